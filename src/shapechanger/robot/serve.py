@@ -89,16 +89,7 @@ class Service:
     def board(
         self, profile: Profile, place: Callable[[], Place], undo: contextlib.ExitStack
     ) -> BoardAt:
-        """Return the twin's board: a running one in the folder, or a new one, in a new process.
-
-        Args:
-            profile: The robot.
-            place: Returns the world of a new board.
-            undo: Ends a new board after an error.
-
-        Raises:
-            RobotError: If the running one has another clock.
-        """
+        """Return the twin's board: a running one in the folder, or a new one, in a new process."""
         folder = self.twin_folder
         if folder is None:
             folder = Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
@@ -125,15 +116,7 @@ class Service:
         return board
 
     def plan(self, profile: Profile, board: BoardAt | None) -> ServePlan:
-        """Return the plan for the robot's processes.
-
-        Args:
-            profile: The robot.
-            board: The board of its twin; None for the pins of this machine.
-
-        Raises:
-            RobotError: If its credentials are missing or invalid.
-        """
+        """Return the plan for the robot's processes."""
         folder = self.credentials or credentials_folder(profile.name)
         is_twin = board is not None
         policies, policy = "", ""  # The folder of those on board, and the one that starts.
@@ -182,12 +165,6 @@ class Service:
 
         This process becomes the supervisor. A robot that does not start must not take the name from
         one that runs.
-
-        Args:
-            name: Name of the robot.
-            plan: Its plan, which from now on has the port.
-            port: The port.
-            say: Tells a person what was stored, in that process.
         """
         # Without TLS, or with credentials of its own and any free port, the caller passes the
         # address on.
@@ -216,13 +193,7 @@ class Service:
 
 
 def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
-    """Wait until a robot can be reached at a port, or until its supervisor has ended.
-
-    Args:
-        ready_file: File that its daemon writes; another robot's may be there.
-        port: The port.
-        served_by: Process id of the supervisor.
-    """
+    """Wait until a robot can be reached at a port, or until its supervisor has ended."""
     os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # The twin ends when the last file is closed.
     while True:
         with contextlib.suppress(OSError, ValueError, LookupError, TypeError):
@@ -236,15 +207,7 @@ def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
 
 
 def require_free(host: str, port: int) -> int:
-    """Check that an address is free before starting anything, and return its port.
-
-    Args:
-        host: The address.
-        port: The port; 0 for any.
-
-    Raises:
-        RobotError: If it cannot be used.
-    """
+    """Check that an address is free before starting anything, and return its port."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -262,11 +225,7 @@ def require_free(host: str, port: int) -> int:
 
 
 def recordings_folder(name: str) -> Path:
-    """Return the default folder for a robot's recordings.
-
-    Raises:
-        RobotError: If the name is not a valid folder name.
-    """
+    """Return the default folder for a robot's recordings."""
     data = os.environ.get("XDG_DATA_HOME", "")
     # As for credentials: a relative path is ignored.
     base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
@@ -276,14 +235,8 @@ def recordings_folder(name: str) -> Path:
 def make_known(robot: KnownRobot) -> str:
     """Store a local robot among the known robots, unless its name is taken.
 
-    Args:
-        robot: The robot, as reached from this machine.
-
     Returns:
         A sentence on what was done.
-
-    Raises:
-        OutputError: If it cannot be stored.
     """
     name = robot.name
     drives = f"`shapechanger robot drive {name}` drives it from here"
@@ -309,12 +262,6 @@ def make_known(robot: KnownRobot) -> str:
 
 
 def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:
-    """Return a robot as its clients know it.
-
-    Args:
-        address: Its address, HOST or HOST:PORT.
-        name: Its name.
-        credentials: Its key and certificate.
-    """
+    """Return a robot as its clients know it."""
     key = credentials.key_file.read_text().strip()
     return KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))

@@ -46,9 +46,6 @@ def open_console(robot: KnownRobot) -> str:
 
     Returns:
         The address without the key.
-
-    Raises:
-        LinkError: If no browser opens.
     """
     address = console_address(robot)
     there = html.escape(f"{address}#key={robot.key}", quote=True)

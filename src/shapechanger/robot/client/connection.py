@@ -71,11 +71,6 @@ class Access:
 class RobotConnection:
     """Open connection to a robot, made by `open_connection`.
 
-    Args:
-        websocket: The WebSocket.
-        welcome: Description of the robot.
-        access: Settings of the connection.
-
     Attributes:
         welcome: Description of the robot.
     """
@@ -100,15 +95,7 @@ class RobotConnection:
         self._posted.set()
 
     async def run(self, handle: _Handler, stop: asyncio.Event) -> None:
-        """Receive and send until `stop` is set.
-
-        Args:
-            handle: Called with each message; it may raise `LinkError` to end the connection.
-            stop: When set, pending messages are sent, and the connection is closed.
-
-        Raises:
-            LinkError: If the connection is lost, or the robot sends an invalid message.
-        """
+        """Receive and send until `stop` is set."""
         work = (self._receive(handle), self._send(), self._watch(), stop.wait())
         tasks = [asyncio.ensure_future(each) for each in work]
         try:
@@ -160,12 +147,7 @@ class RobotConnection:
 
 @asynccontextmanager
 async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
-    """Connect and authenticate.
-
-    Raises:
-        RobotRefused: If the robot's certificate differs, or it refuses the client.
-        LinkError: If no robot answers, or one with another version of the link.
-    """
+    """Connect and authenticate; raise `LinkError` or `RobotRefused`."""
     expected = access.fingerprint
     websocket: aiohttp.ClientWebSocketResponse | None = None
     sockets: list[socket.socket] = []
@@ -249,12 +231,7 @@ async def _welcomed(websocket: aiohttp.ClientWebSocketResponse, access: Access) 
 
 
 async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
-    """Receive a message of one type.
-
-    Raises:
-        RobotRefused: If the robot refuses.
-        LinkError: If the connection ended, or another message arrives.
-    """
+    """Receive a message of one type."""
     message = await _receive(websocket)
     if isinstance(message, messages.Refused):
         raise RobotRefused(message.reason)
@@ -264,11 +241,7 @@ async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) ->
 
 
 async def _receive(websocket: aiohttp.ClientWebSocketResponse) -> RobotMessage:
-    """Receive the next message.
-
-    Raises:
-        LinkError: If the connection ended, or the message is invalid.
-    """
+    """Receive the next message."""
     received = await websocket.receive()
     if received.type is aiohttp.WSMsgType.BINARY:
         return messages.decode_robot_message(received.data)

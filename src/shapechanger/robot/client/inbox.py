@@ -45,9 +45,6 @@ class Inbox:
     The newest observation is in one slot, so that a slow reader never gets an old one. A robot
     sends each frame once, so an observation that replaces an unread one takes over its frame.
 
-    Args:
-        clock: Monotonic clock, s.
-
     Attributes:
         newest: The newest observation of any age; None before the first.
         recorder: Last reported state of the robot's recorder, or None.
@@ -67,12 +64,7 @@ class Inbox:
         self._expected: list[tuple[type[Any], Callable[[Any], bool], Future[Any]]] = []
 
     def put(self, message: RobotMessage) -> None:
-        """Store a message that has just arrived.
-
-        Raises:
-            RobotRefused: If the robot ends the connection.
-            LinkError: If an observation is not newer than the one before, as in a replay.
-        """
+        """Store a message that has just arrived."""
         with self._changed:
             match message:
                 case Observation():
@@ -102,24 +94,12 @@ class Inbox:
             self._changed.notify_all()
 
     def check(self) -> None:
-        """Do nothing while the link is up.
-
-        Raises:
-            LinkError: If it is lost, without the traceback of the connection's thread.
-        """
+        """Do nothing while the link is up."""
         if self.failure is not None:
             raise type(self.failure)(*self.failure.args)
 
     def wait(self, newer_than: int, timeout_s: float) -> Received | None:
-        """Wait for an observation. Return None after the time limit.
-
-        Args:
-            newer_than: Its `seq` is larger than this.
-            timeout_s: Time limit, s.
-
-        Raises:
-            LinkError: If the link is lost.
-        """
+        """Wait for an observation. Return None after the time limit."""
 
         def found() -> Received | None:
             newest = self.newest
@@ -131,16 +111,7 @@ class Inbox:
             return found()
 
     def take(self, newer_than: int, timeout_s: float) -> Received:
-        """Wait for an observation as `wait` does, and raise an error after the time limit.
-
-        Args:
-            newer_than: Its `seq` is larger than this.
-            timeout_s: Time limit, s.
-
-        Raises:
-            StaleObservation: If none arrives in time.
-            LinkError: If the link is lost.
-        """
+        """Wait for an observation as `wait` does, and raise an error after the time limit."""
         found = self.wait(newer_than, timeout_s)
         if found is not None:
             return found
@@ -156,10 +127,6 @@ class Inbox:
         """Return the future answer to a request that is sent next; cancel one that is given up.
 
         A refusal answers the oldest request, and a lost link all of them, with its error.
-
-        Args:
-            kind: Type of the answer.
-            accepts: Returns True if a message of that type is the answer.
         """
         future: Future[_Answer] = Future()
         with self._changed:

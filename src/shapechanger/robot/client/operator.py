@@ -23,15 +23,7 @@ _log = logging.getLogger(__name__)
 
 
 class Preparation:
-    """Steps of one reset, with one time limit for all of them.
-
-    Args:
-        timeout_s: Time limit, s.
-        on_waiting: Called once with a sentence for each thing that is waited for; None for a
-            warning in the log after 2 s.
-        clock: Monotonic clock, s.
-        known_as: Name under which the robot is known on this machine; "" for none.
-    """
+    """Steps of one reset, with one time limit for all of them."""
 
     def __init__(
         self,
@@ -49,12 +41,7 @@ class Preparation:
         self._reported: set[str] = set()
 
     def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
-        """Connect, with retries.
-
-        Raises:
-            RobotRefused: If the robot refuses the client.
-            LinkError: If it does not answer in time.
-        """
+        """Connect, with retries."""
         while True:
             try:
                 return make()
@@ -65,11 +52,7 @@ class Preparation:
                     raise LinkError(f"{error} Gave up after {self._timeout_s:.0f} s.") from None
 
     def take(self, robot: RobotClient) -> None:
-        """Take control, once no other client has it.
-
-        Raises:
-            RobotRefused: If another client keeps control for too long.
-        """
+        """Take control, once no other client has it."""
         while True:
             try:
                 robot.take()
@@ -80,27 +63,14 @@ class Preparation:
                 return
 
     def disarm(self, robot: RobotClient) -> None:
-        """Disarm the robot, so that a person can put it back.
-
-        Raises:
-            RobotRefused: If it stays armed.
-        """
+        """Disarm the robot, so that a person can put it back."""
         robot.disarm()
         while robot.ask().message.armed:
             if not self._wait(f"{robot.welcome.robot} is still armed."):
                 raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
 
     def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
-        """Arm the robot where that is allowed, or wait for a person; we then have control.
-
-        Args:
-            robot: The robot.
-            role: Our role.
-            by_person: Whether to wait for a person in any case.
-
-        Raises:
-            RobotRefused: If it is not armed in time.
-        """
+        """Arm the robot where that is allowed, or wait for a person; we then have control."""
         name = robot.welcome.robot
         because = "It waits for a person"
         first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "
@@ -133,11 +103,7 @@ class Preparation:
                 )
 
     def require_routine(self, robot: RobotClient) -> None:
-        """Check that the robot has a reset routine, before it moves.
-
-        Raises:
-            RobotRefused: If its profile has none.
-        """
+        """Check that the robot has a reset routine, before it moves."""
         if not robot.welcome.reset:
             raise RobotRefused(
                 f"The profile of {robot.welcome.robot} has no reset routine: add [[reset]] tables "
@@ -145,11 +111,7 @@ class Preparation:
             )
 
     def play(self, robot: RobotClient) -> None:
-        """Run the reset routine of the robot's profile.
-
-        Raises:
-            RobotRefused: If the robot is disarmed meanwhile.
-        """
+        """Run the reset routine of the robot's profile."""
         for values, seconds in robot.welcome.reset:
             seen = robot.ask()
             end_ns = seen.message.state_ns + seconds * _NS_PER_S
@@ -166,14 +128,6 @@ class Preparation:
         """Wait for the first observation after the reset.
 
         In lockstep, commands at rest advance the robot's time.
-
-        Args:
-            robot: The robot.
-            rest: Command at rest.
-            is_new: Returns True if an observation was made after a time of the robot, ns.
-
-        Raises:
-            LinkError: If none arrives in time.
         """
         _, now_ns = robot.ping()
         seen = robot.ask()
@@ -186,12 +140,7 @@ class Preparation:
         return seen
 
     def _wait(self, sentence: str, hint: str = "") -> bool:
-        """Wait a moment. Return False after the time limit.
-
-        Args:
-            sentence: What is waited for, a sentence.
-            hint: What a person can do, for the log.
-        """
+        """Wait a moment. Return False after the time limit."""
         now = self._clock()
         is_due = self._on_waiting is not None or now - self._since > _LOG_AFTER_S
         if is_due and sentence not in self._reported:
@@ -213,9 +162,6 @@ class Takeover:
 
     Afterwards the person gives control back and arms the robot for the program. Until both have
     happened, the program only sends suggestions.
-
-    Args:
-        allowed: Whether an episode goes on when a person takes control.
     """
 
     def __init__(self, *, allowed: bool) -> None:
@@ -229,16 +175,8 @@ class Takeover:
     def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
         """Send a command, or a suggestion while another client has control.
 
-        Args:
-            robot: The robot.
-            values: Values of the command.
-            last: The observation that it answers.
-
         Returns:
             Number of the command or suggestion.
-
-        Raises:
-            LinkError: If the link is lost.
         """
         if not self._allowed or last.mine:
             return robot.command(values, answers=last.seq)

@@ -22,9 +22,7 @@ _JOIN_S: Final = 2.0
 class FrameChecks:
     """Rejects frames that fail to decode, repeat the last one or have an impossible time.
 
-    Args:
-        now_ns: Returns the robot's time, to reject frames from the future; None where time moves
-            in steps, and a frame may arrive before its time is known here.
+    `now_ns` is None where time moves in steps, and a frame may arrive before its time is known.
     """
 
     def __init__(self, now_ns: Callable[[], int] | None = None) -> None:
@@ -53,14 +51,6 @@ class FrameChecks:
 
 class FrameReader:
     """Reads a camera in a thread, and reopens it after failures.
-
-    Args:
-        plan: Settings of the camera.
-        checks: Checks each frame.
-        deliver: Called in the thread with each valid, new frame.
-        report: Called in the thread with a sentence when the camera fails, once for each kind of
-            failure, and when it recovers; once if its stream has bytes between frames.
-        opener: Opens the camera.
 
     Attributes:
         errors: Number of frames or attempts that failed.

@@ -43,11 +43,6 @@ _FRAME_PACE: Final = 1.25
 class Timekeeper:
     """Advances the robot's time, and collects all that happened meanwhile.
 
-    Args:
-        clock: The robot's clock.
-        hub: State that all connections share.
-        drain: Reads all states that the guard has sent.
-
     Attributes:
         in_steps: True if time stands still between calls of `step`.
     """
@@ -94,13 +89,7 @@ class Timekeeper:
 
 
 class ObservationPacer:
-    """Waits until an observation is due for one client.
-
-    Args:
-        session: Session of the client.
-        hub: State that all connections share.
-        time: Advances the robot's time.
-    """
+    """Waits until an observation is due for one client."""
 
     def __init__(self, session: Session, hub: SessionHub, time: Timekeeper) -> None:
         self._session = session
@@ -163,14 +152,7 @@ def new_socket() -> web.WebSocketResponse:
 
 
 class ClientConnection:
-    """Moves messages between a WebSocket and a session.
-
-    Args:
-        socket: The WebSocket, prepared.
-        session: The session.
-        pacer: Waits until an observation is due.
-        time: Advances the robot's time.
-    """
+    """Moves messages between a WebSocket and a session."""
 
     def __init__(
         self,
@@ -185,11 +167,7 @@ class ClientConnection:
         self._time = time
 
     async def greet(self) -> None:
-        """Authenticate the client.
-
-        Raises:
-            LinkError: If the client is refused or sends no hello.
-        """
+        """Authenticate the client."""
         await self._send(self._session.challenge())
         try:
             async with asyncio.timeout(HELLO_TIMEOUT_S):
@@ -201,11 +179,7 @@ class ClientConnection:
         await self._send(self._session.introduce(data))
 
     async def serve(self) -> None:
-        """Exchange messages until the client disconnects.
-
-        Raises:
-            LinkError: If the client must be disconnected, with the reason.
-        """
+        """Exchange messages until the client disconnects."""
         tasks = [
             asyncio.create_task(work) for work in (self._listen(), self._answer(), self._observe())
         ]
@@ -236,11 +210,7 @@ class ClientConnection:
         await self._in_time(self._socket.send_bytes(encode(message)))
 
     async def _in_time(self, sending: Awaitable[None]) -> None:
-        """Wait for a message to be sent.
-
-        Raises:
-            LinkError: If the client does not read it in time.
-        """
+        """Wait for a message to be sent."""
         try:
             async with asyncio.timeout(_SEND_S):
                 await sending
@@ -273,11 +243,7 @@ class ClientConnection:
             await self._send(await self._pacer.next())
 
     async def _read(self) -> bytes | None:
-        """Return the next message, or None when the client has disconnected.
-
-        Raises:
-            LinkError: If the message is not binary, or too large.
-        """
+        """Return the next message, or None when the client has disconnected."""
         while True:
             message = await self._socket.receive()
             if message.type is WSMsgType.BINARY:

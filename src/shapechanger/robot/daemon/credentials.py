@@ -42,11 +42,7 @@ class Credentials:
 
 
 def credentials_folder(name: str) -> Path:
-    """Return the folder of a robot's credentials.
-
-    Raises:
-        RobotError: If the name cannot be the name of a folder.
-    """
+    """Return the folder of a robot's credentials."""
     if not name or name.startswith(".") or "/" in name or "\0" in name:
         raise RobotError(f"A robot's name must be a valid folder name, got {name!r}.")
     config = os.environ.get("XDG_CONFIG_HOME", "")
@@ -59,14 +55,6 @@ def make_credentials(folder: Path, name: str) -> Credentials:
     """Make a key and a self-signed certificate that is valid for ten years.
 
     Existing credentials stay, because clients know them.
-
-    Args:
-        folder: Folder of the credentials.
-        name: Name of the robot, the common name of the certificate.
-
-    Raises:
-        OutputError: If the folder cannot be written.
-        RobotError: If some of the files exist, or other users can read them.
     """
     files = [folder / part for part in (_KEY, _CERTIFICATE, _PRIVATE_KEY)]
     if all(file.exists() for file in files):
@@ -95,11 +83,7 @@ def make_credentials(folder: Path, name: str) -> Credentials:
 
 
 def load_credentials(folder: Path) -> Credentials:
-    """Read the credentials in a folder.
-
-    Raises:
-        RobotError: If a file is missing or invalid, or other users can read it.
-    """
+    """Read the credentials in a folder."""
     read_key(folder / _KEY)
     _check_private(folder / _PRIVATE_KEY)
     certificate = folder / _CERTIFICATE
@@ -112,11 +96,7 @@ def load_credentials(folder: Path) -> Credentials:
 
 
 def read_key(file: Path) -> bytes:
-    """Read the key in a file.
-
-    Raises:
-        RobotError: If it is missing or invalid, or other users can read it.
-    """
+    """Read the key in a file."""
     _check_private(file)
     try:
         return parse_key(file.read_text())
@@ -125,15 +105,7 @@ def read_key(file: Path) -> bytes:
 
 
 def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, bytes]:
-    """Return the server's context for TLS 1.3 or newer, and the fingerprint of its certificate.
-
-    Args:
-        certificate: Certificate (PEM).
-        private_key: Its private key (PEM).
-
-    Raises:
-        RobotError: If a file is missing, the two do not match, or other users can read the key.
-    """
+    """Return the server's context for TLS 1.3 or newer, and the fingerprint of its certificate."""
     _check_private(private_key)
     fingerprint = _fingerprint(certificate)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
@@ -146,11 +118,7 @@ def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, by
 
 
 def check_exposure(plan: DaemonPlan) -> None:
-    """Refuse to serve other machines without TLS and a key.
-
-    Raises:
-        RobotError: If the plan does so without `insecure`.
-    """
+    """Refuse to serve other machines without TLS and a key."""
     secured = plan.certificate and plan.private_key and plan.key_file
     if not (secured or plan.insecure or is_loopback(plan.host)):
         raise RobotError(

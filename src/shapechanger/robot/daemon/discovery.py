@@ -22,13 +22,7 @@ _log = logging.getLogger(__name__)
 
 
 async def announce(plan: DaemonPlan, port: int, fingerprint: bytes) -> AsyncZeroconf | None:
-    """Announce a robot. If that fails, log a warning and return None; the robot serves anyway.
-
-    Args:
-        plan: Description of the robot.
-        port: Port of the server.
-        fingerprint: Fingerprint of its certificate; empty without TLS.
-    """
+    """Announce a robot. If that fails, log a warning and return None; the robot serves anyway."""
     zeroconf: AsyncZeroconf | None = None
     try:
         zeroconf = AsyncZeroconf()

@@ -31,11 +31,6 @@ class GuardLink:
 
     A guard that does not read fills the socket. A command is then dropped, because it would be
     too old when the guard reads again, and a stop waits until there is room.
-
-    Args:
-        fd: Descriptor of the socket, which this object owns.
-        on_state: Called with each state, in order.
-        on_lost: Called once, when the guard is gone.
     """
 
     def __init__(
@@ -128,12 +123,7 @@ class GuardLink:
 
 
 async def send_heartbeats(fd: int, period_s: float) -> None:
-    """Send the supervisor a byte each period, until the supervisor is gone.
-
-    Args:
-        fd: Socket to the supervisor, which this function owns.
-        period_s: Real time between two bytes, s.
-    """
+    """Send the supervisor a byte each period, until the supervisor is gone."""
     with socket.socket(fileno=fd) as heart:
         heart.setblocking(False)
         while True:
@@ -159,9 +149,6 @@ def send_lifeline(guard_fd: int) -> bool:
     0.5 ms in place of 7 ms.
 
     Call this while few files are open and no other thread runs.
-
-    Args:
-        guard_fd: The socket to the guard.
 
     Returns:
         False where the system cannot do it; the guard then waits for the end of the socket.

@@ -54,12 +54,6 @@ class HubClient(Protocol):
 class SessionHub:
     """The robot, as its connections see it. The hub never blocks and knows no sockets.
 
-    Args:
-        plan: Description of the robot.
-        now_ns: Returns the robot's time, ns.
-        order: Passes an order to the guard.
-        call: Runs a function in the event loop's thread, from any other thread.
-
     Attributes:
         plan: Description of the robot.
         now_ns: Returns the robot's time, ns.
@@ -105,9 +99,6 @@ class SessionHub:
         """Add the session of an authenticated client.
 
         A person always fits: where the limit is reached, the oldest client without control leaves.
-
-        Raises:
-            RobotRefused: If a program connects and too many clients are connected.
         """
         is_program = member.client.role == "program"
         programs = sum(other.client.role == "program" for other in self._clients.values())
@@ -158,12 +149,7 @@ class SessionHub:
         self._broadcast_lease(reason)
 
     def release(self, client: ClientIdentity, why: str) -> None:
-        """End the lease of a client, if it holds it, and disarm the robot.
-
-        Args:
-            client: The client.
-            why: Reason, a clause without a full stop.
-        """
+        """End the lease of a client, if it holds it, and disarm the robot."""
         if not self.lease.release(client.session):
             return
         self.give_order(Order(kind="disarm", reason=why))
@@ -171,13 +157,7 @@ class SessionHub:
         self._broadcast_lease(f"No client has control: {why}.")
 
     def command(self, client: ClientIdentity, command: Command, now_ns: int) -> None:
-        """Pass a valid command of the lease holder to the guard.
-
-        Args:
-            client: The lease holder.
-            command: The command.
-            now_ns: Its arrival time, ns.
-        """
+        """Pass a valid command of the lease holder to the guard."""
         self._arrivals[self.lease.number, command.seq] = now_ns
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
@@ -211,12 +191,7 @@ class SessionHub:
         self._order(replace(order, issued_ns=self.now_ns()))
 
     def suggest(self, client: ClientIdentity, values: tuple[float, ...]) -> None:
-        """Store the suggestion of a client without the lease.
-
-        Args:
-            client: The client that sent it.
-            values: One number for each action of the robot.
-        """
+        """Store the suggestion of a client without the lease."""
         until_ns = self.now_ns() + _NS_PER_MS * self.plan.card.deadline_ms
         self._suggestion = PendingCommand(client, values, until_ns)
 
@@ -267,12 +242,7 @@ class SessionHub:
         self._notify()
 
     def event(self, name: str, text: str) -> None:
-        """Report an event to all clients.
-
-        Args:
-            name: Kind of event, such as "armed".
-            text: A sentence.
-        """
+        """Report an event to all clients."""
         self._broadcast(Event(name=name, text=text, at_ns=self.now_ns()))
 
     def _broadcast(self, message: RobotMessage) -> None:

@@ -55,12 +55,7 @@ _LINES: Final = msgspec.json.Decoder(_Line)
 
 
 class RecordingLibrary:
-    """Answers questions about recordings, one after another, in a thread of its own.
-
-    Args:
-        folder: Folder of the recordings; None for none.
-        call: Runs a function in the event loop's thread, from any other thread.
-    """
+    """Answers questions about recordings, one after another, in a thread of its own."""
 
     def __init__(self, folder: Path | None, call: Callable[[Callable[[], None]], None]) -> None:
         self._recordings = None if folder is None else RecordingFolder(folder)
@@ -69,12 +64,7 @@ class RecordingLibrary:
         self._thread: threading.Thread | None = None
 
     def ask(self, question: Question, then: Callable[[Answer], None]) -> None:
-        """Ask a question; the caller bounds how many are open.
-
-        Args:
-            question: The question; a judgement must come from a person.
-            then: Called with the answer, in the event loop's thread.
-        """
+        """Ask a question; the caller bounds how many are open."""
         recordings = self._recordings
         if recordings is None:
             then(messages.Refused(reason="This robot was served without a folder for recordings."))
@@ -101,11 +91,7 @@ class RecordingLibrary:
 
 
 class RecordingFolder:
-    """Folder of episodes; an unchanged episode is read once for the list.
-
-    Args:
-        folder: The folder.
-    """
+    """Folder of episodes; an unchanged episode is read once for the list."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -156,24 +142,14 @@ class RecordingFolder:
         return messages.Recordings(episodes=listed, more=len(found) > messages.MAX_EPISODES)
 
     def _path(self, name: str) -> Path:
-        """Return the folder of an episode, directly inside that of the recordings.
-
-        Raises:
-            DemosError: If it does not exist.
-        """
+        """Return the folder of an episode, directly inside that of the recordings."""
         path = self._folder / name
         if not _EPISODE_ID.fullmatch(name) or not _is_listed(path):
             raise DemosError(f"There is no episode {name!r} on this robot.")
         return path
 
     def _piece(self, path: Path, question: messages.Fetch) -> messages.Piece:
-        """Read a part of an episode.
-
-        Raises:
-            DemosError: If a line is damaged, or one step is too large for a message.
-            OSError: If a file cannot be read.
-            ValueError: If a line is not UTF-8.
-        """
+        """Read a part of an episode."""
         steps = path / STEPS
         index = self._index
         if index is None or index.path != steps:
@@ -215,11 +191,7 @@ class RecordingFolder:
 
 
 class LineIndex:
-    r"""Offsets of the complete lines of a growing file: those that end with `\n`.
-
-    Args:
-        path: The file.
-    """
+    r"""Offsets of the complete lines of a growing file: those that end with `\n`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -232,14 +204,7 @@ class LineIndex:
         return len(self._ends)
 
     def refresh(self, file: BinaryIO) -> None:
-        """Read what was appended, or all of it if the file was replaced or truncated.
-
-        Args:
-            file: The file, open for reading.
-
-        Raises:
-            OSError: If it cannot be read.
-        """
+        """Read what was appended, or all of it if the file was replaced or truncated."""
         found = os.fstat(file.fileno())
         if found.st_ino != self._inode or found.st_size < self._read_to:
             self._ends, self._read_to, self._inode = array("Q"), 0, found.st_ino
@@ -251,15 +216,7 @@ class LineIndex:
             self._read_to += len(chunk)
 
     def read(self, file: BinaryIO, number: int) -> bytes:
-        r"""Read a line with its `\n`.
-
-        Args:
-            file: The file, open for reading.
-            number: Number of the line, from 0.
-
-        Raises:
-            OSError: If it cannot be read.
-        """
+        r"""Read a line with its `\n`."""
         start = self._ends[number - 1] if number else 0
         file.seek(start)
         return file.read(self._ends[number] - start)
@@ -271,12 +228,7 @@ def _is_listed(path: Path) -> bool:
 
 
 def _summary(path: Path) -> messages.EpisodeSummary:
-    """Summarise an episode; an incomplete or damaged line is left out.
-
-    Raises:
-        DemosError: If the header cannot be read.
-        OSError: If the steps cannot be read.
-    """
+    """Summarise an episode; an incomplete or damaged line is left out."""
     header, closed = read_header(path)
     steps: dict[int, int | None] = {}
     edits: list[_Line] = []

@@ -27,12 +27,7 @@ class NumberedFrame:
 
 
 class StateReader:
-    """Orders the quantities of the guard as in the state layout.
-
-    Args:
-        state_layout: Layout of `Observation.state`.
-        action_layout: Layout of `Command.values`.
-    """
+    """Orders the quantities of the guard as in the state layout."""
 
     def __init__(self, state_layout: Layout, action_layout: Layout) -> None:
         features = state_layout.features
@@ -76,19 +71,8 @@ def build_observation(
 ) -> Observation:
     """Build the observation for one client.
 
-    Args:
-        seq: Number of the observation.
-        now_ns: The robot's time, ns.
-        reader: Reads the state in the order of the layout.
-        state: Newest state of the guard, or None.
-        newest: Newest valid frame, or None.
-        frame_sent: Number of the last frame sent to this client; None if it wants no frames.
-        lease: Number of the current lease. A command of an earlier lease came from another client.
-        command_ns: Arrival time of the command behind `state.applied`, ns.
-        holder: Holder of the lease.
-        mine: Whether the client holds the lease.
-        commanded: Values of the unexpired command; () for none.
-        suggested: Unexpired suggestion of a client without the lease.
+    `frame_sent` is the number of the last frame sent to it; None if it wants no frames. A command
+    of another lease than `lease` came from another client.
     """
     state_ns = now_ns if state is None else state.at_ns
     is_new = newest is not None and frame_sent is not None and newest.seq != frame_sent

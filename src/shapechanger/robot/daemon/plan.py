@@ -54,11 +54,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> DaemonPlan:
-        """Read the output of `to_dict`.
-
-        Raises:
-            ProfileError: If a field is unknown or has the wrong type or range.
-        """
+        """Read the output of `to_dict`."""
         try:
             return msgspec.convert(fields, cls)
         except msgspec.ValidationError as error:

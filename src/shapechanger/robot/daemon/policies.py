@@ -45,13 +45,7 @@ def policies_in(folder: Path) -> list[str]:
 
 
 class PolicyRunner:
-    """Runs at most one policy of a folder.
-
-    Args:
-        plan: Settings of the daemon.
-        post: Sends a message to all clients.
-        command: Command line of a policy's process; empty for the plan's program.
-    """
+    """Runs at most one policy of a folder."""
 
     def __init__(
         self,
@@ -68,12 +62,7 @@ class PolicyRunner:
         self._task: asyncio.Task[None] | None = None
 
     def serve(self, port: int, fingerprint: bytes) -> None:
-        """Start the policy that starts with the robot, once the robot can be reached.
-
-        Args:
-            port: Port of the robot.
-            fingerprint: SHA-256 of its certificate; empty without TLS.
-        """
+        """Start the policy that starts with the robot, once the robot can be reached."""
         host = self._plan.host
         self._robot = {
             "name": self._plan.card.robot,
@@ -91,9 +80,6 @@ class PolicyRunner:
 
     def run(self, name: str) -> str:
         """Start a policy in place of the one that runs, or end that one.
-
-        Args:
-            name: Name of the policy; "" to end the one that runs.
 
         Returns:
             The reason why it is refused, a sentence; "" if it is not.

@@ -37,11 +37,6 @@ class PreAuthConnections:
 
     A new connection is never turned away, because it may be the person who wants to stop the
     robot: it replaces the oldest connection of the address that has the most.
-
-    Args:
-        max_total: Most connections.
-        max_per_address: Most connections of one address.
-        timeout_s: Time after which a connection without a request is dropped, s.
     """
 
     def __init__(
@@ -61,12 +56,7 @@ class PreAuthConnections:
         return len(self._waiting)
 
     def add(self, key: Hashable, connection: AcceptedSocket) -> None:
-        """Add a connection, and drop another one if there are too many.
-
-        Args:
-            key: Identifies the connection from now on.
-            connection: The connection.
-        """
+        """Add a connection, and drop another one if there are too many."""
         for other in [k for k, (known, _) in self._waiting.items() if known.is_gone]:
             self.remove(other)
         if self._counts()[connection.address] >= self._max_per_address:
@@ -120,13 +110,7 @@ class PreAuthConnections:
 
 
 class Listener:
-    """Accepts connections, and registers each one before its TLS handshake.
-
-    Args:
-        connections: Where new connections are registered, by their protocol.
-        protocol: Makes the protocol of a connection.
-        tls: The TLS context, or None for plain TCP.
-    """
+    """Accepts connections, and registers each one before its TLS handshake."""
 
     def __init__(
         self,
@@ -143,15 +127,8 @@ class Listener:
     async def start(self, host: str, port: int) -> int:
         """Start listening.
 
-        Args:
-            host: Address to listen at; "" for all.
-            port: Port to listen at; 0 for any free port.
-
         Returns:
             The port.
-
-        Raises:
-            RobotError: If the address cannot be used.
         """
         loop = asyncio.get_running_loop()
         try:
@@ -206,12 +183,6 @@ class Listener:
 
 class AcceptedSocket:
     """A connection from its acceptance on, through the TLS handshake.
-
-    Args:
-        accepted: The socket, which this object owns.
-        address: The address of the other end.
-        protocol: Handles the connection once it is open.
-        tls: The TLS context, or None for plain TCP.
 
     Attributes:
         address: The address of the other end.

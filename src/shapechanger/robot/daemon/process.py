@@ -42,15 +42,7 @@ _MAX_LOG_LINES: Final = 1000
 
 
 class Daemon:
-    """The daemon of a robot, from start to end; make it in the event loop that runs it.
-
-    Args:
-        plan: Settings of the daemon.
-        clock: The robot's clock.
-        guard_fd: Socket to the guard, which this object owns.
-        heartbeat_fd: Socket to the supervisor, which this object owns; None without one.
-        ready_fd: Descriptor that the port is written to; None for none.
-    """
+    """The daemon of a robot, from start to end; make it in the event loop that runs it."""
 
     def __init__(
         self,
@@ -80,9 +72,6 @@ class Daemon:
 
         Returns:
             The reason why it ended; "" if it was asked to.
-
-        Raises:
-            RobotError: If it cannot start.
         """
         plan = self._plan
         check_exposure(plan)

@@ -74,12 +74,6 @@ class StepBuilder:
     outputs. Of two commands that answer the same observation the later one counts. A command that
     answers an observation older than that of the last step is ignored, so that time never runs
     backwards in an episode.
-
-    Args:
-        limits: Range of each action, to which the guard clips.
-        write: Called with each complete step, and its frame as JPEG; None if the frame is that of
-            the step before, or there is no camera.
-        wall_ns: Returns the Unix time, ns.
     """
 
     def __init__(
@@ -97,13 +91,7 @@ class StepBuilder:
         self._frame_seq = 0
 
     def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
-        """Note an observation that is sent to a client, and complete the step before it.
-
-        Args:
-            session: Number of the connection.
-            observation: The observation.
-            frame: The newest frame, whether or not it was sent to this client.
-        """
+        """Note an observation that is sent to a client, and complete the step before it."""
         self._seen.setdefault(session, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
         decided = self._decided
         if decided is None or decided.session != session:
@@ -120,14 +108,7 @@ class StepBuilder:
     def decided(
         self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
     ) -> None:
-        """Note a command of a client, and complete a step that answers another observation.
-
-        Args:
-            client: The client.
-            answers: `seq` of the observation that the command answers.
-            values: The values of the command.
-            now_ns: Arrival time on the robot's clock, ns.
-        """
+        """Note a command of a client, and complete a step that answers another observation."""
         window = self._seen.get(client.session, ())
         seen = next((s for s in reversed(window) if s.observation.seq == answers), None)
         if seen is None or self._is_past(client.session, seen):
@@ -177,13 +158,6 @@ class StepBuilder:
 class EpisodeThread:
     """Thread that writes one episode, in the order of the calls; a full one goes on in the next.
 
-    Args:
-        folder: Folder of the recordings.
-        header: Header of the episode.
-        report: Called in the thread with "begun" for each episode, and with "ended" and the error
-            or "".
-        after: The previous thread, to wait for; None for none.
-
     Attributes:
         progress: State of the episode; `recording` and `text` are the recorder's to set.
     """
@@ -211,10 +185,6 @@ class EpisodeThread:
     def add(self, step: Step, jpeg: bytes | None) -> bool:
         """Write a step.
 
-        Args:
-            step: The step.
-            jpeg: Its frame; None if it is that of the step before, or there is no camera.
-
         Returns:
             False if the disk is too slow, which ends the episode.
         """
@@ -230,12 +200,7 @@ class EpisodeThread:
         return self._put(write, len(jpeg or b""))
 
     def edit(self, request: Mark | Undo, then: Callable[[str], None]) -> None:
-        """Mark the newest step, or drop the newest ones.
-
-        Args:
-            request: The mark's text, or how far back to drop.
-            then: Called in the thread with the reason for a refusal, or "".
-        """
+        """Mark the newest step, or drop the newest ones."""
 
         def edit(writer: EpisodeWriter) -> EpisodeWriter:
             refusal = ""
@@ -329,11 +294,6 @@ class Recorder:
 
     Steps are recorded while the robot is armed.
 
-    Args:
-        plan: Settings of the daemon.
-        broadcast: Sends a message to all clients.
-        call: Runs a function in the event loop's thread, from any other thread.
-
     Attributes:
         builder: Makes the steps of the episode; None while nothing is recorded.
     """
@@ -362,12 +322,6 @@ class Recorder:
 
     def begin(self, client: ClientIdentity, name: str, driver: str, post: _Post) -> str:
         """Begin an episode.
-
-        Args:
-            client: The person who asks for it.
-            name: Title of the episode.
-            driver: Name of the client in control.
-            post: Sends a message to that person; errors of the disk come later.
 
         Returns:
             The reason for a refusal, or "".
@@ -400,9 +354,6 @@ class Recorder:
     def end(self, text: str = "") -> str:
         """End the episode.
 
-        Args:
-            text: Why it ends by itself, a sentence; "" where a person ends it.
-
         Returns:
             The reason for a refusal, or "".
         """
@@ -416,10 +367,6 @@ class Recorder:
 
     def edit(self, request: Mark | Undo, post: _Post) -> str:
         """Mark the newest step, or drop the newest ones, after the pending step.
-
-        Args:
-            request: The mark's text, or how far back to drop.
-            post: Called with the message that reports a later refusal.
 
         Returns:
             The reason for a refusal, or "".

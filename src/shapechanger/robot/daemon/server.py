@@ -57,11 +57,8 @@ _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
     """Return the reason why a web page must not open a connection, or "" if it may.
 
-    Args:
-        origin: The `Origin` header; None from a program other than a browser.
-        host: The `Host` header.
-        is_open: Whether the robot accepts every client. The host name must then be one that a
-            foreign name server cannot point at the robot (DNS rebinding).
+    A robot that accepts every client (`is_open`) must be opened under a name that a foreign name
+    server cannot point at it (DNS rebinding).
     """
     if origin is None:
         return ""
@@ -78,17 +75,7 @@ def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
 
 
 class Server:
-    """Serves the robot on one port.
-
-    Args:
-        hub: State that all connections share.
-        time: Advances the robot's time.
-        authenticator: Checks the clients' proofs.
-        tls: The TLS context, or None for plain TCP.
-
-    Raises:
-        RobotError: If the console's files cannot be read.
-    """
+    """Serves the robot on one port."""
 
     def __init__(
         self,
@@ -108,11 +95,7 @@ class Server:
         self._listener = Listener(self._pre_auth, self._protocol, tls)
 
     async def start(self) -> int:
-        """Start listening, and return the port.
-
-        Raises:
-            RobotError: If the address cannot be used.
-        """
+        """Start listening, and return the port."""
         plan = self._hub.plan
         await self._runner.setup()
         return await self._listener.start(plan.host, plan.port)

@@ -55,24 +55,14 @@ class Authenticator:
         return not self.key
 
     def accepts(self, hello: messages.Hello, nonce: bytes) -> bool:
-        """Return True if the proof in `hello` answers `nonce` with the right key.
-
-        Args:
-            hello: The client's first message.
-            nonce: The challenge that it answers.
-        """
+        """Return True if the proof in `hello` answers `nonce` with the right key."""
         if self.is_open:
             return True
         return is_proof(hello.proof, self.key, nonce, self.certificate, hello.role)
 
 
 class MessageRate:
-    """Token bucket that holds one second's worth of messages.
-
-    Args:
-        per_s: Messages per second.
-        clock: Monotonic clock, s.
-    """
+    """Token bucket that holds one second's worth of messages."""
 
     def __init__(
         self, per_s: float = MESSAGES_PER_S, clock: Callable[[], float] = monotonic
@@ -142,33 +132,18 @@ class Outbox:
 
 
 class SentObservations:
-    """The last observations sent to one client, and when.
-
-    Args:
-        max_age_ms: Oldest observation that a command may answer, ms since it was sent.
-        window: Number of observations to remember.
-    """
+    """The last observations sent to one client, and when."""
 
     def __init__(self, max_age_ms: int, window: int = _WINDOW) -> None:
         self._max_age_ms = max_age_ms
         self._sent: deque[tuple[int, int]] = deque(maxlen=window)
 
     def add(self, seq: int, now_ns: int) -> None:
-        """Remember that an observation is sent now.
-
-        Args:
-            seq: Its number, which increases from call to call.
-            now_ns: Robot's time, ns.
-        """
+        """Remember that an observation is sent now."""
         self._sent.append((seq, now_ns))
 
     def refusal(self, answers: int, now_ns: int) -> str:
-        """Return the reason why a message must not act, or "" if it may.
-
-        Args:
-            answers: `seq` of the observation that the message answers.
-            now_ns: The robot's time, ns.
-        """
+        """Return the reason why a message must not act, or "" if it may."""
         sent_ns = dict(self._sent).get(answers)
         if sent_ns is None:
             return f"Observation {answers} was not sent to this client recently."
@@ -188,12 +163,6 @@ def printable(text: str) -> str:
 
 class Session:
     """Session of one client, without its socket.
-
-    Args:
-        number: Number of the connection, never used twice.
-        hub: State that all connections share.
-        authenticator: Checks the client's proof.
-        rate: Limits how many messages the client may send.
 
     Attributes:
         outbox: Messages for the client, other than observations.
@@ -245,13 +214,7 @@ class Session:
         )
 
     def introduce(self, data: bytes) -> messages.Welcome:
-        """Authenticate the client by its first message.
-
-        Raises:
-            WrongKey: If the client does not hold the key.
-            RobotRefused: If its version differs, or too many clients are connected.
-            LinkError: If the message is not a hello.
-        """
+        """Authenticate the client by its first message."""
         hello = messages.decode_client_message(data)
         if not isinstance(hello, messages.Hello) or self._is_known:
             raise LinkError("The first message must be a hello.")
@@ -276,11 +239,7 @@ class Session:
         return messages.Welcome.of(self._hub.plan.card, self.client.session, can_record=can_record)
 
     def receive(self, data: bytes) -> None:
-        """Handle a message of the client.
-
-        Raises:
-            LinkError: If the connection must end, with the reason.
-        """
+        """Handle a message of the client."""
         if not self._is_known:
             raise LinkError("The first message must be a hello.")
         if self.expelled:
@@ -320,11 +279,7 @@ class Session:
             raise LinkError(NOT_READING)
 
     def count(self) -> None:
-        """Count a message.
-
-        Raises:
-            RobotRefused: If the client exceeds its rate.
-        """
+        """Count a message."""
         if not self._rate.spend():
             raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
 

@@ -41,11 +41,7 @@ class GuardChannel(Protocol):
 
 
 class DaemonChannel:
-    """Channel over the daemon's socket.
-
-    Args:
-        fd: Descriptor of the socket, owned by this object.
-    """
+    """Channel over the daemon's socket."""
 
     def __init__(self, fd: int) -> None:
         self._socket = socket.socket(fileno=fd)
@@ -129,12 +125,7 @@ class DaemonChannel:
 
 
 class Heartbeat:
-    """Heartbeat to the supervisor, which also detects the supervisor's death.
-
-    Args:
-        fd: Descriptor of the socket, owned by this object.
-        period_s: Real seconds between two beats.
-    """
+    """Heartbeat to the supervisor, which also detects the supervisor's death."""
 
     def __init__(self, fd: int, period_s: float) -> None:
         self._socket = socket.socket(fileno=fd)

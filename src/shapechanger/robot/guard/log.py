@@ -67,12 +67,7 @@ def log_to_stderr(program: str) -> logging.Logger:
 
 
 def shortened(text: str, most_bytes: int = 200) -> str:
-    """Return the longest prefix of a text that fits.
-
-    Args:
-        text: The text.
-        most_bytes: Largest size in UTF-8, bytes.
-    """
+    """Return the longest prefix of a text that fits."""
     data = text.encode(errors="replace")
     if len(data) <= most_bytes:
         return data.decode()

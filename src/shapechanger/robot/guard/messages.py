@@ -101,11 +101,7 @@ def encode(said: Order | GuardState) -> bytes:
 
 
 def decode_order(data: bytes) -> Order:
-    """Decode an order from the daemon.
-
-    Raises:
-        ValueError: If the datagram is not an order, or a number in it is not finite.
-    """
+    """Decode an order from the daemon."""
     fields = _fields(data)
     try:
         fields["values"] = tuple(fields.get("values", ()))
@@ -127,11 +123,7 @@ def decode_order(data: bytes) -> Order:
 
 
 def decode_state(data: bytes) -> GuardState:
-    """Decode a state from the guard.
-
-    Raises:
-        ValueError: If the datagram is not a state.
-    """
+    """Decode a state from the guard."""
     fields = _fields(data)
     try:
         fields["applied"] = tuple(fields["applied"])

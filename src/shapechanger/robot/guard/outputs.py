@@ -22,12 +22,7 @@ from shapechanger.robot.hardware import REAL, Hardware, load
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
-    """Open the pin that triggers the one-shot, low.
-
-    Args:
-        pin: BCM number.
-        hardware: The pins and buses of this robot.
-    """
+    """Open the pin that triggers the one-shot, low."""
     from gpiozero import OutputDevice  # Robots without such pins do not need gpiozero.
 
     return OutputDevice(pin, initial_value=False, pin_factory=hardware.pin_factory())
@@ -39,10 +34,6 @@ class Switches:
     The enable pin feeds a one-shot that holds the enable line of the motors for some ticks after
     each edge. When the edges end for any reason, even the death of both guard and supervisor, the
     motors lose power.
-
-    Args:
-        plan: The robot.
-        hardware: Where the pins are.
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
@@ -108,13 +99,7 @@ class ActionEstimator:
     def estimate(
         self, actions: Sequence[float], requested: Sequence[float], has: Sequence[float]
     ) -> Applied:
-        """Return the applied outputs.
-
-        Args:
-            actions: Decided value of each action.
-            requested: Requested value of each output.
-            has: Actual value of each output.
-        """
+        """Return the applied outputs."""
         deviating = {
             i for i, (a, b) in enumerate(zip(requested, has, strict=True)) if abs(a - b) > _STEP
         }
@@ -157,13 +142,6 @@ class OutputBank:
     Attributes:
         values: Actual value of each output, by name.
         released: Whether the outputs are released.
-
-    Args:
-        plan: The robot.
-        hardware: Where the outputs are.
-
-    Raises:
-        RobotError: If an output does not respond; outputs opened before it are closed.
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
@@ -186,10 +164,6 @@ class OutputBank:
     def write(self, actions: Sequence[float], now_ns: int) -> Applied:
         """Write all outputs, including unchanged ones: some controllers need several writes.
 
-        Args:
-            actions: Value of each action.
-            now_ns: Robot's time, ns.
-
         Returns:
             The applied outputs.
         """
@@ -203,9 +177,6 @@ class OutputBank:
 
     def ready(self, alive: Callable[[], object]) -> str:
         """Reset outputs that had a fault.
-
-        Args:
-            alive: Feeds the enable line and the supervisor meanwhile.
 
         Returns:
             Why an output cannot be reset; empty if all can move.
@@ -270,12 +241,7 @@ def _devices(drivers: Iterable[OutputDriver]) -> list[SharedDevice]:
 
 @contextlib.contextmanager
 def errors_noted(failures: list[str], what: str = "") -> Generator[None]:
-    """Note an error instead of raising it: whatever it is, the next output must rest too.
-
-    Args:
-        failures: The list to add it to.
-        what: What failed, if the error does not name it.
-    """
+    """Note an error instead of raising it: whatever it is, the next output must rest too."""
     try:
         yield
     except Exception as error:
@@ -287,10 +253,6 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     """Put every output to rest by opening and closing it, independently of the others.
 
     No other process may have the outputs open.
-
-    Args:
-        plan: The robot.
-        hardware: The pins and buses of this robot.
 
     Returns:
         Description of the failures.
@@ -313,12 +275,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
 
 
 def preload(plan: GuardPlan, source: str) -> None:
-    """Import everything that `make_safe` needs without opening anything, to save time later.
-
-    Args:
-        plan: The robot.
-        source: Where its hardware comes from.
-    """
+    """Import everything that `make_safe` needs without opening anything, to save time later."""
     load(source)
     for output in plan.outputs:
         OUTPUTS[output.driver]

@@ -31,9 +31,6 @@ def run_normally(pid: int) -> None:
     """Lower a child process, which inherits this process's priority, to normal priority.
 
     Call this right after its start: threads that it already has keep their priority.
-
-    Args:
-        pid: Its process id.
     """
     with contextlib.suppress(ProcessLookupError):  # It has ended.
         if os.getpriority(os.PRIO_PROCESS, pid) < 0:
@@ -45,9 +42,6 @@ def run_promptly(priority: int) -> None:
 
     On a machine with fourteen busy processes, stops were up to 50 ms late when the guard merely had
     a better nice value. Child processes are not real-time.
-
-    Args:
-        priority: `GUARD` or `SUPERVISOR`.
     """
     run_early()
     # Missing outside Linux, and not permitted to every user; both are fine.

@@ -38,16 +38,7 @@ _MOST_REASON_BYTES: Final = 1000  # Several reasons may be joined; a datagram ho
 
 
 class Guard:
-    """Main loop of the guard.
-
-    Args:
-        plan: The robot.
-        hardware: Its pins, buses and time.
-        daemon: Source of orders.
-        log: Receives one line per event.
-        after_failure: Whether it replaces processes that failed. It then starts in an emergency
-            stop, which only a person can end.
-    """
+    """Main loop of the guard."""
 
     def __init__(
         self,

@@ -42,12 +42,7 @@ class RobotHealth:
         return " ".join(filter(None, (*self._others, self._battery)))
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Update with a new sensing.
-
-        Args:
-            sensing: Readings of all sensors.
-            now_ns: Robot's time, ns.
-        """
+        """Update with a new sensing."""
         failing = [
             f"Sensor {name} fails, and can protect no longer: {sensing.failures[name]}"
             for name in self._protecting

@@ -50,10 +50,6 @@ class Arming:
     def arm(self, seen: int, *, person: bool) -> str:
         """Arm, and end an emergency stop.
 
-        Args:
-            seen: Number of emergency stops that the sender knows of.
-            person: Whether a person arms.
-
         Returns:
             Why it stays disarmed; empty if it is armed now.
         """
@@ -83,14 +79,7 @@ class Arming:
 
 
 class Stopping:
-    """A stop in progress: propulsion rests at once; other actions hold, ramp to rest and release.
-
-    Args:
-        plan: Duration of the hold and the ramp.
-        actions: The actions.
-        values: Values of the actions at the start of the stop.
-        since_ns: Start of the stop, ns.
-    """
+    """A stop: propulsion rests at once; other actions hold, ramp to rest and may be released."""
 
     def __init__(
         self,
@@ -137,9 +126,6 @@ class Freshness:
 
     A command replaces its predecessors even when it is refused for another reason, because its
     sender has superseded them.
-
-    Args:
-        deadline_ms: Longest time for which a command acts, ms.
     """
 
     def __init__(self, deadline_ms: int) -> None:
@@ -147,12 +133,7 @@ class Freshness:
         self._newest = (-1, -1)
 
     def refusal(self, order: Order, now_ns: int) -> str:
-        """Return why a command that arrives now is refused, or an empty string.
-
-        Args:
-            order: The command; its sequence number counts as seen.
-            now_ns: Robot's time, ns.
-        """
+        """Return why a command that arrives now is refused, or an empty string."""
         if (order.session, order.seq) <= self._newest:
             session, seq = self._newest
             return (
@@ -169,12 +150,7 @@ class Freshness:
         return ""
 
     def expiry_ns(self, order: Order, arrived_ns: int) -> int:
-        """Return the time at which a command expires, ns.
-
-        Args:
-            order: The command.
-            arrived_ns: Robot's time at which it arrived, ns.
-        """
+        """Return the time at which a command expires, ns."""
         start_ns = min(order.issued_ns, arrived_ns)
         return start_ns + min(self._deadline_ms, order.ttl_ms) * _NS_PER_MS
 
@@ -204,13 +180,6 @@ class Rules:
     Attributes:
         arming: Whether commands may move anything.
         senses: Sensor readings and their conclusions.
-
-    Args:
-        plan: The robot.
-        now_ns: Monotonic time, ns.
-
-    Raises:
-        RobotError: If an action rests outside its own caps.
     """
 
     def __init__(self, plan: GuardPlan, now_ns: int) -> None:
@@ -258,10 +227,6 @@ class Rules:
     def offer(self, order: Order, now_ns: int) -> str:
         """Process an order.
 
-        Args:
-            order: The order.
-            now_ns: Robot's time, ns.
-
         Returns:
             Why it is refused; empty if it is not.
         """
@@ -296,12 +261,7 @@ class Rules:
         self.arming.stop(reason)
 
     def fail(self, reason: str, now_ns: int) -> None:
-        """Latch an emergency stop without hold or ramp, after an output failed.
-
-        Args:
-            reason: Which output failed, and how.
-            now_ns: Robot's time, ns.
-        """
+        """Latch an emergency stop without hold or ramp, after an output failed."""
         self.stop(reason)
         self._stopping = self._rest_at_once(now_ns)
 
@@ -312,12 +272,7 @@ class Rules:
         self._is_pressed = pressed
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
-        """Update with new sensor readings.
-
-        Args:
-            sensing: Readings of all sensors.
-            now_ns: Robot's time, ns.
-        """
+        """Update with new sensor readings."""
         silent = bool(sensing.silent)
         self._reflexes.sense(sensing.quantities, silent, self._done, now_ns)
         self._health.sense(sensing, now_ns)

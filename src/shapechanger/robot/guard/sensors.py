@@ -33,14 +33,7 @@ def merge(
     measured: Mapping[str, float],
     sensor: str,
 ) -> None:
-    """Merge the readings of one more sensor.
-
-    Args:
-        quantities: Readings so far, by name; updated in place.
-        sources: Name of the sensor behind each; updated in place.
-        measured: Readings of this sensor.
-        sensor: Its name.
-    """
+    """Merge the readings of one more sensor."""
     for name, value in measured.items():
         caution = _CAUTION.get(name)
         if name not in quantities or not caution or caution(value) > caution(quantities[name]):
@@ -85,14 +78,7 @@ class SensedState:
     def complete(
         self, sensing: Sensing, *, speed: float | None, stalled: bool, watches_stall: bool
     ) -> None:
-        """Update with a new sensing.
-
-        Args:
-            sensing: The readings.
-            speed: Expected speed, m/s, used if it is not measured; None if unknown.
-            stalled: Whether the robot is stalled.
-            watches_stall: Whether stalls can be detected.
-        """
+        """Update with a new sensing."""
         self.quantities = dict(sensing.quantities)
         self.sources = dict(sensing.sources)
         if watches_stall:
@@ -119,15 +105,7 @@ _MOST_READ_NS: Final = 20_000_000
 
 
 class Sensors:
-    """All sensors; a failed or slow one is reported without affecting the others.
-
-    Args:
-        plan: The robot.
-        hardware: Where the sensors are.
-
-    Raises:
-        RobotError: If a sensor does not respond.
-    """
+    """All sensors; a failed or slow one is reported without affecting the others."""
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
         self._clock = hardware.clock
@@ -140,12 +118,7 @@ class Sensors:
             undo.pop_all()
 
     def read(self, now_ns: int, direction: float) -> Sensing:
-        """Read all sensors.
-
-        Args:
-            now_ns: Monotonic time, ns.
-            direction: Sign of the propulsion.
-        """
+        """Read all sensors."""
         quantities: dict[str, float] = {}
         sources: dict[str, str] = {}
         failures: dict[str, str] = {}

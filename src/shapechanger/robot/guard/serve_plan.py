@@ -82,12 +82,7 @@ def plan_fd(plan: ServePlan) -> int:
 
 
 def supervisor_command(plan: ServePlan, fd: int) -> list[str]:
-    """Return the command line of the supervisor.
-
-    Args:
-        plan: What it serves.
-        fd: Descriptor at which the plan is open.
-    """
+    """Return the command line of the supervisor."""
     script = str(Path(start.__file__).resolve())
     return [plan.python, "-I", script, "supervise", "--plan-fd", str(fd)]
 
@@ -105,15 +100,7 @@ AFTER_FAILURE: Final = "--after-failure"
 
 
 def descriptors(arguments: Sequence[str], names: Sequence[str]) -> dict[str, int]:
-    """Parse the file descriptors of a command line such as `--plan-fd 3 --heartbeat-fd 4`.
-
-    Args:
-        arguments: The command line.
-        names: The options that must be there, such as "--plan-fd".
-
-    Raises:
-        ValueError: If one is unknown or missing.
-    """
+    """Parse the file descriptors of a command line such as `--plan-fd 3 --heartbeat-fd 4`."""
     pairs = dict(zip(arguments[::2], arguments[1::2], strict=True))
     if sorted(pairs) != sorted(names):
         raise ValueError(f"This takes {' N '.join(names)} N, not {' '.join(arguments)}.")

@@ -27,12 +27,7 @@ def _put_package_in_place() -> None:
 
 
 def run(program: str, arguments: list[str]) -> None:
-    """Run a program of the robot without loading the rest of the package.
-
-    Args:
-        program: Its name, such as "supervise".
-        arguments: Its arguments.
-    """
+    """Run a program of the robot without loading the rest of the package."""
     if "shapechanger" not in sys.modules:
         _put_package_in_place()
     importlib.import_module(_PROGRAMS[program]).main(arguments)

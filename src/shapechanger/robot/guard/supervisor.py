@@ -47,12 +47,6 @@ class Child:
         beaten_ns: Time of the last heartbeat, or of the start before the first, ns.
         has_beaten: Whether there was a heartbeat.
         killed: Whether it was killed; a process stuck in the kernel survives that.
-
-    Args:
-        name: Name of the process.
-        command: Command line, to which `--heartbeat-fd N` is added.
-        inherited: File descriptors that it inherits.
-        now_ns: Monotonic time, ns.
     """
 
     def __init__(
@@ -121,12 +115,7 @@ class Child:
             self._process.terminate()
 
     def end(self, at_most_s: float, reap_s: float) -> None:
-        """Send SIGTERM, then SIGKILL if it has not exited in time.
-
-        Args:
-            at_most_s: Time to exit after SIGTERM, s.
-            reap_s: Time to disappear after SIGKILL, s.
-        """
+        """Send SIGTERM, then SIGKILL if it has not exited in time."""
         self.terminate()
         if not self._wait(at_most_s):
             self.kill(reap_s)
@@ -150,12 +139,7 @@ _PAUSE_S: Final = 0.2
 
 
 class Restarts:
-    """Limit on recent restarts.
-
-    Args:
-        most: Largest number of restarts in that time.
-        within_s: The time, s.
-    """
+    """Limit on recent restarts."""
 
     def __init__(self, most: int = 5, within_s: float = 60.0) -> None:
         self._most = most
@@ -216,14 +200,7 @@ class ProcessCommands:
 
 
 class Supervisor:
-    """Run the processes of one robot.
-
-    Args:
-        plan: Plan of the processes.
-        fd: Descriptor of the plan, inherited by the children.
-        commands: Command lines of the children.
-        log: Receives one line per event.
-    """
+    """Run the processes of one robot."""
 
     def __init__(
         self, plan: ServePlan, fd: int, commands: ProcessCommands, log: logging.Logger
