@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.in_process import InProcessRobot
 from shapechanger.robot.twin.robot import Whereabouts, run_robot
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
 from shapechanger.vehicles.envs import VehicleEnv
 from shapechanger.vehicles.world import MujocoWorld
+from tests.robot.twin.in_process import InProcessRobot
 from tests.robots import write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

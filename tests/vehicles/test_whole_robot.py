@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from shapechanger.layout import Layout
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.in_process import InProcessRobot
 from shapechanger.vehicles.courses.course import HOME
 from shapechanger.vehicles.envs import VehicleEnv
 from shapechanger.vehicles.world import MujocoWorld
+from tests.robot.twin.in_process import InProcessRobot
 
 _COURSE, _START = 5, 3
 

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.cli.console import say
 from shapechanger.errors import MissingExtra
-from shapechanger.robot.check.check import Check, Finding, Results, run_checks
-from shapechanger.robot.check.report import write_report
+from shapechanger.robot.check.check import Check, Finding, Results, run_checks, write_report
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement

@@ -15,7 +15,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.check.check import Finding
 from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.hardware import RealClock
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.systemd import unit_name

@@ -9,7 +9,7 @@ import pytest
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import Finding
-from shapechanger.robot.check.lamps import lamps_of, walk
+from shapechanger.robot.check.pins import lamps_of, walk
 from tests.robot.check.held_pins import HeldPins, shipped
 
 

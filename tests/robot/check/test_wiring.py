@@ -13,14 +13,14 @@ from gpiozero.pins.mock import MockFactory, MockPin
 
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from tests.robot.twin.in_process import LocalBoard
 from tests.robots import write_profile
 
 
@@ -85,7 +85,7 @@ def test_pressed_switches(car: GuardPlan) -> None:
     board.pins.sensors.press_stop(down=True)
     for bumper in board.pins.sensors.of_kind(SimulatedSwitch):
         bumper.held = True
-    board.advance(board.now_ns() + 100_000_000)
+    board.pass_ns(100_000_000)
     found = _found(car, board)
     level, sentence = found["emergency button"][0]
     assert (level, "it is pressed" in sentence) == ("bad", True)

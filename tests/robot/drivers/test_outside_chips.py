@@ -12,10 +12,10 @@ from shapechanger.layout import Layout
 from shapechanger.robot.drivers import chip
 from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
 from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
-from shapechanger.robot.twin.in_process import InProcessRobot
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
 from tests.robot.drivers.outside.bh1750 import LUX
+from tests.robot.twin.in_process import InProcessRobot
 
 _HERE = "tests.robot.drivers.outside"
 _LINES = """

@@ -13,7 +13,7 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.install import (
     RootCommand,

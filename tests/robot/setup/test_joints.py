@@ -11,13 +11,13 @@ import pytest
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.zeros import find_joint_zeros
-from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from tests.robot.twin.in_process import LocalBoard
 
 _PLAN = load_profile(find_profile("finger")).guard_plan()
 _ZEROS = [1234, 4095, 0, 2]

@@ -10,9 +10,9 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.zeros import find_zeros
-from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from tests.robot.twin.in_process import LocalBoard
 
 
 def _board(plan: GuardPlan) -> LocalBoard:
@@ -29,7 +29,7 @@ def _plan(zero: int) -> GuardPlan:
 def test_zeros_are_measured_with_taut_tendons() -> None:
     """All servos are released afterwards."""
     board = _board(_plan(5000))
-    zeros = find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns() + 10_000_000))
+    zeros = find_zeros(_plan(0), board.hardware, lambda: board.pass_ns(10_000_000))
     # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
     assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
     assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
@@ -43,7 +43,11 @@ def test_a_loose_tendon_is_an_error() -> None:
     assert board.pins.rig is not None
     board.pins.rig.break_servo("EIP", "snapped")
     with pytest.raises(RobotError, match="EIP"):
-        find_zeros(_plan(0), board.hardware, lambda: board.advance(board.now_ns() + 10_000_000))
+        find_zeros(
+            _plan(0),
+            board.hardware,
+            lambda: board.pass_ns(10_000_000),
+        )
     assert not any(servo.has_torque for servo in board.pins.rig.bus.servos.values())
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from shapechanger.robot.check.check import Finding
 from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.setup.systemd import unit_text, unit_word, write_unit
 from tests.robot.check.test_computer import CAR
 

@@ -11,8 +11,7 @@ from contextlib import contextmanager
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Clock
-from shapechanger.robot.twin.board_client import BoardClient, GrantedClock, SteadyClock
-from shapechanger.robot.twin.hardware import TwinHardware
+from shapechanger.robot.twin.hardware import BoardClient, GrantedClock, SteadyClock, TwinHardware
 
 ACTIONS = (ActionPlan("steering"), ActionPlan("throttle", propels=True))
 

@@ -11,17 +11,9 @@ import msgspec
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.twin import board_client
-from shapechanger.robot.twin.board_client import BoardClient, GrantedClock, SteadyClock
-from shapechanger.robot.twin.messages import (
-    MAX_MESSAGE,
-    BoardGreeting,
-    BoardReply,
-    OperatorRequest,
-    encode,
-)
-
-_REQUEST = OperatorRequest(action="levels", values=())
+from shapechanger.robot.twin import hardware
+from shapechanger.robot.twin.hardware import BoardClient, GrantedClock, SteadyClock
+from shapechanger.robot.twin.messages import MAX_MESSAGE, Greeting, Reply, encode
 
 
 def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
@@ -35,8 +27,8 @@ def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
     def greet() -> None:
         end, _ = listening.accept()
         end.recv(MAX_MESSAGE)
-        greeting = msgspec.Raw(msgspec.msgpack.encode(BoardGreeting(clock="real", t=0)))
-        end.send(encode(BoardReply(id=1, result=greeting)))
+        greeting = msgspec.Raw(msgspec.msgpack.encode(Greeting(clock="real", t=0)))
+        end.send(encode(Reply(id=1, result=greeting)))
         ends.append(end)
 
     with listening:
@@ -55,12 +47,12 @@ def test_a_late_reply_is_waited_for_with_heartbeats(tmp_path: Path, clock: str) 
 
     def beat() -> None:
         if next(beats) == 5:
-            board.send(encode(BoardReply(id=2, result=msgspec.Raw(msgspec.msgpack.encode(7)))))
+            board.send(encode(Reply(id=2, result=msgspec.Raw(msgspec.msgpack.encode(7)))))
 
     made = SteadyClock(client) if clock == "steady" else GrantedClock(client, "")
     made.keep_alive(beat)
     with board:
-        assert client.ask(_REQUEST, int) == 7
+        assert client.ask(int, "levels") == 7
         client.close()
     assert next(beats) >= 6
 
@@ -81,7 +73,7 @@ def test_requests_that_the_board_does_not_take_are_waited_for(tmp_path: Path) ->
     client.while_held_up = beat
     with board:
         while not beats:
-            client.post(_REQUEST)
+            client.post("levels")
         client.close()
     assert len(beats) == 3
 
@@ -90,12 +82,12 @@ def test_a_board_that_never_replies_ends_the_heartbeats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After that the supervisor finds the guard silent."""
-    monkeypatch.setattr(board_client, "_HELD_UP_S", 0.0)
+    monkeypatch.setattr(hardware, "_HELD_UP_S", 0.0)
     client, board = _connected(tmp_path)
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")
     ending = threading.Timer(0.05, board.close)
     ending.start()
     with pytest.raises(RobotError, match="board is gone"):
-        client.ask(_REQUEST, int)
+        client.ask(int, "levels")
     ending.join()
     client.close()

@@ -18,8 +18,8 @@ from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.cameras.pattern import read_barcode
 from shapechanger.robot.twin.camera import CameraFault, FrontCameraPipe
 from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.start import RunningBoard, start_board
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
 from tests.robot.twin.robots import CAR, until
 
 pytestmark = pytest.mark.realtime

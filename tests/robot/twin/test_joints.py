@@ -20,9 +20,9 @@ from shapechanger.robot.drivers.as5600 import (
     connect_encoders,
     open_driver,
 )
-from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from tests.robot.twin.in_process import LocalBoard
 
 _TURN = 2.0 * math.pi
 

@@ -10,11 +10,11 @@ import pytest
 
 from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.place import Place, open_world
 from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
-from shapechanger.robot.twin.world.place import Place, open_world
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
 from shapechanger.vehicles.twin import course_place
 from shapechanger.vehicles.world import MujocoWorld
 from tests.robot.twin.robots import CAR
@@ -39,7 +39,7 @@ def test_the_room_does_not_import_mujoco() -> None:
         "import sys\n"
         "sys.modules['mujoco'] = None\n"
         "from shapechanger.errors import MissingExtra\n"
-        "from shapechanger.robot.twin.world.place import Place, open_world\n"
+        "from shapechanger.robot.twin.place import Place, open_world\n"
         "from shapechanger.vehicles.twin import course_place\n"
         "open_world(Place(), {'wheels'}, None, 1)\n"
         "try:\n"
@@ -105,7 +105,7 @@ def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
 
 
 def test_an_operator_lays_out_rooms(tmp_path: Path) -> None:
-    """Another seed moves the boxes of the room; the room still reports no counters."""
+    """Another seed is another start in the room, which reports no counters."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         first = operator.where()
         operator.lay_out(5)

@@ -11,9 +11,9 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator, Whereabouts
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
-from shapechanger.robot.twin.world.vehicle import DrivingWorld
 from shapechanger.vehicles.twin import course_place
 from tests.robot.twin.robots import CAR
 

@@ -17,8 +17,8 @@ from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
-from shapechanger.robot.twin.in_process import InProcessRobot
 from shapechanger.robot.twin.servos.rig import Rig, ServoFault
+from tests.robot.twin.in_process import InProcessRobot
 
 _REST = (0.0,) * 7
 _FLEX = (0.65, 0.65, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin.messages import (
     MAX_MESSAGE,
-    BoardEvent,
-    BoardReply,
-    GrantTime,
-    InputEdges,
+    Edges,
+    Event,
+    Grant,
+    Reply,
     decode_event,
 )
 from shapechanger.robot.twin.server import BoardConnection
@@ -24,7 +24,7 @@ from shapechanger.robot.twin.server import BoardConnection
 pytestmark = pytest.mark.realtime  # It opens sockets.
 
 
-def received(client: socket.socket, board: BoardConnection) -> Iterator[BoardEvent]:
+def received(client: socket.socket, board: BoardConnection) -> Iterator[Event]:
     """Yield all messages that wait, while the board sends more."""
     client.setblocking(False)
     while True:
@@ -41,8 +41,7 @@ def test_only_edges_are_dropped(kinds: list[str]) -> None:
     """All replies and grants arrive in order, and of each input at least the last edge."""
     own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     board = BoardConnection(own)
-    board.inputs |= {4, 5}
-    sent: list[BoardEvent] = []
+    sent: list[Event] = []
     edges: list[Edge] = []
     t = 0
     with theirs:
@@ -50,20 +49,20 @@ def test_only_edges_are_dropped(kinds: list[str]) -> None:
             t += 1
             match kind:
                 case "reply":
-                    sent.append(BoardReply(t, msgspec.Raw(b"\x01")))
+                    sent.append(Reply(t, msgspec.Raw(b"\x01")))
                     board.send(sent[-1])
                 case "grant":
-                    sent.append(GrantTime(t))
+                    sent.append(Grant(t))
                     board.send(sent[-1])
                 case _:
-                    pins = (4, 5, 6) if kind == "edges" else (4 + t % 2,)
+                    pins = (4, 5) if kind == "edges" else (4 + t % 2,)
                     new = [Edge(t, pin, t % 2) for pin in pins]
                     board.send_edges(new)
-                    edges += [edge for edge in new if edge.pin != 6]
+                    edges += new
         events = list(received(theirs, board))
         board.close()
-    assert [event for event in events if not isinstance(event, InputEdges)] == sent
-    got = [edge for event in events if isinstance(event, InputEdges) for edge in event.edges]
+    assert [event for event in events if not isinstance(event, Edges)] == sent
+    got = [edge for event in events if isinstance(event, Edges) for edge in event.edges]
     assert got == sorted(got)
     assert set(got) <= set(edges)
     for pin in (4, 5):
@@ -74,7 +73,6 @@ def test_merged_edges_do_not_pile_up() -> None:
     """However long a client does not read, edges occupy a bounded outbox."""
     own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     board = BoardConnection(own)
-    board.inputs |= {4, 5}
     with theirs:
         for t in range(2000):
             board.send_edges([Edge(t, 4 + t % 2, t % 2)])

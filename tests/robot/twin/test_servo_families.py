@@ -25,12 +25,12 @@ from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.setup.zeros import find_zeros
-from shapechanger.robot.twin.in_process import InProcessRobot, LocalBoard
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.servos.rig import Rig
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.profile.texts import finger_text, read
+from tests.robot.twin.in_process import InProcessRobot, LocalBoard
 from tests.robot.twin.robots import until
 
 _REST = (0.0,) * 7
@@ -233,9 +233,9 @@ def test_zeros_are_found_and_kept(family: str) -> None:
     plan = read(finger_text(family)).guard_plan()
     world = FingerWorld(NOMINAL, seed=3)
     board = LocalBoard(TwinWiring(plan), world)
-    zeros = find_zeros(plan, board.hardware, lambda: board.advance(board.now_ns() + _TICK_NS))
+    zeros = find_zeros(plan, board.hardware, lambda: board.pass_ns(_TICK_NS))
     assert tuple(zeros) == TENDONS
-    board.advance(board.now_ns() + 20 * _TICK_NS)
+    board.pass_ns(20 * _TICK_NS)
     rig = board.pins.require_rig()
     assert [servo.pulls_a for servo in rig.bus.servos.values()] == [0.0] * 7
     assert rig.bus.has_power == (family == "Dynamixel")
@@ -249,12 +249,12 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
     bus = board.pins.require_rig().bus
     for _ in range(50):
         switches.toggle()
-        board.advance(board.now_ns() + _TICK_NS)
+        board.pass_ns(_TICK_NS)
     bus.write({1: b"\1"}, 40)
     assert bus.servos[1].has_torque
     switches.close()
     assert make_safe(plan, board.hardware) == []
-    board.advance(board.now_ns() + 11 * _TICK_NS)
+    board.pass_ns(11 * _TICK_NS)
     assert not bus.has_power
     assert not bus.servos[1].has_torque
 

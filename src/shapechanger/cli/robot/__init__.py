@@ -11,9 +11,8 @@ from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.camera import CameraView
 from shapechanger.cli.robot.check import CheckRobot
 from shapechanger.cli.robot.drive import Drive
-from shapechanger.cli.robot.fetch import FetchEpisodes
 from shapechanger.cli.robot.key import Key
-from shapechanger.cli.robot.remote import Find, Forget, Remember, Stop
+from shapechanger.cli.robot.remote import FetchEpisodes, Find, Forget, Remember, Stop
 from shapechanger.cli.robot.serve import Serve
 from shapechanger.cli.robot.setup import Home, Init, Install, SafePins
 

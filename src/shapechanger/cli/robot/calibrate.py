@@ -119,9 +119,6 @@ class Calibration:
         keys: Source of key presses.
         cap: Largest value for motors, and for ESCs unless the person goes beyond.
         twin: Whether on the twin.
-
-    Attributes:
-        found: Results so far by dotted name, for completed outputs and sensors.
     """
 
     def __init__(self, profile: Profile, keys: Terminal, cap: float, *, twin: bool) -> None:
@@ -136,9 +133,6 @@ class Calibration:
 
         Returns:
             Changes to the profile by dotted name; empty if the person quits.
-
-        Raises:
-            RobotError: If a result is impossible.
         """
         say(
             "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
@@ -318,11 +312,7 @@ class Calibration:
 
 
 def ask_for_wheels_up() -> None:
-    """Ask at the terminal to confirm that the wheels are off the ground.
-
-    Raises:
-        RobotError: If the answer is not yes, or there is no terminal.
-    """
+    """Ask at the terminal to confirm that the wheels are off the ground."""
     if not sys.stdin.isatty():
         raise RobotError("The robot will drive: lift its wheels, and say so with --wheels-up.")
     answer = input("The robot will drive. Are its wheels off the ground? [yes/no] ")

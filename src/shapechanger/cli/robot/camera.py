@@ -49,11 +49,7 @@ class CameraView:
     """The drawing: the horizon and what policies with waypoints look at, and what they see."""
 
     def run(self) -> None:
-        """Measure, write and draw.
-
-        Raises:
-            RobotError: If the options contradict each other, or something is missing.
-        """
+        """Measure, write and draw."""
         import simplejpeg
 
         from shapechanger.vehicles.cameras.rectify import CameraGeometry

@@ -16,15 +16,13 @@ from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.cli.robot.setup import require_port
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.check import MARKS
-from shapechanger.robot.check.lamps import lamps_of
-from shapechanger.robot.check.pins import check_jumper, plan_of_pins, require_pins
-from shapechanger.robot.check.report import facts, write_report
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.check import MARKS, facts, write_report
+from shapechanger.robot.check.pins import check_jumper, lamps_of, plan_of_pins, require_pins
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.profile.load import find_profile, load_profile
 
 if TYPE_CHECKING:  # Starts a tenth of a second sooner.
-    from shapechanger.robot.twin.check.levels import CheckLevel
+    from shapechanger.robot.twin.check.trial import CheckLevel
 
 _PILOT: Final = "shapechanger.vehicles.remote.full_throttle"
 _CAP: Final = 0.2
@@ -87,8 +85,7 @@ class CheckRobot:
             f"{platform.platform()}"
         )
         from shapechanger.robot.twin.check.bench import Bench
-        from shapechanger.robot.twin.check.levels import check_robot, require_level
-        from shapechanger.robot.twin.check.trial import Trial
+        from shapechanger.robot.twin.check.trial import Trial, check_robot, require_level
 
         bench = Bench(
             profile,

@@ -86,13 +86,7 @@ class Drive:
 
 @contextlib.contextmanager
 def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
-    """Record on the robot for the duration of a block; if it fails, tell where the recording is.
-
-    Args:
-        data: Folder to download to at the end.
-        robot: The robot, connected to as a person.
-        name: Its local name.
-    """
+    """Record on the robot for the duration of a block; if it fails, tell where the recording is."""
     from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
 
     before = begin_recording(robot)
@@ -149,9 +143,6 @@ class Driving:
         terminal: Source of key presses.
         cap: Largest steering and throttle, 0 to 1.
         pilot: Policy that may drive; None for any waiting program.
-
-    Raises:
-        LinkError: If the robot has no throttle.
     """
 
     def __init__(
@@ -173,11 +164,7 @@ class Driving:
         self._unmoved = dict.fromkeys(_BY_KEYS, 0)
 
     def run(self) -> None:
-        """Drive until Q.
-
-        Raises:
-            LinkError: If the link is lost, or the pilot's is.
-        """
+        """Drive until Q."""
         console = plain_console()
         self._terminal.keys(0.0)  # Keys pressed before this line was shown are no orders.
         console.print(_HELP)

@@ -71,12 +71,7 @@ def shown_credentials(credentials: Credentials) -> str:
 
 
 def how_to_remember(name: str, credentials: Credentials) -> str:
-    """Return the command for the computer that is to drive the robot.
-
-    Args:
-        name: Name of the robot.
-        credentials: Its key and certificate.
-    """
+    """Return the command for the computer that is to drive the robot."""
     return (
         "On the workstation, with the key from above:\n"
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "

@@ -31,7 +31,7 @@ from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
-from shapechanger.robot.twin.world.place import Place
+from shapechanger.robot.twin.place import Place
 from shapechanger.vehicles.courses.course import HOME, require_element
 
 _ROOM: Final = "room"
@@ -141,11 +141,6 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
 
     Returns:
         The place, or None for other robots.
-
-    Raises:
-        RobotError: If a gap is given and there is no finger.
-        UnknownName: If the gap is unknown.
-        MissingExtra: If a gap is given and MuJoCo is not installed.
     """
     tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
     if find_spec("mujoco") is None:
@@ -180,12 +175,6 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
         world: Kind of course; "room" for the plain room, "" for the vehicle's default, or the room
             without such a vehicle or without MuJoCo.
         lenses: Disturbances of the camera.
-
-    Raises:
-        UnknownName: If the course or a lens is unknown.
-        ProfileError: If no simulated vehicle has the parts of the profile.
-        WorldError: If the vehicle cannot drive there.
-        MissingExtra: If MuJoCo is needed and not installed.
     """
     if world == _ROOM or (not world and find_spec("mujoco") is None):
         if lenses:

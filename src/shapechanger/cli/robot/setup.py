@@ -131,11 +131,7 @@ class Init:
         return name, out, text
 
     def _write(self, *, installs: bool = False) -> Path:
-        """Write the files, print the next steps, and return the profile.
-
-        Args:
-            installs: Whether it is installed next.
-        """
+        """Write the files, print the next steps, and return the profile."""
         name, out, text = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
         # Lets this machine drive it, especially on a twin.
@@ -177,12 +173,7 @@ def _first_sentence(profile: Path) -> str:
 
 
 def _one_of(options: Iterable[str], what: str) -> Callable[[str], str]:
-    """Return a check that takes one of some words, in any case, or the start of one.
-
-    Args:
-        options: The words, in lower case.
-        what: What they are, such as "camera".
-    """
+    """Return a check that takes one of some words, in any case, or the start of one."""
 
     def check(answer: str) -> str:
         word = answer.lower()
@@ -195,16 +186,7 @@ def _one_of(options: Iterable[str], what: str) -> Callable[[str], str]:
 
 
 def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
-    """Ask until an answer passes a check, and return what the check makes of it.
-
-    Args:
-        question: The question.
-        default: Answer of an empty line.
-        check: Raises a `ShapechangerError` for an answer that is not possible.
-
-    Raises:
-        RobotError: If the input ends.
-    """
+    """Ask until an answer passes a check, and return what the check makes of it."""
     while True:
         try:
             answer = input(f"{question} [{default}]: ").strip() or default
@@ -222,10 +204,6 @@ def own_profile(name: str) -> Path:
 
     Args:
         name: A file, or the name of a profile.
-
-    Raises:
-        ProfileError: If there is none.
-        RobotError: If it comes with Shapechanger.
     """
     path = find_profile(name)
     if path in shipped_profiles().values():
@@ -238,16 +216,7 @@ def own_profile(name: str) -> Path:
 
 
 def change_profile(path: Path, changes: dict[str, Any]) -> None:
-    """Write changes into a profile, and print them.
-
-    Args:
-        path: The profile.
-        changes: New values by dotted name.
-
-    Raises:
-        ProfileError: If the result is not a valid profile.
-        OutputError: If it cannot be written.
-    """
+    """Write changes into a profile, and print them."""
     from shapechanger.robot.profile.edit import rewrite
 
     rewrite(path, changes)
@@ -313,15 +282,7 @@ class Install:
         self.install(load_profile(path), Machine(getpass.getuser()))
 
     def install(self, profile: Profile, machine: Machine) -> None:
-        """Make the changes on a machine.
-
-        Args:
-            profile: The robot.
-            machine: The computer.
-
-        Raises:
-            RobotError: If it is no Raspberry Pi with systemd, or the wrong user asks.
-        """
+        """Make the changes on a machine."""
         if self.remove:
             require_systemd(machine.root)
             changes = changes_to_remove(unit_name(profile.name), machine.root)
@@ -378,14 +339,7 @@ _LAST_PORT: Final = 65535
 
 
 def require_port(port: int) -> None:
-    """Refuse a number that is no TCP port, or 0 for any that is free.
-
-    Args:
-        port: The number.
-
-    Raises:
-        RobotError: If it is neither.
-    """
+    """Refuse a number that is no TCP port, or 0 for any that is free."""
     if not 0 <= port <= _LAST_PORT:
         raise RobotError(f"A port is 0, for any that is free, to {_LAST_PORT}: got {port}.")
 

@@ -21,8 +21,7 @@ from shapechanger.robot.check.check import (
     judged,
     run_checks,
 )
-from shapechanger.robot.check.standing import StandingRobot
-from shapechanger.robot.check.wiring import wiring_checks
+from shapechanger.robot.check.wiring import StandingRobot, wiring_checks
 from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.profile.profile import Profile
@@ -278,9 +277,6 @@ def examine(robot: StandingRobot) -> Iterator[Finding]:
     """Check all that a robot's safety and function depend on, without moving it.
 
     A check that fails or hangs is a finding, and the others go on.
-
-    Args:
-        robot: The robot.
     """
     checks = [] if robot.on_twin else [*_own_checks(robot)]
     checks += [*wiring_checks(robot), Check("wiring", partial(_close, robot))]

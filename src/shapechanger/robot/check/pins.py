@@ -1,15 +1,19 @@
-"""Pins that a robot uses, and a test of two that it does not use."""
+"""Pins that a robot uses, a test of two that it does not use, and LEDs in place of its motors."""
 
 from __future__ import annotations
 
 import time
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
-from shapechanger.contract.plan import GuardPlan, driven_pins
+from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.errors import RobotError
+from shapechanger.robot.check.check import Finding, judged
+from shapechanger.robot.drivers.chip import open_output
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
+from shapechanger.robot.guard.outputs import enable_device
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.setup.computer import needs_pins
 
@@ -18,11 +22,7 @@ _SETTLES_S: Final = 0.002
 
 
 def pins_of(plan: GuardPlan) -> dict[int, str]:
-    """Return the robot's pins and their uses.
-
-    Args:
-        plan: The robot.
-    """
+    """Return the robot's pins and their uses."""
     used = driven_pins(plan)
     if plan.stop_pin is not None:
         used[plan.stop_pin] = "the emergency button"
@@ -34,11 +34,7 @@ def pins_of(plan: GuardPlan) -> dict[int, str]:
 
 
 def plan_of_pins(plan: GuardPlan) -> list[str]:
-    """Return a line for each pin of a robot, to compare with its wires.
-
-    Args:
-        plan: The robot.
-    """
+    """Return a line for each pin of a robot, to compare with its wires."""
     positions = {pin: position for position, pin in BCM_OF_BOARD.items()}
     return [
         f"pin          GPIO{pin} ({positions[pin]}): {use}"
@@ -52,9 +48,6 @@ def require_free_pin(pin: int, plan: GuardPlan) -> None:
     Args:
         pin: BCM number.
         plan: The robot.
-
-    Raises:
-        RobotError: If it is one of these.
     """
     if not 0 <= pin <= HIGHEST_BCM:
         raise RobotError(f"The header has the pins GPIO0 to GPIO{HIGHEST_BCM}, got {pin}.")
@@ -68,9 +61,6 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
     Args:
         plan: The robot.
         probe: BCM pin of the probe.
-
-    Raises:
-        RobotError: If there is no such pin, the robot uses it, or nothing can be probed.
     """
     require_free_pin(probe, plan)
     for output in plan.outputs:
@@ -95,9 +85,6 @@ def check_jumper(
 
     Returns:
         Description of the result.
-
-    Raises:
-        RobotError: If the robot uses a pin, or the input does not follow.
     """
     from gpiozero import DigitalInputDevice, DigitalOutputDevice
 
@@ -122,17 +109,122 @@ def check_jumper(
 
 
 def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
-    """Refuse a machine without GPIO pins.
-
-    Args:
-        plan: The robot.
-        root: Root of the file system, for tests.
-
-    Raises:
-        RobotError: If an output needs a pin and the machine has none.
-    """
+    """Refuse a machine without GPIO pins."""
     if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
         raise RobotError(
             f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
             "`shapechanger robot serve --twin` runs it on simulated ones."
         )
+
+
+SHOWN_S: Final = 0.5
+"""Time for which an LED is lit when nobody is asked, s."""
+
+Ask = Callable[[str], bool | None]
+"""Asks a person a question; None if nobody answers."""
+
+
+class BenchLamp(NamedTuple):
+    """An LED in place of a motor or servo.
+
+    Attributes:
+        name: Its output and direction, such as "drive forward".
+        place: Its pin or channel, such as "GPIO22".
+        output: The output; None for the enable line.
+        value: Value of the output at which it is lit.
+        pin: Its BCM pin; None on a PWM chip.
+    """
+
+    name: str
+    place: str
+    output: OutputPlan | None
+    value: float = 1.0
+    pin: int | None = None
+
+
+def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
+    """Return the LEDs of a bench, in the order of the outputs."""
+    found: list[BenchLamp] = []
+
+    def add(name: str, pin: int | None, output: OutputPlan | None, value: float = 1.0) -> None:
+        if pin is not None and pin >= 0:
+            found.append(BenchLamp(name, f"GPIO{pin}", output, value, pin))
+
+    for output in plan.outputs:
+        settings, name = output.settings, output.name
+        match output.driver:
+            case "hbridge":
+                for way, value in (("forward", 1.0), ("backward", -1.0), ("enable", 1.0)):
+                    add(f"{name} {way}", settings[way], output, value)
+            case "phase_enable":
+                add(f"{name} enable", settings["enable"], output)
+                add(f"{name} backward", settings["phase"], output, -1.0)
+            case "servo" | "esc" if settings["over"] == "lgpio":
+                add(f"{name}, dimly", settings["pin"], output)
+            case "servo" | "esc":
+                place = f"channel {settings['channel']} of the {settings['over']}"
+                found.append(BenchLamp(f"{name}, dimly", place, output))
+            case driver:
+                raise RobotError(
+                    f"Output {name} is a servo on a bus ({driver}), and an LED cannot stand for "
+                    "it: take a robot whose outputs are on pins, such as `init car`."
+                )
+    add("enable line", plan.enable_pin, None)
+    return found
+
+
+@contextmanager
+def lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
+    """Light one LED, through the driver of its output, and put it out at the end."""
+    if lamp.output is None:
+        device = enable_device(lamp.pin or 0, hardware)
+        try:
+            device.on()
+            yield
+        finally:
+            device.off()
+            device.close()
+        return
+    with closing(open_output(lamp.output, hardware)) as driver:
+        driver.write(lamp.value, hardware.clock.now_ns())
+        yield
+        driver.write(0.0, hardware.clock.now_ns())
+
+
+def walk(
+    plan: GuardPlan,
+    connect_pins: Callable[[], Hardware],
+    ask: Ask,
+    sees: Callable[[BenchLamp], bool | None],
+    shown_s: float = SHOWN_S,
+) -> Iterator[Finding]:
+    """Light each LED alone, and ask or measure whether it is lit.
+
+    Args:
+        plan: The robot.
+        connect_pins: Opens its pins and buses, which nothing else uses meanwhile.
+        ask: Asks the person.
+        sees: Measures whether an LED is lit; None if it cannot.
+        shown_s: Time for which an LED is lit when nobody answers, s.
+    """
+    for lamp in lamps_of(plan):
+        name = f"LED {lamp.place}"
+        hardware = connect_pins()  # Afresh, because a closed output stays claimed.
+        try:
+            with lit(lamp, hardware):
+                answer = ask(f"Is the LED on {lamp.place} lit ({lamp.name})?")
+                if answer is None:
+                    time.sleep(shown_s)
+                measured = sees(lamp)
+        except RobotError as error:
+            yield Finding(name, "bad", f"{lamp.name}: {error}")
+            continue
+        finally:
+            hardware.close()
+        words = {True: "lit", False: "NOT lit", None: "not asked"}[answer]
+        if measured is not None:
+            words += f", measured as {'lit' if measured else 'NOT lit'}"
+        if answer is None and measured is None:
+            yield Finding(name, "unknown", f"{lamp.name}: {words}.")
+        else:
+            yield Finding(name, *judged(False not in (answer, measured), f"{lamp.name}: {words}."))

@@ -19,13 +19,7 @@ _WIDEST_US: Final = 2400
 
 @dataclass(frozen=True, slots=True)
 class JogResult:
-    """Values that a person found by jogging a servo or a motor controller.
-
-    Attributes:
-        low: Value at full left, or at the fastest backward.
-        middle: Value at straight ahead, or at rest.
-        high: Value at full right, or at the fastest forward.
-    """
+    """Values that a person found by jogging a servo or a motor controller."""
 
     low: float
     middle: float
@@ -54,15 +48,7 @@ def reading(output: OutputPlan, value: float) -> str:
 
 
 def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
-    """Return the changes for a jogged output, whole microseconds by dotted name.
-
-    Args:
-        output: The output with the settings that it had while jogging.
-        found: The values that were found.
-
-    Raises:
-        RobotError: If the middle does not lie between the ends.
-    """
+    """Return the changes for a jogged output, whole microseconds by dotted name."""
     keys, jogged = OUTPUTS[output.driver].pulses, PulseRange.of(output)
     widths = [round(jogged.width_us(v)) for v in (found.low, found.middle, found.high)]
     PulseRange(*map(float, widths))  # Checks the order.
@@ -78,9 +64,6 @@ def motor_changes(
         output: The motor.
         went: Direction in which it turned at a forward command.
         starts_at: Duty at which it began to turn, 0 to 1.
-
-    Raises:
-        RobotError: If the duty is out of range.
     """
     full: float = output.settings["full"]
     if not 0.0 <= starts_at < full:
@@ -105,9 +88,6 @@ def wheel_changes(
         wheel_m: Distance of one turn in the profile, m.
         pushed_m: Distance that the robot was pushed, m.
         measured_m: Distance measured by the encoder, m; negative for backward.
-
-    Raises:
-        RobotError: If the encoder counted nothing, or backward.
     """
     if measured_m <= 0.0:
         raise RobotError(

@@ -40,12 +40,7 @@ _UARTS: Final = ("serial", "ttyAMA", "ttyS")  # Serial ports of the header.
 
 
 class RootCommand(NamedTuple):
-    """A command that needs root.
-
-    Attributes:
-        arguments: Program and arguments.
-        text: Its standard input.
-    """
+    """A command that needs root."""
 
     arguments: tuple[str, ...]
     text: str = ""
@@ -81,13 +76,7 @@ def run_as_root(command: RootCommand) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The computer on which a robot is put in place.
-
-    Attributes:
-        user: User that runs the robot.
-        root: Root of the file system.
-        run: Runs commands as root.
-    """
+    """The computer on which a robot is put in place."""
 
     user: str
     root: Path = Path("/")
@@ -117,13 +106,7 @@ class SystemChange:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Result of one change.
-
-    Attributes:
-        change: The change.
-        level: Whether it was made now, was made before, would be made, or could not be made.
-        sentence: The result; for "would" the command, and for "failed" why, with the command.
-    """
+    """Result of one change."""
 
     change: SystemChange
     level: Literal["did", "already", "would", "failed"]
@@ -157,14 +140,7 @@ def make_changes(
 
 
 def require_systemd(root: Path) -> None:
-    """Refuse a machine that systemd does not manage (sd_booted(3)).
-
-    Args:
-        root: Root of the file system.
-
-    Raises:
-        RobotError: If it is one.
-    """
+    """Refuse a machine that systemd does not manage (sd_booted(3))."""
     if not (root / "run/systemd/system").is_dir():
         raise RobotError(
             "This machine is not run by systemd, which starts a robot and makes its pins safe: "
@@ -173,14 +149,7 @@ def require_systemd(root: Path) -> None:
 
 
 def require_pi(root: Path) -> None:
-    """Refuse a machine that is not a Raspberry Pi with systemd.
-
-    Args:
-        root: Root of the file system.
-
-    Raises:
-        RobotError: If it is none.
-    """
+    """Refuse a machine that is not a Raspberry Pi with systemd."""
     require_systemd(root)
     model = root / "proc/device-tree/model"
     if not model.exists() or "Raspberry Pi" not in model.read_text(errors="replace"):
@@ -225,12 +194,7 @@ def changes_to_install(
 
 
 def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
-    """Yield what removes a robot's service; groups and interfaces stay.
-
-    Args:
-        unit_name: Name of its systemd unit.
-        root: Root of the file system.
-    """
+    """Yield what removes a robot's service; groups and interfaces stay."""
     path = root / _UNITS / unit_name
     yield SystemChange(
         "service",

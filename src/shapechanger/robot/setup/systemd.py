@@ -24,11 +24,7 @@ def unit_name(robot: str) -> str:
 
 
 def unit_word(text: str) -> str:
-    """Return a word of a unit's command line, in quotes where it needs them (systemd.service(5)).
-
-    Args:
-        text: The word, such as a path with blanks.
-    """
+    """Return a word of a command line, in quotes where it needs them (systemd.service(5))."""
     if _PLAIN_WORD.fullmatch(text):
         return text
     return f'"{"".join(_ESCAPES.get(character, character) for character in text)}"'
@@ -72,9 +68,6 @@ def write_unit(
 
     Returns:
         The file, and True if it was written now.
-
-    Raises:
-        OutputError: If it cannot be written.
     """
     path = profile.absolute().parent / unit_name(robot)
     program = shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"

@@ -32,9 +32,6 @@ def find_joint_zeros(
     Returns:
         Counts of each encoder, 0 to 4095, by the names of sensor and joint, such as
         `joints.MCP_flexion`; empty for a robot without encoders.
-
-    Raises:
-        RobotError: If an encoder does not answer or detects no magnet.
     """
     zeros: dict[str, int] = {}
     for sensor in (one for one in plan.sensors if one.driver == "as5600"):
@@ -66,9 +63,6 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
 
     Returns:
         Position of each servo, counts, by the name of its output.
-
-    Raises:
-        RobotError: If the robot has no servo bus, a servo fails, or a tendon never gets taut.
     """
     outputs = [output for output in plan.outputs if output.driver == DRIVER]
     if not outputs:

@@ -12,7 +12,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Final, NamedTuple
@@ -23,30 +23,24 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import RESTING_V
 from shapechanger.errors import RobotError, WorldError
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
+from shapechanger.robot.drivers.simulation import Levels
 from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
-from shapechanger.robot.twin.messages import (
-    GrantTime,
-    OperatorRequest,
-    Request,
-    SleepOnBoard,
-    SleepResult,
-    WaitForGrant,
-    Whereabouts,
-)
+from shapechanger.robot.twin.messages import Grant, Slept, Whereabouts
 from shapechanger.robot.twin.pin_board import PinBoard
+from shapechanger.robot.twin.place import open_world
 from shapechanger.robot.twin.server import (
     LATER,
     START_NS,
     BoardConnection,
     BoardServer,
     OwnerGone,
+    functions_of,
 )
 from shapechanger.robot.twin.signals import LedgerWriter
 from shapechanger.robot.twin.start import BoardAt, BoardSettings
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.place import open_world
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
@@ -58,17 +52,10 @@ _log = logging.getLogger(__name__)
 class Board:
     """Pins, chips, sensors and world, with a server for clients.
 
-    Args:
-        settings: Its settings.
-        owner_fd: Descriptor whose end ends the board.
-
     Attributes:
         world: World of the robot.
         camera: Front camera; None without one.
         server: Server of the clients.
-
-    Raises:
-        ShapechangerError: If the world cannot be opened or does not fit the robot.
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
@@ -102,8 +89,11 @@ class Board:
         self._ledger = LedgerWriter(files.ledger_path)
         wiring = TwinWiring(plan, settings.one_shot_ms)
         self._pins = PinBoard(wiring, self.world, self._ledger, seed, clock.now_ns())
+        functions = functions_of("time", (clock.wait, clock.sleep))
+        operator = _OperatorFunctions(self, self._pins, clock.now_ns)
+        functions |= functions_of("operator", operator.all())
         self.server = BoardServer(
-            listening, owner_fd, self._pins, settings.clock, clock.now_ns, self._operate
+            listening, owner_fd, self._pins, settings.clock, clock.now_ns, functions
         )
         listening.listen()
 
@@ -126,89 +116,32 @@ class Board:
             self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
         self.server.send_edges(edges)
 
-    def _operate(self, connection: BoardConnection, request: Request) -> object:
-        """Execute a request of time or of an operator."""
-        match request:
-            case WaitForGrant() | SleepOnBoard():
-                if isinstance(self._time, RealTime):
-                    raise RobotError("This board runs in real time, which cannot be advanced.")
-                if isinstance(request, WaitForGrant):
-                    self._time.wait(connection, request.until_ns)
-                else:
-                    self._time.sleep(connection, request.id or 0, request.ns)
-                return LATER
-            case OperatorRequest():
-                return self._act(request)
-            case _:
-                raise RobotError(f"The board does not execute {type(request).__name__}.")
-
-    def _act(self, request: OperatorRequest) -> object:
-        """Execute a request of an operator."""
-        match request.action, *request.values:
-            case ("tensions",):
-                return self._pins.require_rig().tensions()
-            case ("levels",):
-                return self._pins.levels
-            case ("whereabouts",):
-                return self._whereabouts()
-            case "place", int(seed):
-                self.world.place(seed)
-                self._record("place", seed=seed)
-            case ("put_back",):
-                try:
-                    self.world.put_back()
-                except WorldError as error:
-                    raise RobotError(f"The vehicle cannot be put back: {error}") from error
-                self._record("put_back")
-            case "lay_out", int(seed):
-                self.world.lay_out(seed)
-                self._record("course", seed=seed)
-            case _:
-                self._record("fault", what=self._fail(request))
-        return None
-
-    def _fail(self, request: OperatorRequest) -> str:
-        """Break, repair or press something, and describe it for the ledger."""
-        match request.action, *request.values:
-            case "camera", str(fault):
-                if self.camera is None:
-                    raise RobotError("This twin has no camera.")
-                self.camera.break_down(fault)
-                return f"camera {fault or 'well'}"
-            case "bumper", bool(down):
-                for bumper in self._pins.sensors.of_kind(SimulatedSwitch):
-                    bumper.held = down
-                return f"bumper {'down' if down else 'up'}"
-            case "stop", bool(down):
-                self._pins.sensors.press_stop(down)
-                return f"stop {'down' if down else 'up'}"
-            case "battery", (float() | None) as volts:
-                self.world.resting_v = RESTING_V if volts is None else volts
-                return f"battery {volts}"
-            case "distance", (float() | None) as metres, bool(dead):
-                for sensor in self._pins.sensors.of_kind(SimulatedHcsr04):
-                    sensor.override_m, sensor.dead = metres, dead
-                return f"distance {'dead' if dead else metres}"
-            case "chip", int(bus), int(address), bool(dead):
-                dead_chips = self._pins.dead_chips
-                (dead_chips.add if dead else dead_chips.discard)((bus, address))
-                return f"chip {bus} {address} {'dead' if dead else 'well'}"
-            case "servo", str(tendon), str(fault):
-                self._pins.require_rig().break_servo(tendon, fault)
-                return f"servo {tendon} {fault or 'well'}"
-            case "magnet", str(joint), str(fault):
-                self._pins.encoder(joint).set_magnet(fault)
-                return f"magnet {joint} {fault or 'well'}"
-            case _:
-                raise RobotError(
-                    f"The board has no action {request.action!r} for {request.values}."
-                )
-
-    def _record(self, kind: str, **fields: object) -> None:
+    def record(self, kind: str, **fields: object) -> None:
+        """Write a line of the ledger."""
         self._ledger.write(self._time.now_ns(), kind, **fields)
 
-    def _whereabouts(self) -> Whereabouts:
-        seen = self.world.inputs()
+
+class _OperatorFunctions:
+    """What a person next to the robot does, and the truth; see `Operator`."""
+
+    def __init__(self, board: Board, pins: PinBoard, now_ns: Callable[[], int]) -> None:
+        self._board = board
+        self._world = board.world
+        self._pins = pins
+        self._now_ns = now_ns
+
+    def all(self) -> list[Callable[..., object]]:
+        names = [name for name in vars(type(self)) if not name.startswith("_") and name != "all"]
+        return [getattr(self, name) for name in names]
+
+    def tensions(self) -> dict[str, float]:
+        return self._pins.require_rig().tensions()
+
+    def levels(self) -> Levels:
+        return self._pins.levels
+
+    def where(self) -> Whereabouts:
+        seen = self._world.inputs()
         return Whereabouts(
             x=seen.pose.x,
             y=seen.pose.y,
@@ -216,14 +149,77 @@ class Board:
             speed=seen.speed,
             travelled_m=seen.travelled_m,
             bumped=seen.bumped,
-            distance_m=self.world.distance_m(),
-            truth=self.world.truth(),
-            t=self._time.now_ns(),
+            distance_m=self._world.distance_m(),
+            truth=self._world.truth(),
+            t=self._now_ns(),
         )
+
+    def place(self, seed: int) -> None:
+        self._world.place(seed)
+        self._board.record("place", seed=seed)
+
+    def put_back(self) -> None:
+        try:
+            self._world.put_back()
+        except WorldError as error:
+            raise RobotError(f"The vehicle cannot be put back: {error}") from error
+        self._board.record("put_back")
+
+    def lay_out(self, seed: int) -> None:
+        self._world.lay_out(seed)
+        self._board.record("course", seed=seed)
+
+    def break_camera(self, fault: str) -> None:
+        if self._board.camera is None:
+            raise RobotError("This twin has no camera.")
+        self._board.camera.break_down(fault)
+        self._broke(f"camera {fault or 'well'}")
+
+    def press_bumper(self, down: bool) -> None:
+        for bumper in self._pins.sensors.of_kind(SimulatedSwitch):
+            bumper.held = down
+        self._broke(f"bumper {'down' if down else 'up'}")
+
+    def press_stop(self, down: bool) -> None:
+        self._pins.sensors.press_stop(down)
+        self._broke(f"stop {'down' if down else 'up'}")
+
+    def set_battery(self, volts: float | None) -> None:
+        self._world.resting_v = RESTING_V if volts is None else volts
+        self._broke(f"battery {volts}")
+
+    def set_distance(self, metres: float | None, dead: bool) -> None:
+        for sensor in self._pins.sensors.of_kind(SimulatedHcsr04):
+            sensor.override_m, sensor.dead = metres, dead
+        self._broke(f"distance {'dead' if dead else metres}")
+
+    def break_chip(self, bus: int, address: int, dead: bool) -> None:
+        chips = self._pins.dead_chips
+        (chips.add if dead else chips.discard)((bus, address))
+        self._broke(f"chip {bus} {address} {'dead' if dead else 'well'}")
+
+    def break_servo(self, tendon: str, fault: str) -> None:
+        self._pins.require_rig().break_servo(tendon, fault)
+        self._broke(f"servo {tendon} {fault or 'well'}")
+
+    def break_magnet(self, joint: str, state: str) -> None:
+        self._pins.encoder(joint).set_magnet(state)
+        self._broke(f"magnet {joint} {state or 'well'}")
+
+    def _broke(self, action: str) -> None:
+        self._board.record("fault", what=action)
 
 
 class RealTime:
     """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
+
+    def wait(self, connection: BoardConnection, call_id: int, until_ns: int) -> object:
+        """Refuse: nobody advances real time."""
+        raise RobotError("This board runs in real time, which cannot be advanced.")
+
+    def sleep(self, connection: BoardConnection, call_id: int, ns: int) -> object:
+        """Refuse: nobody advances real time."""
+        raise RobotError("This board runs in real time, which cannot be advanced.")
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
@@ -250,7 +246,7 @@ class _Sleeper(NamedTuple):
     until_ns: int
     number: int
     connection: BoardConnection
-    request_id: int
+    call_id: int
 
 
 class TwinTime:
@@ -271,27 +267,18 @@ class TwinTime:
         """Return the time in nanoseconds."""
         return self._now_ns
 
-    def sleep(self, connection: BoardConnection, request_id: int, ns: int) -> None:
-        """Let a client sleep.
-
-        Args:
-            connection: The client.
-            request_id: Id of its request, to which `SleepResult` is the reply.
-            ns: How long, ns.
-        """
+    def sleep(self, connection: BoardConnection, call_id: int, ns: int) -> object:
+        """Let a client sleep for `ns` nanoseconds, which ends with a `Slept`."""
         self._sleeps += 1
-        self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, request_id))
+        self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, call_id))
+        return LATER
 
-    def wait(self, connection: BoardConnection, until_ns: int) -> None:
-        """Finish the grant of a client, which takes part from now on.
-
-        Args:
-            connection: The client.
-            until_ns: When its next grant is due at the latest, ns.
-        """
+    def wait(self, connection: BoardConnection, call_id: int, until_ns: int) -> object:
+        """Finish the grant of a client, which takes part from now on, until its next is due."""
         connection.takes_part = True
         connection.works = False
         connection.until_ns = until_ns
+        return LATER
 
     def run(self, board: Board) -> None:
         """Run a board until its owner is gone."""
@@ -312,8 +299,8 @@ class TwinTime:
             if first.until_ns <= self._now_ns:
                 self._sleepers.remove(first)
                 newest_ns = None if camera is None else camera.newest_ns
-                result = SleepResult(self._now_ns, newest_ns)
-                server.reply(first.connection, first.request_id, result)
+                result = Slept(self._now_ns, newest_ns)
+                server.reply(first.connection, first.call_id, result)
 
     def _step(self, board: Board, end_ns: int) -> None:
         """Advance to the next time at which anything happens."""
@@ -330,7 +317,7 @@ class TwinTime:
             return
         for connection in participants:
             connection.works = True
-            server.send(connection, GrantTime(self._now_ns))
+            server.send(connection, Grant(self._now_ns))
         while any(one.works and one.fileno() >= 0 for one in participants):
             server.serve(None)
 

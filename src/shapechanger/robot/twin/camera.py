@@ -107,11 +107,7 @@ class FrontCameraPipe:
             self._write(jpeg, now_ns)
 
     def break_down(self, fault: CameraFault | str) -> None:
-        """Make the camera fail; "" repairs it.
-
-        Raises:
-            UnknownName: If there is no such fault.
-        """
+        """Make the camera fail; "" repairs it."""
         if fault not in (faults := get_args(CameraFault)):
             raise UnknownName("fault of a camera", fault, faults)
         self._fault = fault

@@ -9,7 +9,7 @@ from gpiozero.pins.pi import PiFactory, PiPin
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
-from shapechanger.robot.twin.messages import BoardPins, ClaimPin, DrivePin
+from shapechanger.robot.twin.hardware import BoardClient
 
 _REVISION: Final = 0xC03115
 """A Raspberry Pi 4B with 4 GB; its header has the pins of all newer ones."""
@@ -70,16 +70,13 @@ class TwinPin(PiPin):
             self._call_when_changed(at_ns / 1e9, level)
 
     def _claim(self, level: int = 0) -> None:
-        now_ns = self.factory.clock.now_ns()
-        mode = "output" if self._function == "output" else "input"
-        request = ClaimPin(pin=self._number, mode=mode, pull=self._pull, level=level, t=now_ns)
-        found = self._board.levels[self._number] = self._board.ask(request, int)
+        claimed = (self._number, self._function, self._pull, level)
+        found = self._board.levels[self._number] = self._board.ask(int, "claim", *claimed)
         self._pwm_hz, self._duty = 0, float(found)
 
     def _drive(self, duty: float, hz: int) -> None:
         if (duty, hz) != (self._duty, self._pwm_hz):
-            now_ns = self.factory.clock.now_ns()
-            self._board.post(DrivePin(pin=self._number, duty=duty, hz=hz, t=now_ns))
+            self._board.post("drive", self._number, duty, hz)
             self._duty, self._pwm_hz = duty, hz
 
     def _get_function(self) -> str:
@@ -141,13 +138,9 @@ class TwinPinFactory(PiFactory):
     """Factory of the pins of a board.
 
     It has no thread: edges of inputs are dispatched while the process waits on the clock.
-
-    Args:
-        board: The pins.
-        clock: Source of the time of each change.
     """
 
-    def __init__(self, board: BoardPins, clock: Clock) -> None:
+    def __init__(self, board: BoardClient, clock: Clock) -> None:
         super().__init__()
         self.board = board
         self.clock = clock

@@ -1,36 +1,287 @@
-"""Hardware of a robot's process on a twin: pins, buses and time of its board."""
+"""Hardware of a robot's process on a twin: its connection to the board, pins, buses and time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import os
+import select
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, Literal
 
+import msgspec
+
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Clock
-from shapechanger.robot.twin.board_client import BoardClient, GrantedClock, SteadyClock
 from shapechanger.robot.twin.messages import (
-    BoardPins,
-    ClaimPin,
-    InstructServos,
-    PulsePin,
-    ReadChip,
-    WriteChip,
+    MAX_MESSAGE,
+    Edges,
+    Grant,
+    Greeting,
+    Reply,
+    Role,
+    Slept,
+    decode_event,
+    encode_call,
 )
+
+_HELD_UP_MS: Final = 10  # Between two calls while the board does not reply.
+_HELD_UP_S: Final = 10.0  # A board that does not reply for longer is broken.
+
+
+class BoardClient:
+    """A connection to the board, to be used by one thread.
+
+    Attributes:
+        clock: Kind of clock, "real" or "twin".
+        now_ns: Newest twin time that the board has sent; with the clock "real", the time of the
+            connection.
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Called by `dispatch` with pin, level and time of each edge.
+        while_held_up: Called every 10 ms while the board is held up and neither takes a request nor
+            replies to it, for 10 s at most.
+    """
+
+    def __init__(self, path: str, role: Role) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            self._socket.connect(path)
+        except OSError as error:
+            self._socket.close()
+            raise RobotError(f"No twin's board answers at {path}: {error.strerror}.") from error
+        self._readable, self._writable = select.poll(), select.poll()
+        self._readable.register(self._socket, select.POLLIN)
+        self._writable.register(self._socket, select.POLLOUT)
+        self._last_id = 0
+        self._edges: deque[tuple[int, int, int]] = deque()
+        self._grants: deque[int] = deque()
+        self._replies: dict[int, Reply] = {}
+        self.levels: dict[int, int] = {}
+        self.on_edge: Callable[[int, int, int], None] | None = None
+        self.while_held_up: Callable[[], object] = lambda: None
+        greeting = self.ask(Greeting, "greet", role, os.getpid())
+        self.clock: Literal["real", "twin"] = greeting.clock
+        self.now_ns = greeting.t
+
+    @property
+    def closed(self) -> bool:
+        """True if `close` was called."""
+        return self._socket.fileno() < 0
+
+    def fileno(self) -> int:
+        """Return the descriptor of the connection."""
+        return self._socket.fileno()
+
+    def post(self, function: str, *arguments: object) -> None:
+        """Call a function of the board without waiting for its end."""
+        self._send(encode_call(function, *arguments, t=time.monotonic_ns()))
+
+    def _send(self, data: bytes) -> None:
+        until_s = time.monotonic() + _HELD_UP_S
+        while True:
+            try:
+                self._socket.send(data, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                self._await(self._writable, until_s)
+            except OSError as error:
+                raise RobotError("The twin's board is gone.") from error
+            else:
+                return
+
+    def ask(self, kind: Any, function: str, *arguments: object) -> Any:
+        """Call a function of the board and return its result."""
+        self._last_id += 1
+        self._send(encode_call(function, *arguments, id=self._last_id, t=time.monotonic_ns()))
+        until_s = time.monotonic() + _HELD_UP_S
+        while self._last_id not in self._replies:
+            self._await(self._readable, until_s)
+            self._receive()
+        reply = self._replies.pop(self._last_id)
+        if reply.error:
+            raise RobotError(reply.error)
+        if reply.errno:
+            raise OSError(reply.errno, os.strerror(reply.errno))
+        return msgspec.msgpack.decode(reply.result, type=kind)
+
+    def drain(self) -> None:
+        """Receive everything that has arrived, without waiting."""
+        while self._receive():
+            pass
+
+    def dispatch(self) -> None:
+        """Call `on_edge` for all edges that have arrived."""
+        while self._edges:
+            edge = self._edges.popleft()
+            if self.on_edge is not None:
+                self.on_edge(*edge)
+
+    def await_grant(self, at_most_s: float) -> bool:
+        """Wait for a grant, which sets `now_ns`, and dispatch the edges before it."""
+        while not self._grants:
+            if not self._readable.poll(max(0.0, at_most_s * 1e3)):
+                self.dispatch()
+                return False
+            self.drain()
+        self.now_ns = self._grants.popleft()
+        self.dispatch()
+        return True
+
+    def close(self) -> None:
+        """Leave the board in order."""
+        if not self.closed:
+            try:
+                self._socket.send(encode_call("leave"))
+            except OSError:
+                pass  # The board ended first.
+            finally:
+                self._socket.close()
+
+    def _await(self, ready: select.poll, until_s: float) -> None:
+        """Wait for the board, which a busy machine or a new world may hold up."""
+        while not ready.poll(_HELD_UP_MS):
+            if time.monotonic() < until_s:
+                self.while_held_up()
+
+    def _receive(self) -> bool:
+        """Receive one message; False if there is none."""
+        try:
+            data = self._socket.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise RobotError("The twin's board is gone.") from error
+        if not data:
+            raise RobotError("The twin's board is gone.")
+        match decode_event(data):
+            case Grant(t=t):
+                self._grants.append(t)
+            case Edges(edges=edges):
+                for edge in edges:
+                    self.levels[edge.pin] = edge.level
+                    self._edges.append((edge.pin, edge.level, edge.t))
+            case Reply() as reply:
+                self._replies[reply.id] = reply
+        return True
+
+
+class SteadyClock:
+    """The machine's monotonic clock; edges of inputs are dispatched while the guard waits."""
+
+    def __init__(self, client: BoardClient) -> None:
+        self._client = client
+
+    def now_ns(self) -> int:
+        """Return the time of CLOCK_MONOTONIC in nanoseconds."""
+        return time.monotonic_ns()
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        """Wait until a descriptor can be read or it is `until_ns`; see `Clock.wait`."""
+        latest_ns = min(until_ns, time.monotonic_ns() + int(at_most_s * 1e9))
+        board = self._client.fileno()
+        poll = select.poll()
+        for fd in {*readable, board}:
+            poll.register(fd, select.POLLIN)
+        while True:
+            left_ms = max(0.0, (latest_ns - time.monotonic_ns()) / 1e6)
+            ready = {fd for fd, _ in poll.poll(left_ms)}
+            if board in ready:
+                self._client.drain()
+            self._client.dispatch()
+            now_ns = time.monotonic_ns()
+            if ready - {board} or now_ns >= latest_ns:
+                return bool(ready - {board}) or now_ns >= until_ns
+
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
+        self._client.while_held_up = beat
+
+    async def sleep(self, seconds: float) -> None:
+        """Sleep in real time."""
+        import asyncio  # Only the daemon sleeps; the guard stays light.
+
+        await asyncio.sleep(seconds)
+
+
+class GrantedClock:
+    """The twin's own clock, which the board advances.
+
+    A process that calls `wait` takes part: time advances only while all participants wait.
+    """
+
+    def __init__(self, client: BoardClient, path: str) -> None:
+        self._client = client
+        self._path = path
+        self._waiting = False
+        self._idle: list[socket.socket] = []
+
+    def now_ns(self) -> int:
+        """Return the newest twin time that this process has received."""
+        return self._client.now_ns
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        """Finish the last grant and wait for the next; see `Clock.wait`.
+
+        A grant arrives at each tick of the board, and at `until_ns` if that is earlier.
+        """
+        if not self._waiting:
+            self._client.post("wait", until_ns)
+            self._waiting = True
+        if not self._client.await_grant(at_most_s):
+            return False
+        self._waiting = False
+        return True
+
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
+        self._client.while_held_up = beat
+
+    async def sleep(self, seconds: float) -> int | None:
+        """Let twin time advance, and return when the newest picture was taken."""
+        import asyncio  # Only the daemon sleeps; the guard stays light.
+
+        loop = asyncio.get_running_loop()
+        connected = bool(self._idle)
+        if connected:
+            connection = self._idle.pop()
+        else:
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            connection.setblocking(False)
+        try:
+            if not connected:
+                await loop.sock_connect(connection, self._path)
+            call = encode_call("sleep", max(0, round(seconds * 1e9)), id=0)
+            await loop.sock_sendall(connection, call)
+            data = await loop.sock_recv(connection, MAX_MESSAGE)
+            if not data:
+                raise RobotError("The twin's board is gone.")
+        except BaseException as error:
+            # Also when cancelled: a reply that is still due would answer the next sleep.
+            connection.close()
+            if isinstance(error, OSError):
+                raise RobotError("The twin's board is gone.") from error
+            raise
+        self._idle.append(connection)
+        reply = decode_event(data)
+        if not isinstance(reply, Reply) or reply.error:
+            raise RobotError(getattr(reply, "error", "") or "The twin's board does not sleep.")
+        slept = msgspec.msgpack.decode(reply.result, type=Slept)
+        self._client.now_ns = max(self._client.now_ns, slept.t)
+        return slept.captured_ns
+
+    def close(self) -> None:
+        """Close the connections of `sleep`."""
+        while self._idle:
+            self._idle.pop().close()
 
 
 class TwinBus:
-    """The part of `smbus2.SMBus` that the drivers use; a missing chip raises OSError.
+    """The part of `smbus2.SMBus` that the drivers use; a missing chip raises OSError."""
 
-    Args:
-        board: Pins and chips.
-        clock: Source of the time of each write.
-        bus: Number of the bus.
-    """
-
-    def __init__(self, board: BoardPins, clock: Clock, bus: int) -> None:
+    def __init__(self, board: BoardClient, bus: int) -> None:
         self._board = board
-        self._clock = clock
         self._bus = bus
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
@@ -47,22 +298,13 @@ class TwinBus:
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         """Read several bytes, starting at one register."""
-        request = ReadChip(bus=self._bus, address=i2c_addr, register=register, length=length)
-        return self._board.ask(request, list[int])
+        return self._board.ask(list[int], "read_chip", self._bus, i2c_addr, register, length)
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
         """Write several bytes, starting at one register."""
         if not all(0 <= byte <= 0xFF for byte in data):
             raise ValueError(f"Bytes must be 0 to 255, got {list(data)}.")
-        self._board.ask(
-            WriteChip(
-                bus=self._bus,
-                address=i2c_addr,
-                register=register,
-                data=list(data),
-                t=self._clock.now_ns(),
-            )
-        )
+        self._board.ask(None, "write_chip", self._bus, i2c_addr, register, list(data))
 
     def close(self) -> None:
         """Let go of the bus; its chips continue with what they do."""
@@ -73,24 +315,19 @@ class TwinServoPins:
 
     A thread of the process sends the pulses. If the process dies, they end, and the pin keeps the
     level that it has at that moment.
-
-    Args:
-        board: The pins.
-        clock: Source of the time of each change.
     """
 
-    def __init__(self, board: BoardPins, clock: Clock) -> None:
+    def __init__(self, board: BoardClient) -> None:
         self._board = board
-        self._clock = clock
         self._pulses: dict[int, tuple[int, int]] = {}
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
         """Send pulses of this width on a BCM pin from now on; 0 for none."""
         if pin not in self._pulses:
-            self._board.ask(ClaimPin(pin=pin, mode="output", t=self._clock.now_ns()), int)
+            self._board.ask(int, "claim", pin, "output", "floating", 0)
         us, hz = int(width_us), int(frequency_hz)
         if self._pulses.get(pin) != (us, hz):
-            self._board.post(PulsePin(pin=pin, us=us, hz=hz, t=self._clock.now_ns()))
+            self._board.post("pulse", pin, us, hz)
             self._pulses[pin] = us, hz
 
     def close(self) -> None:
@@ -102,50 +339,30 @@ class TwinServoPins:
 
 
 class TwinServoPort:
-    """Port of the servo bus; see `ServoPort`. Its servos answer at once or not at all.
+    """Port of the servo bus; see `ServoPort`. Its servos answer at once or not at all."""
 
-    Args:
-        board: The servos.
-        device: Name of the bus.
-
-    Attributes:
-        has_stray: False: no answer is late.
-    """
-
-    def __init__(self, board: BoardPins, device: str) -> None:
+    def __init__(self, board: BoardClient, device: str) -> None:
         self._board = board
         self._device = device
         self.has_stray = False
 
     def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of several servos; see `ServoPort.read`."""
-        request = InstructServos(device=self._device, at=at, ids=list(ids), size=size)
-        return self._board.ask(request, dict[int, ServoReply])
+        replies = dict[int, ServoReply]
+        return self._board.ask(replies, "read_servos", self._device, list(ids), at, size)
 
     def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
         """Write bytes of several servos, or of one; see `ServoPort.write`."""
-        request = InstructServos(
-            device=self._device, at=at, ids=list(data), data=list(data.values())
-        )
-        return self._board.ask(request, dict[int, ServoReply])
+        return self._board.ask(dict[int, ServoReply], "write_servos", self._device, dict(data), at)
 
     def close(self) -> None:
         """Do nothing: the bus outlives the port."""
 
 
 class TwinHardware:
-    """Pins, buses and time of a board; see `shapechanger.robot.hardware.Hardware`.
+    """Pins, buses and time of a board; see `shapechanger.robot.hardware.Hardware`."""
 
-    Args:
-        board: Pins, chips and servos.
-        clock: Time.
-
-    Attributes:
-        board: Pins, chips and servos.
-        clock: Time.
-    """
-
-    def __init__(self, board: BoardPins, clock: Clock) -> None:
+    def __init__(self, board: BoardClient, clock: Clock) -> None:
         self.board = board
         self._pin_factory: Any = None
         self.clock = clock
@@ -160,11 +377,11 @@ class TwinHardware:
 
     def i2c(self, bus: int) -> TwinBus:
         """Return an I2C bus by its number."""
-        return TwinBus(self.board, self.clock, bus)
+        return TwinBus(self.board, bus)
 
     def servo_pins(self) -> TwinServoPins:
         """Return the pins that send servo pulses."""
-        return TwinServoPins(self.board, self.clock)
+        return TwinServoPins(self.board)
 
     def servo_port(self, settings: BusSettings) -> TwinServoPort:
         """Return the port of the servo bus; its first use fails if the board has no such bus."""
@@ -181,11 +398,7 @@ class TwinHardware:
 
 
 def connect(path: str) -> TwinHardware:
-    """Connect to the board that listens on a socket.
-
-    Raises:
-        RobotError: If no board answers there.
-    """
+    """Connect to the board that listens on a socket."""
     client = BoardClient(path, "hardware")
     clock = GrantedClock(client, path) if client.clock == "twin" else SteadyClock(client)
     return TwinHardware(client, clock)

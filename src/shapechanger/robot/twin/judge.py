@@ -48,10 +48,6 @@ def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval
 
     A pin with PWM counts by its duty. The last levels last for ever, unless the one-shot of the
     enable line ends them.
-
-    Args:
-        ledger: Transitions, ordered by time.
-        wiring: Wiring of the robot.
     """
     found: list[Interval] = []
     running: dict[str, tuple[int, float]] = {}
@@ -109,11 +105,6 @@ def unauthorised(
 
 def time_to_rest(ledger: Iterable[Transition], wiring: TwinWiring, fault_ns: int) -> float:
     """Return the time from a fault until all propelling outputs are at rest for good.
-
-    Args:
-        ledger: Transitions, ordered by time.
-        wiring: Wiring of the robot.
-        fault_ns: Time of the fault.
 
     Returns:
         Seconds; 0 if they were at rest before and stayed so, infinite if one never comes to rest.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import random
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -11,21 +12,13 @@ from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
 from shapechanger.robot.drivers.chip import PULSES
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.simulation import (
     Edge,
     Levels,
     Pulse,
     PwmChannel,
     SimulatedChip,
-)
-from shapechanger.robot.twin.messages import (
-    ClaimPin,
-    DrivePin,
-    HardwareRequest,
-    InstructServos,
-    PulsePin,
-    ReadChip,
-    WriteChip,
 )
 from shapechanger.robot.twin.sensors import Surroundings
 from shapechanger.robot.twin.servos.rig import Rig
@@ -34,11 +27,7 @@ from shapechanger.robot.twin.wiring import TwinWiring
 
 
 class Owner(Protocol):
-    """Connection of a process that holds pins; two connections of one process are two owners.
-
-    Attributes:
-        pid: Process id.
-    """
+    """Connection of a process that holds pins; two connections of one process are two owners."""
 
     pid: int
 
@@ -68,9 +57,6 @@ class PinBoard:
         sensors: The sensors.
         rig: Servos on a bus; None without any.
         dead_chips: Bus and address of the chips that do not answer.
-
-    Raises:
-        RobotError: If the world does not fit the robot.
     """
 
     def __init__(
@@ -110,38 +96,98 @@ class PinBoard:
         claim = self._claims.get(pin)
         return None if claim is None else claim.owner
 
-    def execute(self, owner: Owner, request: HardwareRequest) -> object:
-        """Execute a request and return its result.
+    def reader(self, pin: int) -> Owner | None:
+        """Return the owner of an input; None for other pins."""
+        claim = self._claims.get(pin)
+        return claim.owner if claim is not None and claim.mode == "input" else None
 
-        Args:
-            owner: The process that sends it.
-            request: The request.
+    @property
+    def functions(self) -> tuple[Callable[..., object], ...]:
+        """Functions of a robot's processes; each takes the process and the time, ns, first.
 
-        Raises:
-            RobotError: If another process holds the pin, or this one has not claimed it.
-            OSError: If no chip answers, with the `errno` of the kernel's driver.
+        They raise RobotError if another process holds the pin, or this one has not claimed it, and
+        OSError with the `errno` of the kernel's driver if no chip answers.
         """
-        match request:
-            case DrivePin():
-                self._start_pulses(self._output(owner, request.pin), request.hz, request.t)
-                self._drive(owner.pid, request.pin, request.duty, request.hz, request.t)
-            case PulsePin():
-                self._pulse(owner, request)
-            case ReadChip():
-                return self._chip(request.bus, request.address).read(
-                    request.register, request.length
-                )
-            case WriteChip():
-                self._write_chip(owner.pid, request)
-            case InstructServos():
-                rig = self.require_rig()
-                rig.require(request.device)
-                if request.size:
-                    return rig.bus.read(request.ids, request.at, request.size)
-                return rig.bus.write(dict(zip(request.ids, request.data, strict=True)), request.at)
-            case ClaimPin():
-                return self._claim(owner, request)
-        return None
+        return (
+            self.claim,
+            self.drive,
+            self.pulse,
+            self.read_chip,
+            self.write_chip,
+            self.read_servos,
+            self.write_servos,
+        )
+
+    def claim(
+        self,
+        owner: Owner,
+        t: int,
+        pin: int,
+        mode: Literal["input", "output"],
+        pull: str,
+        level: int,
+    ) -> int:
+        """Claim a pin, and return its level: for an input that of its sensor, pull or resistors."""
+        claim = self._claims.setdefault(pin, _Claim())
+        if claim.owner is not None and claim.owner is not owner:
+            raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
+        claim.owner, claim.mode, claim.hz = owner, mode, 0
+        if mode == "output":
+            self._drive(owner.pid, pin, float(level), 0, t)
+            return level
+        idle = self._wiring.idle_level(pin)
+        if pin in self.levels.duties:
+            self.levels.release(pin)
+            self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
+            self.sensors.output_changed(t, pin, float(idle))
+        if pull != "floating" and not self._wiring.has_resistor(pin):
+            idle = int(pull == "up")
+        return self.sensors.levels.get(pin, idle)
+
+    def drive(self, owner: Owner, t: int, pin: int, duty: float, hz: int) -> None:
+        """Set the level of an output (`hz` 0), or the duty of its software PWM."""
+        self._start_pulses(self._output(owner, pin), hz, t)
+        self._drive(owner.pid, pin, duty, hz, t)
+
+    def pulse(self, owner: Owner, t: int, pin: int, us: int, hz: int) -> None:
+        """Send servo pulses on an output; a width of 0 us ends them."""
+        self._start_pulses(self._output(owner, pin), hz if us else 0, t)
+        pulse = Pulse(us, hz)
+        if self.levels.pulses.get(pin) != pulse:
+            self.levels.pulse(pin, pulse)
+            self._record(t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+
+    def read_chip(
+        self, owner: Owner, t: int, bus: int, address: int, register: int, length: int
+    ) -> list[int]:
+        """Read registers of an I2C chip."""
+        return self._chip(bus, address).read(register, length)
+
+    def write_chip(
+        self, owner: Owner, t: int, bus: int, address: int, register: int, data: list[int]
+    ) -> None:
+        """Write registers of an I2C chip."""
+        chip = self._chip(bus, address)
+        chip.write(register, data)
+        if not chip.is_logged:
+            return
+        at = {"bus": bus, "address": address}
+        self._record(t, "i2c", **at, register=register, data=data, pid=owner.pid)
+        for channel, pulse in self._update_channels((bus, address), chip):
+            us, hz = round(pulse.us, 3), round(pulse.hz, 3)
+            self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=owner.pid)
+
+    def read_servos(
+        self, owner: Owner, t: int, device: str, ids: list[int], at: int, size: int
+    ) -> dict[int, ServoReply]:
+        """Read bytes of servos, and return their replies by id."""
+        return self._rig_at(device).bus.read(ids, at, size)
+
+    def write_servos(
+        self, owner: Owner, t: int, device: str, data: dict[int, bytes], at: int
+    ) -> dict[int, ServoReply]:
+        """Write bytes of servos, and return their replies by id."""
+        return self._rig_at(device).bus.write(data, at)
 
     def leave(self, owner: Owner, t: int, *, died: bool) -> None:
         """Free the pins of a process that has ended; outputs keep their level of that moment.
@@ -167,11 +213,7 @@ class PinBoard:
             self._drive(owner.pid, pin, duty, 0, t)
 
     def encoder(self, joint: str) -> SimulatedAs5600:
-        """Return the encoder of a joint.
-
-        Raises:
-            UnknownName: If no such joint has an encoder.
-        """
+        """Return the encoder of a joint."""
         joints = self.sensors.of_kind(SimulatedJoints)
         encoders = {name: one for some in joints for name, one in some.encoders.items()}
         if joint not in encoders:
@@ -182,44 +224,10 @@ class PinBoard:
         if self._ledger is not None:
             self._ledger.write(t, kind, **fields)
 
-    def _claim(self, owner: Owner, request: ClaimPin) -> int:
-        """Return the level of the pin; for an input that of its sensor, pull or resistors."""
-        pin, t = request.pin, request.t
-        claim = self._claims.setdefault(pin, _Claim())
-        if claim.owner is not None and claim.owner is not owner:
-            raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
-        claim.owner, claim.mode, claim.hz = owner, request.mode, 0
-        if request.mode == "output":
-            self._drive(owner.pid, pin, float(request.level), 0, t)
-            return request.level
-        idle = self._wiring.idle_level(pin)
-        if pin in self.levels.duties:
-            self.levels.release(pin)
-            self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
-            self.sensors.output_changed(t, pin, float(idle))
-        if request.pull != "floating" and not self._wiring.has_resistor(pin):
-            idle = int(request.pull == "up")
-        return self.sensors.levels.get(pin, idle)
-
-    def _pulse(self, owner: Owner, request: PulsePin) -> None:
-        pin, us, hz = request.pin, request.us, request.hz
-        self._start_pulses(self._output(owner, pin), hz if us else 0, request.t)
-        pulse = Pulse(us, hz)
-        if self.levels.pulses.get(pin) != pulse:
-            self.levels.pulse(pin, pulse)
-            self._record(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
-
-    def _write_chip(self, pid: int, request: WriteChip) -> None:
-        t, bus, address = request.t, request.bus, request.address
-        chip = self._chip(bus, address)
-        chip.write(request.register, request.data)
-        if not chip.is_logged:
-            return
-        at = {"bus": bus, "address": address}
-        self._record(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
-        for channel, pulse in self._update_channels((bus, address), chip):
-            us, hz = round(pulse.us, 3), round(pulse.hz, 3)
-            self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
+    def _rig_at(self, device: str) -> Rig:
+        rig = self.require_rig()
+        rig.require(device)
+        return rig
 
     def _update_channels(self, at: tuple[int, int], chip: SimulatedChip) -> list[tuple[int, Pulse]]:
         """Update the levels of a chip's channels and return those that changed."""

@@ -23,9 +23,9 @@ from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.drivers.simulation import Levels
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.board_client import BoardClient
 from shapechanger.robot.twin.camera import CameraFault
-from shapechanger.robot.twin.messages import OperatorRequest, SleepOnBoard, SleepResult, Whereabouts
+from shapechanger.robot.twin.hardware import BoardClient
+from shapechanger.robot.twin.messages import Slept, Whereabouts
 from shapechanger.robot.twin.servos.rig import ServoFault
 from shapechanger.robot.twin.start import BoardAt
 
@@ -53,14 +53,14 @@ class Operator:
 
     def place(self, seed: int) -> None:
         """Place the vehicle at the start that follows from a seed."""
-        self._act("place", seed)
+        self._client.ask(None, "place", seed)
 
     def put_back(self) -> None:
         """Put a vehicle that has collided back on its lane, at rest, to continue from there.
 
         In the plain room, which has no lane, it returns to its start. Its truth counts on.
         """
-        self._act("put_back")
+        self._client.ask(None, "put_back")
 
     def lay_out(self, seed: int) -> None:
         """Replace the surroundings, and place the vehicle at a start in them.
@@ -68,7 +68,7 @@ class Operator:
         On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
         for the first `put_back` on it. A twin that is started with another seed has no such wait.
         """
-        self._act("lay_out", seed)
+        self._client.ask(None, "lay_out", seed)
 
     def advance(self, seconds: float) -> int:
         """Advance the twin's clock and return its time in nanoseconds.
@@ -76,23 +76,23 @@ class Operator:
         Raises:
             RobotError: If the board runs in real time.
         """
-        return self._client.ask(SleepOnBoard(ns=round(seconds * 1e9)), SleepResult).t
+        return self._client.ask(Slept, "sleep", round(seconds * 1e9)).t
 
     def break_camera(self, fault: CameraFault) -> None:
         """Make the camera fail; "" repairs it."""
-        self._act("camera", fault)
+        self._client.ask(None, "break_camera", fault)
 
     def press_bumper(self, down: bool = True) -> None:
         """Press or release all bumpers."""
-        self._act("bumper", down)
+        self._client.ask(None, "press_bumper", down)
 
     def press_stop(self, down: bool = True) -> None:
         """Press or release the emergency stop button."""
-        self._act("stop", down)
+        self._client.ask(None, "press_stop", down)
 
     def set_battery(self, volts: float | None) -> None:
         """Set the battery's voltage without load, V; None for a full one."""
-        self._act("battery", None if volts is None else float(volts))
+        self._client.ask(None, "set_battery", None if volts is None else float(volts))
 
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
         """Override what distance sensors measure.
@@ -101,7 +101,7 @@ class Operator:
             metres: Distance, m; None for the truth.
             dead: Whether they do not answer at all.
         """
-        self._act("distance", None if metres is None else float(metres), dead)
+        self._client.ask(None, "set_distance", None if metres is None else float(metres), dead)
 
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
         """Make an I2C chip stop answering, or answer again.
@@ -111,7 +111,7 @@ class Operator:
             address: Address on the bus.
             dead: Whether it stops answering.
         """
-        self._act("chip", bus, address, dead)
+        self._client.ask(None, "break_chip", bus, address, dead)
 
     def break_servo(self, tendon: str, fault: ServoFault) -> None:
         """Make the servo of a tendon fail.
@@ -120,7 +120,7 @@ class Operator:
             tendon: Name of the tendon.
             fault: The fault; "" repairs what can be repaired.
         """
-        self._act("servo", tendon, fault)
+        self._client.ask(None, "break_servo", tendon, fault)
 
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
         """Change the magnet of a joint's encoder.
@@ -129,26 +129,23 @@ class Operator:
             joint: Name of the joint.
             state: State of the magnet; "" repairs it.
         """
-        self._act("magnet", joint, state)
+        self._client.ask(None, "break_magnet", joint, state)
 
     def tensions(self) -> dict[str, float]:
         """Return the tension of each tendon on the servo bus, N, by name."""
-        return self._act("tensions", kind=dict[str, float])
+        return self._client.ask(dict[str, float], "tensions")
 
     def levels(self) -> Levels:
         """Return the state of all outputs."""
-        return self._act("levels", kind=Levels)
+        return self._client.ask(Levels, "levels")
 
     def where(self) -> Whereabouts:
         """Return the true state of the vehicle."""
-        return self._act("whereabouts", kind=Whereabouts)
+        return self._client.ask(Whereabouts, "where")
 
     def close(self) -> None:
         """Leave the board."""
         self._client.close()
-
-    def _act(self, action: str, *values: bool | int | float | str | None, kind: Any = None) -> Any:
-        return self._client.ask(OperatorRequest(action=action, values=values), kind)
 
 
 _READY: Final = "ready.json"

@@ -17,19 +17,7 @@ _Sensor = TypeVar("_Sensor", bound=SimulatedSensor)
 
 
 class BoardSensors:
-    """All sensors, and the emergency stop button.
-
-    Args:
-        plan: The robot as it is wired.
-        world: World of the robot.
-
-    Attributes:
-        sensors: The sensors by name.
-        levels: Level of each pin that a sensor drives.
-
-    Raises:
-        RobotError: If the world has other joints than the robot.
-    """
+    """All sensors, and the emergency stop button."""
 
     def __init__(self, plan: GuardPlan, world: World) -> None:
         self.sensors = {
@@ -47,13 +35,7 @@ class BoardSensors:
         self._stop_held = False
 
     def advance(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
-        """Return the edges between two times, in order.
-
-        Args:
-            start_ns: End of the last call.
-            end_ns: Current time.
-            seen: Current state of the world.
-        """
+        """Return the edges between two times, in order."""
         found: list[Edge] = []
         for sensor in self.sensors.values():
             found += sensor.edges(start_ns, end_ns, seen)

@@ -1,4 +1,4 @@
-"""Server of the board: connections to its clients, and their requests."""
+"""Server of the board: connections to its clients, and the calls of its functions."""
 
 from __future__ import annotations
 
@@ -7,31 +7,21 @@ import select
 import socket
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple, get_type_hints
 
 import msgspec
 
-from shapechanger.errors import ShapechangerError
+from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin.messages import (
-    MAX_EDGES,
     MAX_MESSAGE,
-    BoardEvent,
-    BoardGreeting,
-    BoardReply,
-    ClaimPin,
-    ConnectClient,
-    DrivePin,
-    HardwareRequest,
-    InputEdges,
-    InstructServos,
-    LeaveBoard,
-    PulsePin,
-    ReadChip,
-    Request,
+    Call,
+    Edges,
+    Event,
+    Greeting,
+    Reply,
     Role,
-    WriteChip,
-    decode_request,
+    decode_call,
     encode,
 )
 from shapechanger.robot.twin.pin_board import PinBoard
@@ -39,8 +29,11 @@ from shapechanger.robot.twin.pin_board import PinBoard
 START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could be taken for "never"."""
 
-_MAX_OUTBOX: Final = 256
-"""Messages kept for a client that does not read, before edges are merged."""
+LATER: Final = object()
+"""Result of a call that is answered later, or never."""
+
+_MAX_OUTBOX: Final = 256  # Messages kept for a client that does not read, before edges are merged.
+_MAX_EDGES: Final = 500  # Most edges in one message, so that it stays below `MAX_MESSAGE`.
 _READABLE: Final = select.EPOLLIN | select.EPOLLHUP | select.EPOLLERR
 
 _log = logging.getLogger(__name__)
@@ -51,20 +44,7 @@ class OwnerGone(Exception):
 
 
 class BoardConnection:
-    """The board's end of the connection to a client, which never blocks.
-
-    Args:
-        connected: Its socket.
-
-    Attributes:
-        role: Role of the client.
-        pid: Process id of the client.
-        inputs: Pins whose edges it receives.
-        takes_part: Whether time waits for it.
-        works: Whether it has a grant that it has not finished.
-        until_ns: Time at which it wants its next grant at the latest.
-        has_left: Whether it has announced that it closes the connection.
-    """
+    """The board's end of the connection to a client, which never blocks."""
 
     def __init__(self, connected: socket.socket) -> None:
         connected.setblocking(False)
@@ -73,7 +53,6 @@ class BoardConnection:
         self._outbox: deque[tuple[bytes, Sequence[Edge]]] = deque()
         self.role: Role = "clock"
         self.pid = 0
-        self.inputs: set[int] = set()
         self.takes_part = False
         self.works = False
         self.until_ns = 0
@@ -88,12 +67,8 @@ class BoardConnection:
         """True if messages wait for the client to read."""
         return bool(self._outbox)
 
-    def receive(self) -> Request | None:
-        """Return the next request; None if there is none now.
-
-        Raises:
-            EOFError: If the client is gone, or sends nonsense.
-        """
+    def receive(self) -> Call | None:
+        """Return the next call; None if there is none now."""
         try:
             data = self._socket.recv(MAX_MESSAGE)
         except BlockingIOError:
@@ -103,36 +78,30 @@ class BoardConnection:
         if not data:
             raise EOFError
         try:
-            return decode_request(data)
+            return decode_call(data)
         except msgspec.MsgspecError as error:
             _log.warning("process %d sends a malformed request: %s", self.pid, error)
             raise EOFError from error
 
-    def send(self, event: BoardEvent) -> None:
+    def send(self, event: Event) -> None:
         """Send a message, now or when the client reads."""
-        edges = event.edges if isinstance(event, InputEdges) else ()
+        edges = event.edges if isinstance(event, Edges) else ()
         self._outbox.append((encode(event), edges))
         self.flush()
 
     def send_edges(self, edges: Iterable[Edge]) -> None:
-        """Send the edges of the client's inputs.
+        """Send edges of the client's inputs, in order of time.
 
         A client that does not read loses edges, as in the kernel, but never a reply or a grant:
         beyond 256 messages, only the last of the waiting edges of each input is kept.
-
-        Args:
-            edges: All edges, in order of time.
         """
-        wanted = [edge for edge in edges if edge.pin in self.inputs]
-        if not wanted:
-            return
+        edges = list(edges)
         if len(self._outbox) >= _MAX_OUTBOX:
             waiting = [edge for _, edges in self._outbox for edge in edges]
-            last = {edge.pin: edge for edge in (*waiting, *wanted) if edge.pin in self.inputs}
             self._outbox = deque(message for message in self._outbox if not message[1])
-            wanted = sorted(last.values())
-        for start in range(0, len(wanted), MAX_EDGES):
-            self.send(InputEdges(wanted[start : start + MAX_EDGES]))
+            edges = sorted({edge.pin: edge for edge in (*waiting, *edges)}.values())
+        for start in range(0, len(edges), _MAX_EDGES):
+            self.send(Edges(edges[start : start + _MAX_EDGES]))
 
     def flush(self) -> None:
         """Send waiting messages as far as the client reads."""
@@ -151,24 +120,34 @@ class BoardConnection:
         self._socket.close()
 
 
-Operate = Callable[[BoardConnection, Request], Any]
-"""Executes a request of time or of an operator; returns its result, or `LATER`."""
+class Function(NamedTuple):
+    """A function that clients may call, and the decoder of its arguments.
 
-LATER: Final = object()
-"""Result of a request that is answered later, or never."""
+    The server passes "hardware" the connection and the time first, "time" the connection and the id
+    of the call, and "operator" nothing.
+    """
+
+    run: Callable[..., object]
+    decode: Callable[[bytes], tuple[Any, ...]]
+    takes: Literal["hardware", "time", "operator"]
+
+
+def functions_of(
+    takes: Literal["hardware", "time", "operator"], functions: Iterable[Callable[..., object]]
+) -> dict[str, Function]:
+    """Return functions by name, for `BoardServer`."""
+    found: dict[str, Function] = {}
+    for function in functions:
+        hints = get_type_hints(function)
+        hints.pop("return", None)
+        kinds = [*hints.values()][0 if takes == "operator" else 2 :]
+        decode = msgspec.msgpack.Decoder(tuple[*kinds] if kinds else tuple[()]).decode
+        found[function.__name__.lstrip("_")] = Function(function, decode, takes)
+    return found
 
 
 class BoardServer:
-    """Accepts clients and executes their requests.
-
-    Args:
-        listening: Listening socket.
-        owner_fd: Descriptor whose end ends the board.
-        pins: Pins, chips and servos.
-        clock: Kind of clock.
-        now_ns: Time of that clock.
-        operate: Executes the requests of time and of operators.
-    """
+    """Accepts clients and executes their calls."""
 
     def __init__(
         self,
@@ -177,7 +156,7 @@ class BoardServer:
         pins: PinBoard,
         clock: Literal["real", "twin"],
         now_ns: Callable[[], int],
-        operate: Operate,
+        functions: dict[str, Function],
     ) -> None:
         self._listening = listening
         listening.setblocking(False)
@@ -185,7 +164,8 @@ class BoardServer:
         self._pins = pins
         self._clock: Literal["real", "twin"] = clock
         self._now_ns = now_ns
-        self._operate = operate
+        self._functions = functions_of("hardware", pins.functions) | functions
+        self._functions |= functions_of("time", (self._greet, self._leave))
         self._epoll = select.epoll()
         self._epoll.register(listening, select.EPOLLIN)
         self._epoll.register(owner_fd, select.EPOLLIN)
@@ -197,11 +177,7 @@ class BoardServer:
         return tuple(self._by_fd.values())
 
     def serve(self, timeout_s: float | None) -> None:
-        """Wait for requests and execute them.
-
-        Raises:
-            OwnerGone: If the owner has ended.
-        """
+        """Wait for calls and execute them."""
         new = False
         for fd, events in self._epoll.poll(timeout_s):
             if fd == self._listening.fileno():
@@ -219,31 +195,21 @@ class BoardServer:
 
     def send_edges(self, edges: Sequence[Edge]) -> None:
         """Send the edges of inputs to the clients that claimed them."""
-        if edges:
-            for connection in self.connections:
-                connection.send_edges(edges)
+        for connection in self.connections if edges else ():
+            own = [edge for edge in edges if self._pins.reader(edge.pin) is connection]
+            if own:
+                connection.send_edges(own)
                 self._watch(connection)
 
-    def send(self, connection: BoardConnection, event: BoardEvent) -> None:
-        """Send a message to a client, now or when it reads.
-
-        Args:
-            connection: The client.
-            event: The message.
-        """
+    def send(self, connection: BoardConnection, event: Event) -> None:
+        """Send a message to a client, now or when it reads."""
         connection.send(event)
         if connection.wants_to_write:
             self._watch(connection)
 
-    def reply(self, connection: BoardConnection, request_id: int, result: object) -> None:
-        """Send the result of a request.
-
-        Args:
-            connection: The client.
-            request_id: Id of its request.
-            result: The result, which msgspec can encode.
-        """
-        self.send(connection, BoardReply(request_id, msgspec.Raw(encode(result))))
+    def reply(self, connection: BoardConnection, call_id: int, result: object) -> None:
+        """Send the result of a call, which msgspec can encode."""
+        self.send(connection, Reply(call_id, msgspec.Raw(encode(result))))
 
     def close(self) -> None:
         """Close all sockets."""
@@ -268,66 +234,62 @@ class BoardServer:
             self._epoll.modify(connection.fileno(), select.EPOLLIN | writing)
 
     def _execute_all(self, connection: BoardConnection) -> None:
-        """Execute all requests that have arrived from a client."""
+        """Execute all calls that have arrived from a client."""
         try:
-            while (request := connection.receive()) is not None:
-                self._execute(connection, request)
+            while (call := connection.receive()) is not None:
+                self._execute(connection, call)
         except EOFError:
             self._forget(connection)
 
-    def _execute(self, connection: BoardConnection, request: Request) -> None:
+    def _execute(self, connection: BoardConnection, call: Call) -> None:
         result: object = LATER
         error, number = "", 0
         try:
-            result = self._result(connection, request)
+            result = self._result(connection, call)
         except ShapechangerError as refusal:  # For example of a course: the board runs on.
             error = str(refusal)
         except OSError as refusal:
             number = refusal.errno or 0
-        if request.id is None:
+        if call.id is None:
             if error or number:
                 _log.warning("process %d: %s", connection.pid, error or f"errno {number}")
         elif error or number:
-            self.send(connection, BoardReply(request.id, error=error, errno=number))
+            self.send(connection, Reply(call.id, error=error, errno=number))
         elif result is not LATER:
-            self.reply(connection, request.id, result)
+            self.reply(connection, call.id, result)
 
-    def _result(self, connection: BoardConnection, request: Request) -> object:
-        match request:
-            case ClaimPin():
-                return self._claim(connection, request)
-            case DrivePin() | PulsePin() | ReadChip() | WriteChip() | InstructServos():
-                return self._execute_on_hardware(connection, request)
-            case ConnectClient():
-                connection.role = request.role
-                connection.pid = request.pid
-                return BoardGreeting(self._clock, self._now_ns())
-            case LeaveBoard():
-                connection.has_left = True
-            case _:
-                if connection.role == "operator":
-                    self._catch_up()
-                return self._operate(connection, request)
-        return None
+    def _result(self, connection: BoardConnection, call: Call) -> object:
+        function = self._functions.get(call.function)
+        if function is None:
+            raise RobotError(f"The board has no function {call.function!r}.")
+        try:
+            arguments = function.decode(call.arguments)
+        except msgspec.MsgspecError as error:
+            raise RobotError(f"The board's {call.function} takes others: {error}.") from error
+        if connection.role == "operator":
+            self._catch_up()
+        match function.takes:
+            case "operator":
+                return function.run(*arguments)
+            case "time":
+                return function.run(connection, call.id or 0, *arguments)
+            case "hardware":
+                t = self._now_ns() if self._clock == "twin" else call.t
+                if call.function == "claim":
+                    holder = self._pins.owner(arguments[0])
+                    if isinstance(holder, BoardConnection) and holder is not connection:
+                        self._execute_all(holder)  # It may have ended meanwhile.
+                return function.run(connection, t, *arguments)
 
-    def _execute_on_hardware(self, connection: BoardConnection, request: HardwareRequest) -> object:
-        if self._clock == "twin":
-            request.t = self._now_ns()
-        return self._pins.execute(connection, request)
+    def _greet(self, connection: BoardConnection, _: int, role: Role, pid: int) -> Greeting:
+        connection.role, connection.pid = role, pid
+        return Greeting(self._clock, self._now_ns())
 
-    def _claim(self, connection: BoardConnection, request: ClaimPin) -> object:
-        holder = self._pins.owner(request.pin)
-        if isinstance(holder, BoardConnection) and holder is not connection:
-            self._execute_all(holder)  # It may have ended meanwhile.
-        level = self._execute_on_hardware(connection, request)
-        if request.mode == "input":
-            connection.inputs.add(request.pin)
-        else:
-            connection.inputs.discard(request.pin)
-        return level
+    def _leave(self, connection: BoardConnection, _: int) -> None:
+        connection.has_left = True
 
     def _catch_up(self) -> None:
-        """Execute what processes have sent until now, and notice which have ended."""
+        """Execute all that processes have sent until now, and notice which have ended."""
         for connection in self.connections:
             if connection.role == "hardware":
                 self._execute_all(connection)

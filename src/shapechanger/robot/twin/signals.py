@@ -77,11 +77,7 @@ class Transition:
 
 
 class LedgerWriter:
-    """A ledger in a file.
-
-    Args:
-        path: The file, which must not exist yet.
-    """
+    """A ledger in a file."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_EXCL, 0o644)
@@ -107,9 +103,6 @@ def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
     """Read all complete lines of a ledger, ordered by time.
 
     Processes stamp their changes, so lines of two processes may be out of order in the file.
-
-    Raises:
-        RobotError: If a complete line is malformed.
     """
     text = Path(path).read_text(encoding="utf-8")
     decode = msgspec.json.Decoder(Transition).decode

@@ -16,9 +16,9 @@ import msgspec
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError, check_seed
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.twin.board_client import BoardClient
+from shapechanger.robot.twin.hardware import BoardClient
+from shapechanger.robot.twin.place import Place
 from shapechanger.robot.twin.wiring import ONE_SHOT_MS, TwinWiring
-from shapechanger.robot.twin.world.place import Place
 
 _HARDWARE: Final = "shapechanger.robot.twin.hardware:connect"
 """Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
@@ -52,11 +52,7 @@ class BoardSettings(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class BoardAt:
-    """Files of a board.
-
-    Attributes:
-        folder: Their folder.
-    """
+    """Files of a board."""
 
     folder: Path
 
@@ -93,12 +89,7 @@ class BoardAt:
 
 @dataclass(frozen=True, slots=True)
 class RunningBoard(BoardAt):
-    """A board that this process has started. It ends with `close`, or with this process.
-
-    Attributes:
-        process: Process of the board.
-        owner: Our end of the connection that keeps the board running.
-    """
+    """A board that this process has started. It ends with `close`, or with this process."""
 
     process: subprocess.Popen[bytes]
     owner: socket.socket

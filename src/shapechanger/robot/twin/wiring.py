@@ -24,14 +24,6 @@ class TwinWiring:
         plan: The robot as it is wired.
         one_shot_ms: Hold time of the enable line's one-shot after each edge of `plan.enable_pin`,
             ms; None without one.
-
-    Attributes:
-        plan: The robot as it is wired.
-        outputs: Plans of the outputs, by name.
-        propelling: Names of the outputs that propel the robot.
-
-    Raises:
-        RobotError: If the twin does not support an output.
     """
 
     def __init__(self, plan: GuardPlan, one_shot_ms: float | None = ONE_SHOT_MS) -> None:

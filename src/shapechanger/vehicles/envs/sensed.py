@@ -189,8 +189,8 @@ _COUNTS: Final = 4096  # Of its period.
 class SensedVehicle:
     """A vehicle that moves within a robot's limits and senses what the robot would.
 
-    It is the robot without pins, chips, link and emergency stops: `InProcessRobot` of
-    `shapechanger.robot.twin.in_process` emulates those, and drives to the same place.
+    It is the robot without pins, chips, link and emergency stops: a robot's twin simulates
+    those, and drives to the same place.
 
     Args:
         plan: Plan of the guard.

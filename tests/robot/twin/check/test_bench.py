@@ -7,8 +7,7 @@ import math
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.lamps import lamps_of
-from shapechanger.robot.check.pins import probed_pin
+from shapechanger.robot.check.pins import lamps_of, probed_pin
 from shapechanger.robot.twin.check.bench import Bench, ProbeWatcher
 from tests.robot.check.held_pins import HeldPins, shipped
 

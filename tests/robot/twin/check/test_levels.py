@@ -13,11 +13,16 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import Finding
-from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.twin.check.bench import Bench, Watcher
 from shapechanger.robot.twin.check.faults import FAULTS
-from shapechanger.robot.twin.check.levels import check_robot, require_level
-from shapechanger.robot.twin.check.trial import Trial, TrialResult, fault_checks
+from shapechanger.robot.twin.check.trial import (
+    Trial,
+    TrialResult,
+    check_robot,
+    fault_checks,
+    require_level,
+)
 from tests.robot.check.held_pins import shipped
 
 
@@ -113,8 +118,8 @@ def test_a_part_is_named_before_its_questions(monkeypatch: pytest.MonkeyPatch) -
         events.append("closed")
         return ["GPIO22 burns."]
 
-    monkeypatch.setattr("shapechanger.robot.twin.check.levels.walk", walked)
-    monkeypatch.setattr("shapechanger.robot.twin.check.levels.examine", lambda _: iter(()))
+    monkeypatch.setattr("shapechanger.robot.twin.check.trial.walk", walked)
+    monkeypatch.setattr("shapechanger.robot.twin.check.trial.examine", lambda _: iter(()))
     monkeypatch.setattr(bench, "watcher", Watcher)
     monkeypatch.setattr(bench, "close", closed)
     parts = check_robot("leds", Trial(bench), StandingRobot(bench.plan), 0.2)

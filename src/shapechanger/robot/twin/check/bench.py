@@ -10,8 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.lamps import BenchLamp
-from shapechanger.robot.check.pins import probed_pin
+from shapechanger.robot.check.pins import BenchLamp, probed_pin
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.outputs import make_safe
@@ -53,12 +52,7 @@ class Watcher:
 
 
 class LedgerWatcher(Watcher):
-    """Reads the levels and the ledger of a twin.
-
-    Args:
-        board: The board.
-        wiring: The wiring of the robot.
-    """
+    """Reads the levels and the ledger of a twin."""
 
     def __init__(self, board: BoardAt, wiring: TwinWiring) -> None:
         self._board = board
@@ -141,9 +135,6 @@ class Bench:
         one_shot: Whether a twin has the one-shot of the enable line, where the profile has one.
         probe: Free BCM pin with a wire to the pin of the motor that drives forward; None without.
         arguments: Further arguments of `serve`.
-
-    Raises:
-        RobotError: If the probe cannot be used.
     """
 
     def __init__(

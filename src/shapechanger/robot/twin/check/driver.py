@@ -76,11 +76,7 @@ class Driver:
         return [int(line) for line in self._sent.read_bytes().split(b"\n")[:-1]]
 
     def await_commands(self, count: int) -> None:
-        """Wait until it has sent `count` commands.
-
-        Raises:
-            RobotError: If it ends before, or takes too long.
-        """
+        """Wait until it has sent `count` commands."""
         until_s = time.monotonic() + _STARTED_S
         while len(self.sent) < count:
             if self.process.poll() is not None or time.monotonic() > until_s:

@@ -32,9 +32,6 @@ class DrivenRobot:
         robot: The running robot.
         profile: Its profile.
         cap: Largest throttle, 0 to 1.
-
-    Raises:
-        LinkError: If it cannot be reached.
     """
 
     def __init__(self, robot: RunningRobot, profile: Profile, cap: float) -> None:
@@ -193,9 +190,6 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
         robot: The running robot.
         profile: Its profile.
         cap: Largest throttle, 0 to 1.
-
-    Raises:
-        LinkError: If it cannot be reached.
     """
     driven = DrivenRobot(robot, profile, cap)
     try:

@@ -47,11 +47,7 @@ class Scene:
     strangers: list[socket.socket] = field(default_factory=list[socket.socket])
 
     def on_board(self) -> Operator:
-        """Return the operator.
-
-        Raises:
-            RobotError: If the robot is not on a twin.
-        """
+        """Return the operator."""
         if self.operator is None:
             raise RobotError("Only the board of a twin has this fault.")
         return self.operator

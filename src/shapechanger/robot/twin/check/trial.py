@@ -1,22 +1,25 @@
-"""Trials of a robot: drive at full throttle, inject a fault, and judge by the pins."""
+"""Trials of a robot: drive, inject a fault, judge by the pins; and the levels of a check."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, Literal, Self
 
 from shapechanger.errors import RobotError, ShapechangerError
-from shapechanger.robot.check.check import Check, Results, judged
-from shapechanger.robot.check.lamps import SHOWN_S, Ask
+from shapechanger.robot.check.check import Check, Finding, Results, judged, run_checks
+from shapechanger.robot.check.computer import examine
+from shapechanger.robot.check.pins import SHOWN_S, Ask, lamps_of, walk
+from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.check.bench import Bench, Watcher
 from shapechanger.robot.twin.check.driver import Driver
+from shapechanger.robot.twin.check.driving import check_driving
 from shapechanger.robot.twin.check.faults import FAULTS, Fault, Scene, Untimely
 from shapechanger.robot.twin.judge import (
     ExpectedCommand,
@@ -78,14 +81,7 @@ class TrialResult:
 
 
 class Trial:
-    """A robot for successive trials.
-
-    Args:
-        bench: Where it is; a profile for its twin.
-        pilot: Module of the program that drives as a policy on board, for the faults of a policy.
-        trials: Trials of each fault in `results`.
-        ask: Asks a person, where nothing measures.
-    """
+    """A robot for successive trials."""
 
     def __init__(
         self,
@@ -111,11 +107,7 @@ class Trial:
         self.close()
 
     def close(self) -> None:
-        """Stop the robot and remove its files.
-
-        Raises:
-            RobotError: If pins of this machine could not be put at rest.
-        """
+        """Stop the robot and remove its files."""
         self._restarts = 0
         if failures := self.bench.close():
             raise RobotError(f"Not everything is at rest: {' '.join(failures)}")
@@ -134,11 +126,7 @@ class Trial:
         return "" if has.get(need, True) else f"This robot has no {need}."
 
     def results(self, fault: Fault) -> Results:
-        """Try a fault as often as asked, and yield one result.
-
-        Args:
-            fault: The fault.
-        """
+        """Try a fault as often as asked, and yield one result."""
         if why := self.lacks("throttle") or self.lacks(fault.needs):
             yield "unknown", why
             return
@@ -186,12 +174,6 @@ class Trial:
 
         A robot that cannot be driven, because a busy machine made it restart, is replaced first; so
         is one whose fault has an unknown time.
-
-        Args:
-            fault: The fault.
-
-        Raises:
-            RobotError: If no robot can be driven.
         """
         attempt = 0
         while True:
@@ -319,11 +301,6 @@ class Trial:
         What the board makes begins with its line of the ledger: the edge of the button or bumper,
         or the failure of the camera. Until then the request waits for this process and the board,
         neither of which is part of a robot.
-
-        Args:
-            fault: The fault.
-            ledger: Transitions, ordered by time.
-            at_ns: When this process made it, or asked the board to make it.
         """
         plan = self._plan
         switches = (one for one in plan.sensors if one.driver == "switch")
@@ -377,3 +354,67 @@ def fault_checks(trial: Trial, *, all_faults: bool) -> list[Check]:
         for fault in FAULTS.values()
         if all_faults or fault.on_pins
     ]
+
+
+CheckLevel = Literal["wiring", "plain", "leds", "faults"]
+Part = Literal["wiring", "LEDs", "driving", "faults"]
+
+PARTS: Final[dict[CheckLevel, tuple[Part, ...]]] = {
+    "wiring": ("wiring",),
+    "plain": ("wiring", "driving"),
+    "leds": ("wiring", "LEDs", "driving", "faults"),
+    "faults": ("faults",),
+}
+"""Parts of each level. Nothing moves in the first part; all others drive outputs."""
+
+# Longer than two cycles of software PWM at 50 Hz.
+_MEASURED_S: Final = 0.04
+
+
+def require_level(level: CheckLevel, trial: Trial) -> None:
+    """Refuse a level that a robot cannot have."""
+    profile = trial.bench.profile
+    if level == "leds":
+        lamps_of(trial.bench.plan)
+    if level == "faults" and trial.lacks("throttle"):
+        raise RobotError(f"Nothing of {profile.name} propels, so there is nothing to stop.")
+
+
+def check_robot(
+    level: CheckLevel, trial: Trial, standing: StandingRobot, cap: float
+) -> Iterator[tuple[Part, Iterator[Finding]]]:
+    """Yield each part of a level, and its findings, before its first question.
+
+    Args:
+        level: The level.
+        trial: The robot for the faults, and where it is.
+        standing: The robot for the checks that move nothing.
+        cap: Largest throttle of the checks that drive, 0 to 1.
+    """
+    for part in PARTS[level]:
+        yield part, _findings(part, level, trial, standing, cap)
+
+
+def _findings(
+    part: Part, level: CheckLevel, trial: Trial, standing: StandingRobot, cap: float
+) -> Iterator[Finding]:
+    """Yield the findings of a part, and leave everything at rest."""
+    bench = trial.bench
+    try:
+        match part:
+            case "wiring":
+                robot = replace(standing, hardware=bench.pins, on_twin=bench.twin)
+                yield from examine(robot)
+            case "LEDs":
+                with closing(bench.watcher()) as watcher:
+                    shown_s = SHOWN_S if type(watcher) is Watcher else _MEASURED_S
+                    yield from walk(bench.plan, bench.pins, trial.ask, watcher.sees, shown_s)
+            case "driving":
+                with bench.robot() as served:
+                    yield from check_driving(served, bench.profile, cap)
+            case "faults":
+                yield from run_checks(fault_checks(trial, all_faults=level == "faults"))
+    finally:
+        failures = bench.close()
+    if failures:
+        yield Finding("safe pins", "bad", " ".join(failures))

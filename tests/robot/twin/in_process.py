@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import simplejpeg
@@ -22,11 +22,11 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.process import Guard
+from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.link.messages import Observation, Welcome
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.hardware import TwinHardware
-from shapechanger.robot.twin.messages import HardwareRequest
+from shapechanger.robot.twin.hardware import BoardClient, TwinHardware
 from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.server import START_NS
 from shapechanger.robot.twin.wiring import TwinWiring
@@ -38,38 +38,26 @@ _SESSION: Final = 1
 _MAX_ARM_TICKS: Final = 10
 
 
-class LocalBoard:
+class LocalBoard(BoardClient):
     """A board with its world in this process, whose time only `advance` moves.
 
-    It is the board of the only process that uses it, and that process's clock; see `BoardPins` and
-    `Clock`.
-
-    Args:
-        wiring: What is attached to the pins.
-        world: World of the robot.
-        seed: Seed of the phase of software PWM.
-
-    Attributes:
-        pid: This process, which owns the pins.
-        pins: Pins, chips and servos.
-        hardware: Hardware for a guard in this process.
-        levels: Level of each pin that is claimed as an input.
-        on_edge: Called with pin, level and time of each edge.
-        closed: Whether `close` was called.
+    It is the board of the only process that uses it, and that process's clock.
     """
 
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
         self._now_ns = START_NS
         self.pid = os.getpid()
         self.pins = PinBoard(wiring, world, None, seed, START_NS)
+        self._functions = {one.__name__: one for one in self.pins.functions}
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
-        self.closed = False
-        self.hardware = TwinHardware(self, self)
+        self._closed = False
+        self.hardware = TwinHardware(self, cast("Clock", _Clock(self)))
 
-    def now_ns(self) -> int:
-        """Return the time in nanoseconds."""
-        return self._now_ns
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._closed
 
     def advance(self, now_ns: int) -> None:
         """Advance time, the world and the sensors."""
@@ -80,31 +68,38 @@ class LocalBoard:
                 if self.on_edge is not None:
                     self.on_edge(pin, level, t)
 
-    def post(self, request: HardwareRequest) -> None:
-        """Execute a request."""
-        self.pins.execute(self, request)
+    def pass_ns(self, ns: int) -> None:
+        """Advance time by some nanoseconds."""
+        self.advance(self._now_ns + ns)
 
-    def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
-        """Execute a request and return its result; see `BoardPins.ask`."""
-        return self.pins.execute(self, request)
+    def post(self, function: str, *arguments: Any) -> None:
+        """Call a function of the board."""
+        self._functions[function](self, self._now_ns, *arguments)
+
+    def ask(self, kind: Any, function: str, *arguments: Any) -> Any:
+        """Call a function of the board and return its result."""
+        return self._functions[function](self, self._now_ns, *arguments)
 
     def drain(self) -> None:
         """Do nothing: edges arrive with `advance`."""
 
     def close(self) -> None:
         """Use the pins no more."""
-        self.closed = True
+        self._closed = True
+
+
+class _Clock:
+    def __init__(self, board: LocalBoard) -> None:
+        self._board = board
+
+    def now_ns(self) -> int:
+        return self._board._now_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Refuse: the caller is the one who would have to advance the board."""
         raise RobotError("The time of a board in this process advances only by `advance`.")
 
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Do nothing: a guard in this process has no supervisor."""
-
-    async def sleep(self, seconds: float) -> int | None:
-        """Refuse; see `wait`."""
-        raise RobotError("The time of a board in this process advances only by `advance`.")
 
 
 class _Orders:
@@ -133,21 +128,7 @@ class _Orders:
 
 
 class InProcessRobot:
-    """A robot in a world, advanced step by step.
-
-    Args:
-        profile: The robot. Pictures come from the world, not from its camera's driver.
-        world: World of the robot.
-        pictures: Whether observations have pictures.
-        seed: Seed of the phase of software PWM.
-        wired_as: The robot as it is really wired; None for the plan of the profile.
-
-    Attributes:
-        welcome: Description of the robot, as a daemon sends it to a client.
-
-    Raises:
-        RobotError: If the world does not fit the profile.
-    """
+    """A robot in a world, advanced step by step."""
 
     def __init__(
         self,
@@ -178,7 +159,7 @@ class InProcessRobot:
     @property
     def now_ns(self) -> int:
         """Time of the robot in nanoseconds."""
-        return self._board.now_ns()
+        return self._board.hardware.clock.now_ns()
 
     def start(self, place: Callable[[], object] | None = None) -> Observation:
         """Restart the robot, arm it, and place it at a start.
@@ -212,7 +193,7 @@ class InProcessRobot:
             The observation at the end of the period, and whether the robot bumped into something.
         """
         bumps = self._state.bumps
-        self._command_ns = self._board.now_ns()
+        self._command_ns = self._board.hardware.clock.now_ns()
         self._seq += 1
         self._orders.waiting.append(
             Order(
@@ -221,7 +202,7 @@ class InProcessRobot:
                 seq=self._seq,
                 issued_ns=self._command_ns,
                 ttl_ms=self._profile.limits.deadline_ms,
-                frame_ns=self._board.now_ns(),
+                frame_ns=self._board.hardware.clock.now_ns(),
                 values=tuple(values),
             )
         )
@@ -237,7 +218,7 @@ class InProcessRobot:
         self._orders.refused = refused = ""  # An earlier refusal is about something else.
         seen = self._state.emergencies
         for _ in range(_MAX_ARM_TICKS):
-            now_ns = self._board.now_ns()
+            now_ns = self._board.hardware.clock.now_ns()
             self._orders.waiting.append(Order("arm", issued_ns=now_ns, emergency=seen, person=True))
             self._advance(self._tick_ns)
             refused = self.refused
@@ -284,7 +265,7 @@ class InProcessRobot:
         guard, board = self._guard, self._board
         if guard is None:
             raise RobotError("This robot is closed.")
-        now_ns = board.now_ns()
+        now_ns = board.hardware.clock.now_ns()
         end_ns = now_ns + ns
         while now_ns < end_ns:
             now_ns = min(now_ns + self._tick_ns, end_ns)
@@ -307,10 +288,10 @@ class InProcessRobot:
             jpeg = simplejpeg.encode_jpeg(
                 np.ascontiguousarray(self._world.picture()), quality, "RGB", "444"
             )
-            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.now_ns()))
+            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.hardware.clock.now_ns()))
         return build_observation(
             seq=self._observed,
-            now_ns=self._board.now_ns(),
+            now_ns=self._board.hardware.clock.now_ns(),
             reader=self._reader,
             state=self._state,
             newest=newest,
