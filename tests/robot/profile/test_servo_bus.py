@@ -23,7 +23,7 @@ def test_outputs_include_the_bus_and_the_sensor_its_tendons() -> None:
     assert [output.settings["id"] for output in plan.outputs] == [1, 2, 3, 4, 5, 6, 7]
     sensor, _ = plan.sensors
     assert sensor.measures == "tendons"
-    assert sensor.settings["tendons"] == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
+    assert [*sensor.settings["tendons"]] == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
     assert GuardPlan.from_json(json.dumps(json.loads(plan.to_json()))) == plan
 
 

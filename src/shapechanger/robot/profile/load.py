@@ -98,18 +98,7 @@ _NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)
 
 
 def starter_text(kind: str, path: str | os.PathLike[str], robot_name: str) -> str:
-    """Return what `write_profile` would write, with the same checks, without writing it.
-
-    Args:
-        kind: Name of a shipped profile, such as "car".
-        path: The new file, which must not exist.
-        robot_name: Name of the new robot.
-
-    Raises:
-        UnknownName: If no shipped profile has this name.
-        ProfileError: If the robot's name is invalid.
-        OutputError: If the file exists.
-    """
+    """Return the text of a new profile, with the checks of `write_profile`, without writing it."""
     shipped = shipped_profiles()
     if kind not in shipped:
         raise UnknownName("kind of robot", kind, shipped)
@@ -124,15 +113,12 @@ def starter_text(kind: str, path: str | os.PathLike[str], robot_name: str) -> st
 
 
 def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> Path:
-    """Copy a shipped profile under a new name, creating missing folders.
+    """Copy a shipped profile under a new name, creating missing folders, and return its file.
 
     Args:
         kind: Name of a shipped profile, such as "car".
         path: The new file, which must not exist.
         robot_name: Name of the new robot.
-
-    Returns:
-        The file.
 
     Raises:
         UnknownName: If no shipped profile has this name.
@@ -143,14 +129,7 @@ def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> P
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a new profile, creating missing folders.
-
-    Args:
-        path: The new file, which must not exist.
-        text: Its content.
-
-    Returns:
-        The file.
+    """Write a new profile, creating missing folders, and return its file.
 
     Raises:
         OutputError: If the file exists or cannot be written; no partial file is left.

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.layout import Element, Feature, Layout
@@ -67,15 +67,16 @@ def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]
     moved = [name for output in outputs for name in output.mix]
     spans: dict[str, tuple[float, str]] = {}
     for output in outputs:
-        if output.driver != "bus_servo" or output.offset or len(output.mix) != 1:
+        if output.driver != "bus_servo" or output.offset or list(output.mix.values()) != [1.0]:
             continue
-        ((name, weight),) = output.mix.items()
-        if weight == 1.0 and moved.count(name) == 1:
-            one = output.settings
-            if one["control"] == "length":
-                spans[name] = one["longest_m"] - one["shortest_m"], "m"
-            elif span := one["most_tension_n"] - one["pretension_n"]:
-                spans[name] = span, "N"
+        (name,) = output.mix
+        one = output.settings
+        if moved.count(name) > 1:
+            continue
+        if one["control"] == "length":
+            spans[name] = one["longest_m"] - one["shortest_m"], "m"
+        elif span := one["most_tension_n"] - one["pretension_n"]:
+            spans[name] = span, "N"
     return spans
 
 
@@ -147,36 +148,22 @@ class Profile(GuardPlan):
         controlled.
         """
         spans = _tendon_spans(self.outputs)
-        return Layout(
-            tuple(_action_feature(action, spans.get(action.name)) for action in self.actions)
-        )
+        features: list[Feature] = []
+        for action in self.actions:
+            unit, factor = _SI.get(action.unit, (action.unit, 1.0))
+            if unit == "1":
+                factor, unit = spans.get(action.name, (1.0, "1"))
+            gain_unit = "" if unit == "1" else unit
+            features.append(_feature(action, gain=action.gain * factor, gain_unit=gain_unit))
+        return Layout(tuple(features))
 
     def state_layout(self) -> Layout:
         """Return the layout of states: sensed quantities, then applied actions."""
-        applied = tuple(
-            Feature(
-                f"{action.name}/applied",
-                "1",
-                0.0 if action.one_sided else -1.0,
-                1.0,
-                Element("actuator", action.name),
-            )
-            for action in self.actions
-        )
+        applied = (_feature(action, "/applied") for action in self.actions)
         return Layout((*_state_features(self), *applied))
 
 
-def _action_feature(action: ActionPlan, span: tuple[float, str] | None) -> Feature:
-    """Return the feature of an action; `span` is that of its tendon, with its unit."""
-    unit, factor = _SI.get(action.unit, (action.unit, 1.0))
-    if span is not None and unit == "1":
-        factor, unit = span
-    return Feature(
-        action.name,
-        "1",
-        0.0 if action.one_sided else -1.0,
-        1.0,
-        Element("actuator", action.name),
-        gain=action.gain * factor,
-        gain_unit="" if unit == "1" else unit,
-    )
+def _feature(action: ActionPlan, suffix: str = "", **gain: Any) -> Feature:
+    low = 0.0 if action.one_sided else -1.0
+    element = Element("actuator", action.name)
+    return Feature(f"{action.name}{suffix}", "1", low, 1.0, element, **gain)

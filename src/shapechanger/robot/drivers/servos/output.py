@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
@@ -263,16 +263,19 @@ def _features(sensor: SensorPlan) -> list[Feature]:
     """Return length, speed and tension of each tendon."""
     from shapechanger.layout import Element, Feature  # The guard needs no layouts.
 
-    most = dict(zip(sensor.settings["tendons"], sensor.settings["most_tensions_n"], strict=True))
-    parts = {name: Element("tendon", name) for name in most}
-    spans = zip(most, sensor.settings["lengths_m"], strict=True)
-    lengths: dict[str, tuple[float, float]] = {
-        name: tuple(span) if span else (-math.inf, math.inf) for name, span in spans
+    tendons: dict[str, dict[str, Any]] = sensor.settings["tendons"]
+    parts = {name: Element("tendon", name) for name in tendons}
+    ends = {
+        name: (one["shortest_m"], one["longest_m"])
+        if one["control"] == "length"
+        else (-math.inf, math.inf)
+        for name, one in tendons.items()
     }
+    most_n = {name: one["most_tension_n"] for name, one in tendons.items()}
     return [
-        *(Feature(f"{n}/length", "m", *ends, element=parts[n]) for n, ends in lengths.items()),
-        *(Feature(f"{name}/speed", "m/s", element=part) for name, part in parts.items()),
-        *(Feature(f"{name}/tension", "N", 0.0, most[name], part) for name, part in parts.items()),
+        *(Feature(f"{n}/length", "m", *ends[n], element=part) for n, part in parts.items()),
+        *(Feature(f"{n}/speed", "m/s", element=part) for n, part in parts.items()),
+        *(Feature(f"{n}/tension", "N", 0.0, most_n[n], part) for n, part in parts.items()),
     ]
 
 
