@@ -15,8 +15,8 @@ from shapechanger.finger.model import FINGERTIP, build_finger
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.tensions import drive_of
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.drivers.servos.rig import Rig
 from shapechanger.robot.twin.place import Place
-from shapechanger.robot.twin.servos.rig import Rig
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
 _CABLE_STIFFNESS: Final = 20e3

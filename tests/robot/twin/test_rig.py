@@ -15,9 +15,9 @@ from shapechanger.finger.anatomy import JOINT_REST, JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
+from shapechanger.robot.drivers.servos.rig import Rig, ServoFault
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
-from shapechanger.robot.twin.servos.rig import Rig, ServoFault
 from tests.robot.twin.in_process import InProcessRobot
 
 _REST = (0.0,) * 7

@@ -18,6 +18,7 @@ from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
+from shapechanger.robot.drivers.servos.rig import Rig
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
 from shapechanger.robot.guard.outputs import Switches, make_safe
@@ -26,7 +27,6 @@ from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.setup.zeros import find_zeros
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.servos.rig import Rig
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.profile.texts import finger_text, read

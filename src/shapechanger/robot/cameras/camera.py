@@ -87,11 +87,7 @@ class Camera(Protocol):
 
 
 def open_camera(plan: CameraPlan) -> Camera:
-    """Open a camera.
-
-    Raises:
-        RobotError: If the camera does not respond.
-    """
+    """Open a camera."""
     return load(CAMERA_DRIVERS[plan.driver])(plan)
 
 
@@ -105,15 +101,8 @@ class Interruption:
     def wait(self, fd: int, at_most_s: float | None = None) -> bool:
         """Wait until a descriptor is readable.
 
-        Args:
-            fd: The descriptor.
-            at_most_s: Longest wait, s; None for no limit.
-
         Returns:
             Whether it is; False after `at_most_s` seconds.
-
-        Raises:
-            RobotError: If `set` is or was called.
         """
         poll = select.poll()
         poll.register(fd, select.POLLIN)
@@ -151,9 +140,6 @@ class Pace:
         """Wait until the next frame is due, and return that time: monotonic, ns.
 
         A late frame is due at once, and the rate continues from there.
-
-        Raises:
-            RobotError: If the camera is closed.
         """
         left_ns = self._next_ns - time.monotonic_ns()
         if self._closed.wait(max(0.0, left_ns / 1e9)):

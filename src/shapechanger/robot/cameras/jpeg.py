@@ -19,15 +19,7 @@ _MAX_SKIPPED: Final = 1 << 20
 
 
 def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
-    """Check that a frame is a complete JPEG of the expected size, by its header and its end.
-
-    Args:
-        jpeg: The frame.
-        size: Width and height in pixels.
-
-    Raises:
-        RobotError: If it is not.
-    """
+    """Check that a frame is a complete JPEG of the expected size, by its header and its end."""
     if len(jpeg) > _MAX_JPEG:
         raise RobotError(f"The camera returned {len(jpeg)} bytes; a frame has at most {_MAX_JPEG}.")
     if not simplejpeg.is_jpeg(jpeg):
@@ -64,15 +56,6 @@ def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
     """Return a frame of the camera's size, rotated by 180 degrees if the camera is upside down.
 
     The data is decoded only in order to rotate it.
-
-    Args:
-        jpeg: Data from a camera.
-        captured_ns: Time of capture, ns.
-        plan: Settings of the camera.
-
-    Raises:
-        RobotError: If the data is not a complete JPEG of that size, or cannot be decoded to rotate
-            it.
     """
     jpeg = _without_padding(jpeg)
     check_jpeg(jpeg, plan.size)

@@ -36,9 +36,6 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
     Args:
         image: The image, shape (height, width, 3), at least 96 pixels wide; changed in place.
         number: At least 0.
-
-    Raises:
-        ValueError: If the image is too small or the number is negative.
     """
     height, width = image.shape[:2]
     rows = barcode_rows(width)

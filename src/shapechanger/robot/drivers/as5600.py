@@ -160,11 +160,7 @@ class As5600:
         self.encoders = encoders
 
     def measure(self, encoder: JointEncoder) -> Measured:
-        """Read one encoder.
-
-        Raises:
-            RobotError: If it or the multiplexer does not respond.
-        """
+        """Read one encoder."""
         with device_errors(self._words):
             self._bus.write_byte(self._mux, 1 << encoder.channel)
         with device_errors(f"The encoder of {encoder.joint}, on channel {encoder.channel},"):
@@ -177,11 +173,7 @@ class As5600:
         )
 
     def counts(self, encoder: JointEncoder) -> int:
-        """Return the raw angle of one encoder, 0 to 4095.
-
-        Raises:
-            RobotError: If it or the multiplexer does not respond, or it detects no magnet.
-        """
+        """Return the raw angle of one encoder, 0 to 4095."""
         measured = self.measure(encoder)
         if not measured.detects_magnet:
             raise RobotError(
@@ -230,9 +222,6 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
         plan: Has the settings `bus` and `mux`, and name, channel, zero and direction of each joint
             in `joints`, `channels`, `zeros` and `directions`.
         hardware: Where the bus is.
-
-    Raises:
-        RobotError: If there is no such bus.
     """
     bus, mux = plan.settings["bus"], plan.settings["mux"]
     words = f"The multiplexer of sensor {plan.name!r} at 0x{mux:02x} on I2C bus {bus}"
@@ -241,12 +230,7 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> As5600:
-    """Open the sensor and read each encoder once; see `connect_encoders`.
-
-    Args:
-        plan: The sensor.
-        hardware: Hardware of its bus.
-    """
+    """Open the sensor and read each encoder once; see `connect_encoders`."""
     sensor = connect_encoders(plan, hardware)
     try:
         for encoder in sensor.encoders:
@@ -262,11 +246,7 @@ class JointWorld(Protocol):
     """A world with joints that encoders measure."""
 
     def measured_angle(self, joint: str) -> float:
-        """Return one reading of a joint's angle, rad, with the noise of its encoder.
-
-        Raises:
-            RobotError: If there is no such joint.
-        """
+        """Return one reading of a joint's angle, rad, with the noise of its encoder."""
         ...
 
 
@@ -303,11 +283,7 @@ class SimulatedAs5600(SimulatedChip):
         self._magnet = ""
 
     def set_magnet(self, state: Magnet | str) -> None:
-        """Set the state of the magnet.
-
-        Raises:
-            UnknownName: If there is no such state.
-        """
+        """Set the state of the magnet."""
         if state not in _STATUS_OF:
             raise UnknownName("fault of a magnet", state, _STATUS_OF)
         self._magnet = state

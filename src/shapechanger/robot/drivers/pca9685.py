@@ -170,11 +170,7 @@ class Pca9685:
         self._must_start = False
 
     def _check(self) -> None:
-        """Check that the chip is awake.
-
-        Raises:
-            RobotError: If it does not respond, or sleeps, as after a loss of power.
-        """
+        """Check that the chip is awake."""
         with self._doubt_on_failure():
             if self._bus.read_byte_data(self._address, _MODE1) & _SLEEP:
                 raise RobotError(f"{self.name} is asleep: it lost power for a moment.")

@@ -57,11 +57,7 @@ class PinAllocation:
             )
 
     def shared(self, outputs: Sequence[OutputPlan]) -> tuple[OutputPlan, ...]:
-        """Return outputs with the frequency and the enable pin that a PCA9685 has once.
-
-        Raises:
-            ProfileError: If two outputs disagree about their chip.
-        """
+        """Return outputs with the frequency and the enable pin that a PCA9685 has once."""
         chips: dict[tuple[int, ...], dict[str, Any]] = {}
         for output in outputs:
             for name in ("hz", "output_enable") if (chip := _pca9685(output)) else ():
@@ -252,10 +248,6 @@ def with_servo_bus(
         sensors: All sensors.
         stop: How the robot stops.
         enable_hold_ms: How long the enable line stays on without the guard, ms; None without one.
-
-    Raises:
-        ProfileError: If outputs lack a bus, or a bus lacks outputs or a sensor; if a servo cannot
-            do what the bus is set to, or a stop or the end of the guard would not release it.
     """
     servos = [output for output in outputs if output.driver == DRIVER]
     sensing = [sensor for sensor in sensors if sensor.driver == DRIVER]

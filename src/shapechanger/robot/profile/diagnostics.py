@@ -239,12 +239,7 @@ class Section:
         return line_of(self._text, (*self.place, *keys))
 
     def error_at(self, keys: str | Place, message: str) -> ProfileError:
-        """Return an error with file, line and message.
-
-        Args:
-            keys: Key, or path from this table to the mistake.
-            message: One sentence without its stop.
-        """
+        """Return an error with file, line and message."""
         keys = (keys,) if isinstance(keys, str) else keys
         return ProfileError(f"{self.path}, line {self.line(keys)}: {message}.")
 

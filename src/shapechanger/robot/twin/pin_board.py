@@ -13,6 +13,7 @@ from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
 from shapechanger.robot.drivers.chip import PULSES
 from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.rig import Rig
 from shapechanger.robot.drivers.simulation import (
     Edge,
     Levels,
@@ -21,7 +22,6 @@ from shapechanger.robot.drivers.simulation import (
     SimulatedChip,
 )
 from shapechanger.robot.twin.sensors import Surroundings
-from shapechanger.robot.twin.servos.rig import Rig
 from shapechanger.robot.twin.signals import LedgerWriter
 from shapechanger.robot.twin.wiring import TwinWiring
 

@@ -20,13 +20,13 @@ from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.drivers.as5600 import Magnet
+from shapechanger.robot.drivers.servos.rig import ServoFault
 from shapechanger.robot.drivers.simulation import Levels
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.camera import CameraFault
 from shapechanger.robot.twin.hardware import BoardClient
 from shapechanger.robot.twin.messages import Slept, Whereabouts
-from shapechanger.robot.twin.servos.rig import ServoFault
 from shapechanger.robot.twin.start import BoardAt
 
 

@@ -8,9 +8,9 @@ from typing import Final, TypeVar
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import Readings, World
 from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
+from shapechanger.robot.drivers.servos.rig import Rig
 from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.drivers.simulation import Edge, Levels, SimulatedSensor
-from shapechanger.robot.twin.servos.rig import Rig
 from shapechanger.robot.twin.wiring import TwinWiring
 
 _Sensor = TypeVar("_Sensor", bound=SimulatedSensor)
@@ -88,7 +88,7 @@ class Surroundings:
         self._world = world
         self.sensors = BoardSensors(wiring.plan, world)
         has_bus = any(output.driver == DRIVER for output in wiring.plan.outputs)
-        self.rig = Rig(wiring.plan, world) if has_bus else None
+        self.rig = Rig(wiring.plan.outputs, world) if has_bus else None
         self.now_ns = now_ns
         self._obeys = {
             name: obeys(plan)

@@ -10,7 +10,7 @@ import tty
 from types import TracebackType
 from typing import Final, Self
 
-from shapechanger.robot.twin.servos.bus import SimulatedBus
+from shapechanger.robot.drivers.servos.rig import SimulatedBus
 from tests.robot.drivers.servos import wire
 
 _CHUNK: Final = 4096

@@ -10,10 +10,10 @@ from msgspec.structs import replace
 
 from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.rig import SimulatedBus
 from shapechanger.robot.drivers.servos.serial_port import SerialServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
-from shapechanger.robot.twin.servos.bus import SimulatedBus
-from shapechanger.robot.twin.servos.servo import ServoPlan, SimulatedServo
+from shapechanger.robot.drivers.servos.simulation import ServoPlan, SimulatedServo
 from tests.robot.drivers.servos import wire
 
 NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.twin.servos.servo import ServoPlan
+from shapechanger.robot.drivers.servos.simulation import ServoPlan
 from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, servo, settings
 
 

@@ -8,7 +8,7 @@ import pytest
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.health import BusState
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.twin.servos.servo import ServoPlan
+from shapechanger.robot.drivers.servos.simulation import ServoPlan
 from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, settings
 
 

@@ -7,10 +7,10 @@ from dynamixel_sdk import PacketHandler, PortHandler
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.rig import SimulatedBus
 from shapechanger.robot.drivers.servos.serial_port import PromptPort, open_serial_port
 from shapechanger.robot.drivers.servos.settings import BusSettings
-from shapechanger.robot.twin.servos.bus import SimulatedBus
-from shapechanger.robot.twin.servos.servo import ServoPlan
+from shapechanger.robot.drivers.servos.simulation import ServoPlan
 from tests.robot.drivers.servos.pty import ServoPty
 from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, of, settings
 

@@ -6,7 +6,7 @@ from dynamixel_sdk import PacketHandler
 
 from shapechanger.robot.drivers.servos.family import DYNAMIXEL, ServoFamily
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.twin.servos.bus import SimulatedBus
+from shapechanger.robot.drivers.servos.rig import SimulatedBus
 
 _SDK = PacketHandler(2.0)
 _STATUS = 0x55

@@ -65,14 +65,7 @@ class ServoBus:
         return faults
 
     def set_up(self, alive: Callable[[], object] = lambda: None) -> None:
-        """Check and prepare all servos, without torque, and clear all faults.
-
-        Args:
-            alive: Called between the servos, to feed a power switch meanwhile.
-
-        Raises:
-            RobotError: If a servo is missing, is of another model, refuses, or has shut itself off.
-        """
+        """Check and prepare all servos, without torque, and clear all faults."""
         self.is_ready = False
         if self.mode != "silent":  # A servo may still pull, until all have been set up.
             self.mode = "off"
@@ -135,11 +128,7 @@ class ServoBus:
             self._health[servo.id].was_reset = False
 
     def cycle(self, now_ns: int) -> BusState:
-        """Read the state of all servos, and go on with a stop.
-
-        Args:
-            now_ns: Time, ns.
-        """
+        """Read the state of all servos, and go on with a stop."""
         if self.mode == "silent" or not self.is_ready:
             return BusState(now_ns, self.mode, {}, self.faults)
         heard: dict[int, ServoReply] = {}
@@ -267,11 +256,7 @@ class ServoBus:
                 )
 
     def _prepare(self, servo: ServoSettings) -> None:
-        """Set up the mode, the limit of the goal, no goal and no torque.
-
-        Raises:
-            RobotError: If the servo does not answer, refuses, or has switched itself off.
-        """
+        """Set up the mode, the limit of the goal, no goal and no torque."""
         registers, family = self._registers, self._family
         registers.write(servo.id, family.torque_enable, 0)
         registers.write(servo.id, family.mark, 0)  # A tripped watchdog blocks all goals.

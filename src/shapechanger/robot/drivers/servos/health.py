@@ -108,11 +108,7 @@ class ServoHealth:
         self.missed = 0
 
     def miss(self, *, late: bool) -> None:
-        """Count a cycle without an answer.
-
-        Args:
-            late: Whether bytes of a late answer have arrived.
-        """
+        """Count a cycle without an answer."""
         self.missed += 1
         self._was_late |= late
         if self.missed >= self._bus.most_missed:

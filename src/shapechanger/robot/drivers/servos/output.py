@@ -46,11 +46,7 @@ class SharedBus:
         self._silent_since_ns: int | None = None
 
     def add(self, plan: OutputPlan) -> ServoSettings:
-        """Add a servo.
-
-        Raises:
-            RobotError: If a setting is out of range.
-        """
+        """Add a servo."""
         servo = servo_settings(plan)
         self._plans[plan.name] = plan
         self._tensions[plan.name] = servo.pretension_n
@@ -124,11 +120,7 @@ class SharedBus:
         self._require_release(bus)
 
     def cycle(self, now_ns: int) -> BusState:
-        """Run a cycle of the bus.
-
-        Raises:
-            RobotError: If the bus is not in use.
-        """
+        """Run a cycle of the bus."""
         return self._open_bus().cycle(now_ns)
 
     def leave(self, name: str) -> None:
@@ -232,10 +224,6 @@ class TendonSensor:
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Run a cycle and return its readings, without servos that did not answer.
-
-        Args:
-            now_ns: Time, ns.
-            direction: Not used.
 
         Returns:
             For each tendon, such as FDP, `FDP/length`, its length beyond its zero, m, if it has

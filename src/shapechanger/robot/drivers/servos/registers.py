@@ -46,11 +46,6 @@ class ServoPort(Protocol):
     def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of several servos and wait for the replies.
 
-        Args:
-            ids: Ids of the servos, which reply in this order.
-            at: Address of the first byte.
-            size: Number of bytes; a refusal may have fewer.
-
         Returns:
             The replies by id, without servos that did not answer.
 
@@ -61,10 +56,6 @@ class ServoPort(Protocol):
 
     def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
         """Write bytes of several servos without a reply, or of one and wait for its reply.
-
-        Args:
-            data: The bytes, equally many for each servo, by id.
-            at: Address of the first byte.
 
         Returns:
             The reply of a single servo by its id, if it answered.
@@ -108,15 +99,7 @@ class RegisterBus:
         self.suspects: list[int] = []
 
     def find(self, servo_id: int, register: Register) -> int | None:
-        """Read a register of one servo; None if it does not answer, even when asked again.
-
-        Args:
-            servo_id: Id of the servo.
-            register: The register.
-
-        Raises:
-            RobotError: If it refuses, or the bus is gone.
-        """
+        """Read a register of one servo; None if it does not answer, even when asked again."""
         for _ in range(_TRIES):
             if reply := self.port.read([servo_id], register.address, register.size).get(servo_id):
                 self._check(reply, servo_id, f"read its {register.name}")
@@ -125,10 +108,6 @@ class RegisterBus:
 
     def read(self, servo_id: int, register: Register) -> int:
         """Read a register of one servo.
-
-        Args:
-            servo_id: Id of the servo.
-            register: The register.
 
         Raises:
             RobotError: If it does not answer or refuses.
@@ -141,11 +120,6 @@ class RegisterBus:
     def write(self, servo_id: int, register: Register, value: int) -> None:
         """Write a register of one servo and wait for its confirmation.
 
-        Args:
-            servo_id: Id of the servo.
-            register: The register.
-            value: The new value, in the register's unit.
-
         Raises:
             RobotError: If it does not answer or refuses.
         """
@@ -157,40 +131,21 @@ class RegisterBus:
         raise RobotError(f"Servo {servo_id} at {self._device} does not answer.")
 
     def write_all(self, register: Register, values: Mapping[int, int]) -> None:
-        """Write a register of all servos with one packet, which has no reply.
-
-        Args:
-            register: The register.
-            values: New values by id.
-
-        Raises:
-            RobotError: If the bus is gone.
-        """
+        """Write a register of all servos with one packet, which has no reply."""
         data = {one: register.encode(value) for one, value in values.items()}
         self.port.write(data, register.address)
 
     def read_several(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Read a register of several servos with one packet.
 
-        Args:
-            register: The register.
-            ids: Ids of the servos; without any nothing is sent.
-
         Returns:
             The replies by id, without servos that did not answer or refused.
-
-        Raises:
-            RobotError: If the bus is gone.
         """
         heard = self.port.read(ids, register.address, register.size) if ids else {}
         return {one: reply for one, reply in heard.items() if len(reply.data) == register.size}
 
     def poll(self, register: Register) -> dict[int, ServoReply]:
-        """Read a register of all servos; those that did not answer are missing.
-
-        Raises:
-            RobotError: If the bus is gone.
-        """
+        """Read a register of all servos; those that did not answer are missing."""
         asked = self._trusted()
         heard = self.read_several(register, asked)
         missing = [one for one in asked if one not in heard]
@@ -207,11 +162,7 @@ class RegisterBus:
         return heard
 
     def read_each(self, register: Register) -> dict[int, int]:
-        """Read a register of all servos, suspects one by one; those without an answer are missing.
-
-        Raises:
-            RobotError: If the bus is gone.
-        """
+        """Read a register of all servos, suspects one by one; silent ones are missing."""
         groups = [self._trusted(), *([one] for one in self.suspects)]
         return {
             one: register.decode(reply.data)

@@ -177,11 +177,7 @@ class SerialServoPort:
 
 
 def open_serial_port(settings: BusSettings) -> SerialServoPort:
-    """Open the port of a bus.
-
-    Raises:
-        RobotError: If it cannot be opened with this baud rate.
-    """
+    """Open the port of a bus."""
     port = PromptPort(settings.device, settings.answer_ms)
     try:
         opened = port.setBaudRate(settings.baud)

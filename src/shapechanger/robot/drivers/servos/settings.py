@@ -238,9 +238,6 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         Args:
             tension: Tension, N.
             least: Lower end of the range, N; None for the pretension.
-
-        Raises:
-            RobotError: If it is not finite.
         """
         if not math.isfinite(tension):
             raise RobotError(f"{self.words} cannot pull {tension} N.")
@@ -254,9 +251,6 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
 
         Returns:
             Counts, with the sign that winds in.
-
-        Raises:
-            RobotError: If the tension is not finite.
         """
         # Clip first: the quotient of a huge number could overflow to infinity.
         counts = math.floor(self.clip(tension, 0.0) / self.newton_per_goal + _ROUNDING)
@@ -270,9 +264,6 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         Args:
             length: Length beyond the zero, m, clipped to its range.
             zero: Position at the zero, in counts.
-
-        Raises:
-            RobotError: If the length is not finite.
         """
         if not math.isfinite(length):
             raise RobotError(f"{self.words} cannot go to a length of {length} m.")

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from shapechanger.robot.drivers.servos.rig import EndStops
 from shapechanger.robot.drivers.servos.settings import MODELS
-from shapechanger.robot.twin.servos.motor import EndStops, SimulatedMotor, Tendon
+from shapechanger.robot.drivers.servos.simulation import SimulatedMotor, Tendon
 
 
 def _run(

@@ -1,7 +1,7 @@
-"""One simulated servo: its registers, its safety functions and its control.
+"""A simulated servo: its motor, its registers, its safety functions and its control.
 
-Sources as of `shapechanger.robot.drivers.servos.family`, whose registers it has. Assumed for want
-of a source, to be tried on a rig:
+Sources as of `shapechanger.robot.drivers.servos.family`, whose registers it has. Assumed for want of
+a source, to be tried on a rig:
 
 - A bus watchdog that trips in current mode takes the current away; torque enable stays 1
   (`on_trip` "coast"), or goes to 0 ("release"). In the manual the servo "will stop".
@@ -30,8 +30,102 @@ from shapechanger.robot.drivers.servos.family import (
     Register,
 )
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.drivers.servos.settings import MODELS
-from shapechanger.robot.twin.servos.motor import SimulatedMotor, Tendon
+from shapechanger.robot.drivers.servos.settings import MODELS, ServoModel
+
+# Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
+# degrees warmer, with a time constant of two minutes.
+_ROOM_C: Final = 25.0
+_KELVIN_PER_WATT: Final = 30.0
+_HEAT_S: Final = 120.0
+
+
+@dataclass(slots=True)
+class Tendon:
+    """Tendon between a spool and the load.
+
+    Attributes:
+        spool_radius_m: Radius of the spool, m.
+        direction: 1 if a positive angle winds in, -1 if it lets out.
+        stiffness: Stiffness of cable and frame, N/m. Chosen: a good millimetre for 25 N. The end
+            of the load needs a mass of more than 0.01 kg to follow such a spring in steps of 1 ms.
+        snapped: Whether it is torn.
+    """
+
+    spool_radius_m: float = 0.005
+    direction: int = 1
+    stiffness: float = 20e3
+    snapped: bool = False
+
+
+class SimulatedMotor:
+    """A motor with its gears, its spool and its end of a tendon.
+
+    Args:
+        model: Model of the servo.
+        tendon: Its tendon.
+        angle: Angle of the spool while the tendon is just taut and its far end at 0, rad.
+
+    Attributes:
+        angle: Angle of the spool over many turns, rad.
+        speed: Speed of the spool, rad/s.
+        current: Current, A.
+        tension: Tension of the tendon, N.
+        temperature: Temperature, degrees Celsius.
+    """
+
+    def __init__(self, model: ServoModel, tendon: Tendon, angle: float = 0.0) -> None:
+        self._model = model
+        self._tendon = tendon
+        no_load, gears = model.no_load_rad_per_s, model.gears
+        lost = (gears.friction_nm + gears.viscous * no_load) / model.stall_nm
+        self._electric_rad_per_s = no_load / (1.0 - lost)  # No current: friction takes some speed.
+        self._taut_at = angle
+        self.angle = angle
+        self.speed = 0.0
+        self.current = 0.0
+        self.tension = 0.0
+        self.temperature = _ROOM_C
+
+    def current_at(self, volts: float) -> float:
+        """Return the current at a voltage and the present speed, A."""
+        share = volts / self._model.volts - self.speed / self._electric_rad_per_s
+        return self._model.stall_a * share
+
+    def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
+        """Turn for one short step."""
+        model, gears, tendon = self._model, self._model.gears, self._tendon
+        # The faster it turns, the less current the voltage can still drive.
+        least, most = min(self.current_at(-volts), 0.0), max(self.current_at(volts), 0.0)
+        self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, least), most)
+        lever = tendon.direction * tendon.spool_radius_m
+        # Friction and cable use the speed at the end of the step, so that a stiff cable does not
+        # need a tiny step.
+        inertia = gears.inertia + dt_s * gears.viscous
+        torque = model.torque_constant * self.current
+        if self._pull(travel_m) > 0.0:
+            stretch = lever * (self.angle - self._taut_at) - travel_m
+            torque -= lever * tendon.stiffness * stretch
+            inertia += (dt_s * lever) ** 2 * tendon.stiffness
+        speed = (gears.inertia * self.speed + dt_s * torque) / inertia
+        held = dt_s * gears.friction_nm / inertia
+        self.speed = math.copysign(max(abs(speed) - held, 0.0), speed)
+        self.angle += dt_s * self.speed
+        self.tension = self._pull(travel_m)
+        self._warm(dt_s)
+
+    def _pull(self, travel_m: float) -> float:
+        """Return the tension for the positions of both ends, N."""
+        tendon = self._tendon
+        if tendon.snapped:
+            return 0.0
+        stretch = tendon.direction * tendon.spool_radius_m * (self.angle - self._taut_at) - travel_m
+        return max(0.0, tendon.stiffness * stretch)
+
+    def _warm(self, dt_s: float) -> None:
+        ohm = self._model.volts / self._model.stall_a
+        warm = _ROOM_C + _KELVIN_PER_WATT * ohm * self.current**2
+        self.temperature += (warm - self.temperature) * -math.expm1(-dt_s / _HEAT_S)
+
 
 # Reasons of refusals.
 _RANGE: Final = 4
@@ -140,24 +234,14 @@ class SimulatedServo:
         self._fed_ns = self._now_ns
 
     def read(self, at: int, size: int) -> ServoReply:
-        """Reply with bytes of the registers.
-
-        Args:
-            at: Address of the first.
-            size: Number of bytes.
-        """
+        """Reply with bytes of the registers."""
         try:
             return self._reply(0, self._read(at, size))
         except _Refusal as refusal:
             return self._reply(refusal.args[0])
 
     def write(self, at: int, data: bytes) -> ServoReply:
-        """Write one register and reply.
-
-        Args:
-            at: Its address.
-            data: Its bytes.
-        """
+        """Write one register and reply."""
         try:
             self._write(at, data)
         except _Refusal as refusal:
@@ -184,12 +268,7 @@ class SimulatedServo:
         self._cache()
 
     def advance(self, now_ns: int, travel_m: float) -> None:
-        """Advance to a time.
-
-        Args:
-            now_ns: The time, ns.
-            travel_m: How far the tendon's far end is towards the spool, m.
-        """
+        """Advance to a time."""
         dt_s = (now_ns - self._now_ns) / 1e9
         self._now_ns = now_ns
         if self._watchdog_ns is not None and now_ns - self._fed_ns >= self._watchdog_ns:

@@ -4,8 +4,8 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.twin.servos.bus import SimulatedBus
-from shapechanger.robot.twin.servos.servo import ServoPlan
+from shapechanger.robot.drivers.servos.rig import SimulatedBus
+from shapechanger.robot.drivers.servos.simulation import ServoPlan
 from tests.robot.drivers.servos.wire import instruct
 
 MS = 1_000_000
