@@ -16,9 +16,6 @@ def device_errors(device: str) -> Generator[None]:
 
     Args:
         device: Description of the device, such as "The motor on GPIO22 and GPIO27".
-
-    Raises:
-        RobotError: If the device does not respond.
     """
     try:
         yield

@@ -69,9 +69,6 @@ def _open_gpio_chip() -> int:
 
     Its number differs between models and kernels; its label does not: pinctrl-bcm2835,
     pinctrl-bcm2711 or pinctrl-rp1.
-
-    Raises:
-        OSError: If there is none.
     """
     for chip in range(_MOST_CHIPS):
         try:

@@ -95,11 +95,7 @@ DEAD_BAND_US: Final = 20.0
 
 
 def wired_pulse(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
-    """Return what reads the width of an output's pulses on a twin, µs; 0 for none.
-
-    Raises:
-        RobotError: If a twin has no such source of pulses.
-    """
+    """Return what reads the width of an output's pulses on a twin, µs; 0 for none."""
     over = plan.settings["over"]
     pulse_of = PULSES[over].pulse_of
     if pulse_of is None:

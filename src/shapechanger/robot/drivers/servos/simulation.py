@@ -1,7 +1,7 @@
 """A simulated servo: its motor, its registers, its safety functions and its control.
 
-Sources as of `shapechanger.robot.drivers.servos.family`, whose registers it has. Assumed for want of
-a source, to be tried on a rig:
+Sources as of `shapechanger.robot.drivers.servos.family`, whose registers it has. Assumed for
+want of a source, to be tried on a rig:
 
 - A bus watchdog that trips in current mode takes the current away; torque enable stays 1
   (`on_trip` "coast"), or goes to 0 ("release"). In the manual the servo "will stop".
