@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin.messages import (
     MAX_MESSAGE,
-    Edges,
     Event,
     Grant,
+    InputEdges,
     Reply,
     decode_event,
 )
@@ -61,8 +61,8 @@ def test_only_edges_are_dropped(kinds: list[str]) -> None:
                     edges += new
         events = list(received(theirs, board))
         board.close()
-    assert [event for event in events if not isinstance(event, Edges)] == sent
-    got = [edge for event in events if isinstance(event, Edges) for edge in event.edges]
+    assert [event for event in events if not isinstance(event, InputEdges)] == sent
+    got = [edge for event in events if isinstance(event, InputEdges) for edge in event.edges]
     assert got == sorted(got)
     assert set(got) <= set(edges)
     for pin in (4, 5):

@@ -86,7 +86,7 @@ class Reply(msgspec.Struct, tag=True, frozen=True, omit_defaults=True):
     errno: int = 0
 
 
-class Edges(msgspec.Struct, tag=True, frozen=True):
+class InputEdges(msgspec.Struct, tag=True, frozen=True):
     """Edges of the inputs that the client has claimed, in order of time."""
 
     edges: list[Edge]
@@ -98,7 +98,7 @@ class Grant(msgspec.Struct, tag=True, frozen=True):
     t: int
 
 
-Event = Reply | Edges | Grant
+Event = Reply | InputEdges | Grant
 
 encode = msgspec.msgpack.encode
 decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode

@@ -24,8 +24,8 @@ from shapechanger.robot.drivers.servos.rig import ServoFault
 from shapechanger.robot.drivers.simulation import Levels
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.twin.board_client import BoardClient
 from shapechanger.robot.twin.camera import CameraFault
-from shapechanger.robot.twin.hardware import BoardClient
 from shapechanger.robot.twin.messages import Slept, Whereabouts
 from shapechanger.robot.twin.start import BoardAt
 

@@ -16,9 +16,9 @@ from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin.messages import (
     MAX_MESSAGE,
     Call,
-    Edges,
     Event,
     Greeting,
+    InputEdges,
     Reply,
     Role,
     decode_call,
@@ -85,7 +85,7 @@ class BoardConnection:
 
     def send(self, event: Event) -> None:
         """Send a message, now or when the client reads."""
-        edges = event.edges if isinstance(event, Edges) else ()
+        edges = event.edges if isinstance(event, InputEdges) else ()
         self._outbox.append((encode(event), edges))
         self.flush()
 
@@ -101,7 +101,7 @@ class BoardConnection:
             self._outbox = deque(message for message in self._outbox if not message[1])
             edges = sorted({edge.pin: edge for edge in (*waiting, *edges)}.values())
         for start in range(0, len(edges), _MAX_EDGES):
-            self.send(Edges(edges[start : start + _MAX_EDGES]))
+            self.send(InputEdges(edges[start : start + _MAX_EDGES]))
 
     def flush(self) -> None:
         """Send waiting messages as far as the client reads."""

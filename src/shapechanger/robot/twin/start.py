@@ -16,7 +16,7 @@ import msgspec
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError, check_seed
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.twin.hardware import BoardClient
+from shapechanger.robot.twin.board_client import BoardClient
 from shapechanger.robot.twin.place import Place
 from shapechanger.robot.twin.wiring import ONE_SHOT_MS, TwinWiring
 
