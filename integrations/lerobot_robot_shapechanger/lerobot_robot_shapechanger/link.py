@@ -10,7 +10,7 @@ from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnected
 
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.known_robots import known_names, recall
 from shapechanger.robot.client.observations import RobotSpaces
 from shapechanger.robot.link.messages import Welcome

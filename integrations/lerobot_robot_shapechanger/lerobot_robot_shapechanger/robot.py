@@ -13,7 +13,7 @@ from lerobot_robot_shapechanger.config import ShapechangerConfig
 from lerobot_robot_shapechanger.link import Link, named
 from shapechanger.errors import RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.observations import IMAGE, RobotSpaces
 from shapechanger.robot.client.operator import Takeover, interruption
 from shapechanger.robot.link.messages import Observation

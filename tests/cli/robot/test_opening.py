@@ -10,9 +10,8 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.errors import LinkError
-from shapechanger.robot.client import browser as opening
-from shapechanger.robot.client.browser import can_open, open_console
-from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.client import known_robots as opening
+from shapechanger.robot.client.known_robots import KnownRobot, can_open, open_console, remember
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.twin.robot import run_robot
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile

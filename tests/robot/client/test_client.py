@@ -23,7 +23,6 @@ Connect = Callable[..., RobotClient]
 
 
 def test_a_program_takes_control_arms_and_commands(run: Run, connect: Connect) -> None:
-    """Take, arm and command, with the observation that each command answers."""
     robot = run()
     client = connect(robot, pace="lockstep", name="ada")
     client.take()
@@ -41,7 +40,6 @@ def test_a_program_takes_control_arms_and_commands(run: Run, connect: Connect) -
 
 
 def test_arming_ends_only_an_emergency_stop_that_was_seen(run: Run, connect: Connect) -> None:
-    """Arming acknowledges only stops in the last observation."""
     robot = run()
     client = connect(robot, role="person")
     client.take()
@@ -54,7 +52,6 @@ def test_arming_ends_only_an_emergency_stop_that_was_seen(run: Run, connect: Con
 
 
 def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Connect) -> None:
-    """Sequence numbers are unique across threads."""
     client = connect(run(), pace="lockstep")
     numbers: list[int] = []
     threads = [
@@ -71,14 +68,12 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
 
 
 def test_a_ping_measures_the_round_trip(run: Run, connect: Connect) -> None:
-    """A ping returns the round-trip time and the robot's time."""
     took_s, now_ns = connect(run()).ping()
     assert took_s > 0.0
     assert now_ns > 0
 
 
 def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
-    """The error gives the command that stores the fingerprint."""
     robot = run()
     with pytest.raises(LinkError) as refused:
         RobotClient.connect(robot.address, key=robot.key)
@@ -90,7 +85,6 @@ def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
 
 
 def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
-    """The connection is refused before the key is used."""
     robot = run()
     expected = "ab" * 32
     with pytest.raises(RobotRefused) as refused:
@@ -101,20 +95,17 @@ def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
 
 
 def test_a_wrong_key_is_refused(run: Run) -> None:
-    """The error is the robot's message."""
     with pytest.raises(RobotRefused, match="Wrong key"):
         RobotClient.connect(replace(run().known, key=new_key()))
 
 
 @pytest.mark.parametrize(("version", "older"), [(0, "robot"), (2, "workstation")])
 def test_another_version_is_refused(run: Run, version: int, older: str) -> None:
-    """The error names the side to update."""
     with pytest.raises(LinkError, match=f"on the {older}"):
         RobotClient.connect(run(version=version).known)
 
 
 def test_a_missing_robot_is_an_error_at_once(run: Run, credentials: object) -> None:
-    """The error says what to check."""
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
@@ -123,7 +114,6 @@ def test_a_missing_robot_is_an_error_at_once(run: Run, credentials: object) -> N
 
 
 def test_a_failed_connection_is_one_error(run: Run, credentials: object) -> None:
-    """The traceback has no chained socket errors and no frames of another thread."""
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
@@ -136,7 +126,6 @@ def test_a_failed_connection_is_one_error(run: Run, credentials: object) -> None
 
 
 def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
-    """A call that waits for an answer raises one error when the connection is cut."""
     robot = run(delay_s=60.0)
     client = connect(robot, timeout_s=30.0)
     threading.Thread(
@@ -148,7 +137,6 @@ def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
 
 
 def test_an_abandoned_client_gives_control_back(run: Run, connect: Connect) -> None:
-    """`abandon` does not wait, and is idempotent."""
     robot = run()
     client = connect(robot)
     client.take()
@@ -159,20 +147,17 @@ def test_an_abandoned_client_gives_control_back(run: Run, connect: Connect) -> N
 
 
 def test_plain_connections_must_be_asked_for(run: Run) -> None:
-    """A plain connection to a TLS port raises an error."""
     with pytest.raises(LinkError):
         RobotClient.connect(run().address, fingerprint="insecure", timeout_s=1.0)
 
 
 def test_control_of_another_client_is_not_taken(run: Run, connect: Connect) -> None:
-    """The error is the robot's message."""
     client = connect(run(held_by="Grace"))
     with pytest.raises(RobotRefused, match="Grace has control"):
         client.take()
 
 
 def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
-    """With arming = "person", a program is refused."""
     client = connect(run(arming="person"))
     client.take()
     with pytest.raises(RobotRefused, match="Only a person"):
@@ -183,7 +168,6 @@ def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
 
 
 def test_a_refused_command_has_a_reason(run: Run, connect: Connect) -> None:
-    """`refusal` returns the reason for the command with that number."""
     robot = run(refusal="It is too old.")
     client = connect(robot, pace="lockstep")
     client.take()
@@ -195,7 +179,6 @@ def test_a_refused_command_has_a_reason(run: Run, connect: Connect) -> None:
 
 
 def test_events_are_returned_once(run: Run, connect: Connect) -> None:
-    """Events are kept until they are read, up to a limit."""
     robot = run()
     client = connect(robot)
     for i in range(300):
@@ -206,7 +189,6 @@ def test_events_are_returned_once(run: Run, connect: Connect) -> None:
 
 
 def test_an_emergency_stop_is_sent_before_closing(run: Run, connect: Connect) -> None:
-    """A stop followed by a close stops the robot."""
     robot = run()
     client = connect(robot)
     client.emergency_stop("a dog")
@@ -215,7 +197,6 @@ def test_an_emergency_stop_is_sent_before_closing(run: Run, connect: Connect) ->
 
 
 def test_a_closed_client_raises_an_error(run: Run, connect: Connect) -> None:
-    """Every method raises."""
     client = connect(run())
     client.close()
     assert not client.alive
@@ -234,7 +215,6 @@ def _in_child(client: RobotClient, answers: multiprocessing.Queue[str]) -> None:
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork.*:DeprecationWarning")
 def test_a_forked_client_does_not_touch_the_connection(run: Run, connect: Connect) -> None:
-    """A worker process must open its own connection."""
     client = connect(run(), pace="lockstep")
     context = multiprocessing.get_context("fork")
     answers = context.Queue()
@@ -250,6 +230,5 @@ def test_a_forked_client_does_not_touch_the_connection(run: Run, connect: Connec
 
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
 def test_an_invalid_timeout_is_an_error(timeout_s: float) -> None:
-    """The error is raised before connecting."""
     with pytest.raises(LinkError, match="above 0"):
         RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

@@ -29,7 +29,6 @@ def _ready(client: RobotClient) -> None:
 
 
 def test_a_black_hole_is_detected_in_time(run: Run, connect: Connect) -> None:
-    """The connection is lost after the timeout, although the socket stays open."""
     robot = run()
     client = connect(robot, pace="lockstep", timeout_s=TIMEOUT_S)
     _ready(client)
@@ -42,7 +41,6 @@ def test_a_black_hole_is_detected_in_time(run: Run, connect: Connect) -> None:
 
 
 def test_an_idle_link_stays_up(run: Run, connect: Connect) -> None:
-    """Pings keep an idle connection alive."""
     robot = run()
     client = connect(robot, timeout_s=TIMEOUT_S)
     eventually(lambda: len(robot.received(m.Ping)) > 3)
@@ -50,7 +48,6 @@ def test_an_idle_link_stays_up(run: Run, connect: Connect) -> None:
 
 
 def test_a_closed_connection_is_detected_at_once(credentials: Path) -> None:
-    """A call that waits for an observation ends before its timeout."""
     robot = Robot()
     with robot.running(credentials):
         client = RobotClient.connect(robot.known, timeout_s=30.0)
@@ -72,7 +69,6 @@ def test_a_closed_connection_is_detected_at_once(credentials: Path) -> None:
 
 
 def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
-    """A late observation raises StaleObservation, and the connection stays up."""
     client = connect(run(delay_s=0.2))
     client.acknowledge()
     with pytest.raises(StaleObservation):
@@ -82,7 +78,6 @@ def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
 
 @pytest.mark.timeout(30)  # The connection's own is 60 s.
 def test_closing_a_dead_connection_takes_no_time(run: Run, connect: Connect) -> None:
-    """A silent robot does not delay `close`."""
     robot = run()
     client = connect(robot, timeout_s=60.0)
     robot.silent = True
@@ -91,7 +86,6 @@ def test_closing_a_dead_connection_takes_no_time(run: Run, connect: Connect) -> 
 
 @given(garbage=st.binary(max_size=100))
 def test_an_invalid_message_ends_the_link(credentials: Path, garbage: bytes) -> None:
-    """All waiting calls raise."""
     robot = Robot(garbage=garbage)
     with robot.running(credentials), RobotClient.connect(robot.known) as client:
         with pytest.raises(LinkError, match="Not a valid message"):
@@ -100,7 +94,6 @@ def test_an_invalid_message_ends_the_link(credentials: Path, garbage: bytes) -> 
 
 
 def test_an_old_observation_ends_the_link(run: Run, connect: Connect) -> None:
-    """A sequence number that decreases may be a replay."""
     robot = run()
     client = connect(robot)
     robot._seq = 10
@@ -111,7 +104,6 @@ def test_an_old_observation_ends_the_link(run: Run, connect: Connect) -> None:
 
 
 def test_a_fatal_refusal_ends_the_link_with_its_reason(run: Run, connect: Connect) -> None:
-    """The error is the robot's message, not a broken pipe."""
     robot = run()
     client = connect(robot)
     robot.send(m.Refused(reason="Too many messages.", fatal=True))
@@ -121,7 +113,6 @@ def test_a_fatal_refusal_ends_the_link_with_its_reason(run: Run, connect: Connec
 
 
 def test_a_blocked_connection_delivers_only_the_newest_command(run: Run, connect: Connect) -> None:
-    """Queued commands are replaced by newer ones."""
     robot = run()
     client = connect(robot)
     client.take()

@@ -23,7 +23,6 @@ def network() -> Iterator[Zeroconf]:
 
 
 def test_announced_robots_are_found(network: Zeroconf) -> None:
-    """Results have name, body, address, fingerprint and version, sorted by name."""
     for name, body, port in (("tank", "tank", 5001), ("car", "car", 5000)):
         network.register_service(
             ServiceInfo(
@@ -42,5 +41,4 @@ def test_announced_robots_are_found(network: Zeroconf) -> None:
 
 
 def test_an_empty_network_gives_an_empty_list(network: Zeroconf) -> None:
-    """The network may block multicast."""
     assert find(0.1, network) == []

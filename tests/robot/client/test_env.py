@@ -55,7 +55,6 @@ def made(robot: Robot, **how: Any) -> gym.Env[Any, Any]:
     ids=lambda promise: promise.__name__,
 )
 def test_an_env_with_images_passes_the_checks(run: Run, promise: Callable[[MakeEnv], None]) -> None:
-    """All checks apply except those for flat observations."""
     promise(partial(made, run(home_at_take=True)))
 
 
@@ -75,13 +74,11 @@ def test_an_env_with_images_passes_the_checks(run: Run, promise: Callable[[MakeE
 def test_an_env_without_images_passes_the_checks(
     run: Run, promise: Callable[[MakeEnv], None], image: bool | None
 ) -> None:
-    """Without a camera, and with `image=False`."""
     robot = run(home_at_take=True, image_size=None if image is None else (160, 120))
     promise(partial(made, robot, image=image))
 
 
 def test_layouts_name_images_and_states(run: Run) -> None:
-    """An image is one block, in Gymnasium's order of a flattened Dict."""
     env = made(run(), state=True, size=(40, 30))
     observation, action = layouts_of(env)
     assert observation.names == ("camera/image", *(f.name for f in STATE))
@@ -95,7 +92,6 @@ def test_layouts_name_images_and_states(run: Run) -> None:
 
 @pytest.mark.parametrize("size", [(160, 120), (80, 60), (128, 128)])
 def test_images_have_the_requested_size(run: Run, size: tuple[int, int]) -> None:
-    """The default is 160 x 120; in 2017 it was 128 x 128."""
     env = made(run(), size=size, render_mode="rgb_array")
     seen, _ = env.reset(seed=0)
     assert seen.shape == (size[1], size[0], 3)
@@ -104,7 +100,6 @@ def test_images_have_the_requested_size(run: Run, size: tuple[int, int]) -> None
 
 
 def test_the_reward_is_metres_forward(run: Run) -> None:
-    """Reversing is negative, and `info` names the sensors."""
     robot = run(reward={"velocity": 2.0})
     env = made(robot, reward={"stall": -5.0})
     env.reset(seed=0)
@@ -121,7 +116,6 @@ def test_the_reward_is_metres_forward(run: Run) -> None:
 
 
 def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
-    """The episode is terminated, not truncated."""
     robot = run()
     env = made(robot, on_reset=lambda seed: robot.stand_at(0.0))
     env.reset(seed=0)
@@ -141,7 +135,6 @@ def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
 
 
 def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
-    """The event counts, and the bumper's later value is not counted again."""
     robot = run(reward={"collision_ends_episode": 0.0})
     env = made(robot)
     env.reset(seed=0)
@@ -156,7 +149,6 @@ def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
 
 
 def test_an_unmeasured_quantity_is_absent(run: Run) -> None:
-    """It has no reward term, and `info` lists it."""
     robot = run(absent=("speed", "stall"))
     env = made(robot, state=True)
     seen, _ = env.reset(seed=0)
@@ -169,7 +161,6 @@ def test_an_unmeasured_quantity_is_absent(run: Run) -> None:
 
 
 def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
-    """A command that was not applied has no latency to the outputs."""
     robot = run(clock="real")
     env = made(robot)
     env.reset(seed=0)
@@ -190,7 +181,6 @@ def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
 
 
 def test_a_command_answers_the_last_observation(run: Run) -> None:
-    """Each command answers the observation of the previous step."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -204,7 +194,6 @@ def test_a_command_answers_the_last_observation(run: Run) -> None:
 
 @pytest.mark.parametrize("how", ["frozen", "broken"])
 def test_a_repeated_image_is_reported(run: Run, how: str) -> None:
-    """With a frozen camera or invalid frames, the image is the last valid one."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -222,7 +211,6 @@ def test_a_repeated_image_is_reported(run: Run, how: str) -> None:
 
 
 def test_an_episode_needs_a_new_frame(run: Run) -> None:
-    """`reset` raises if no frame arrives after it."""
     env = made(run(frozen=True), reset_timeout_s=0.2)
     with pytest.raises(LinkError, match="Does its camera still work"):
         env.reset(seed=0)
@@ -231,7 +219,6 @@ def test_an_episode_needs_a_new_frame(run: Run) -> None:
 
 @pytest.mark.parametrize("action", [[0.0], [0.0, np.nan], [0.0, np.inf], [[0.0, 0.0]]])
 def test_an_invalid_action_is_an_error(run: Run, action: Any) -> None:
-    """The error names the expected numbers, and no command is sent."""
     robot = run()
     env = RemoteVehicleEnv(pace="lockstep", **robot.arguments)
     env.reset(seed=0)
@@ -243,7 +230,6 @@ def test_an_invalid_action_is_an_error(run: Run, action: Any) -> None:
 
 
 def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
-    """Actions beyond the range are clipped."""
     env = RemoteVehicleEnv(pace="lockstep", **run().arguments)
     env.reset(seed=0)
     *_, info = env.step(np.array([-3.0, 2.0], np.float32))
@@ -260,7 +246,6 @@ def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
     ],
 )
 def test_a_person_truncates_the_episode(run: Run, change: dict[str, Any], because: str) -> None:
-    """`info` has the reason, with the person's name."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -273,7 +258,6 @@ def test_a_person_truncates_the_episode(run: Run, change: dict[str, Any], becaus
 
 
 def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Path) -> None:
-    """The last observation is returned again, with the reason."""
     robot = Robot()
     with robot.running(credentials):
         env = made(robot, reset_timeout_s=20.0)
@@ -295,7 +279,6 @@ def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Pa
 
 
 def test_a_silent_link_truncates_in_time(run: Run) -> None:
-    """The timeout applies although the connection is not closed."""
     robot = run()
     env = made(robot, timeout_s=0.3)
     env.reset(seed=0)
@@ -307,7 +290,6 @@ def test_a_silent_link_truncates_in_time(run: Run) -> None:
 
 
 def test_reset_waits_for_the_operator(run: Run) -> None:
-    """`on_waiting` is called once per reset, and the robot is then armed."""
     robot = run(arming="person")
     sentences: list[str] = []
 
@@ -329,7 +311,6 @@ def test_reset_waits_for_the_operator(run: Run) -> None:
 
 
 def test_a_reset_disarms_the_robot_first(run: Run) -> None:
-    """`on_reset` runs while the robot is disarmed."""
     robot = run()
     disarmed: list[int] = []
     env = made(robot, on_reset=lambda _: disarmed.append(len(robot.received(m.Disarm))))
@@ -341,7 +322,6 @@ def test_a_reset_disarms_the_robot_first(run: Run) -> None:
 
 
 def test_no_round_trip_is_reported_across_two_clocks(run: Run) -> None:
-    """The clock of a twin runs at another rate."""
     env = made(run(clock="twin"))
     env.reset(seed=0)
     *_, info = env.step(AHEAD)
@@ -351,7 +331,6 @@ def test_no_round_trip_is_reported_across_two_clocks(run: Run) -> None:
 
 
 def test_reset_times_out(run: Run) -> None:
-    """The error says what to do."""
     env = made(run(arming="person"), reset_timeout_s=0.1)
     with pytest.raises(RobotRefused, match=r"was not armed within 0 s.*shapechanger robot drive"):
         env.reset(seed=0)
@@ -361,7 +340,6 @@ def test_reset_times_out(run: Run) -> None:
 def test_a_long_reset_logs_what_it_waits_for(
     run: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Each reason is logged once, with the command that helps."""
     monkeypatch.setattr("shapechanger.robot.client.operator._LOG_AFTER_S", 0.0)
     robot = run(arming="person")
     remember(robot.known)
@@ -378,7 +356,6 @@ def test_a_long_reset_logs_what_it_waits_for(
 
 
 def test_a_short_wait_is_not_logged(run: Run, caplog: pytest.LogCaptureFixture) -> None:
-    """Waits of up to two seconds are not logged."""
     env = made(run(arming="person"), reset_timeout_s=0.1)
     with pytest.raises(RobotRefused):
         env.reset(seed=0)
@@ -387,7 +364,6 @@ def test_a_short_wait_is_not_logged(run: Run, caplog: pytest.LogCaptureFixture) 
 
 
 def test_reset_waits_for_control_of_an_armed_robot(run: Run) -> None:
-    """A robot armed for another client is not enough."""
     robot = run(arming="person")
     sentences: list[str] = []
 
@@ -405,7 +381,6 @@ def test_reset_waits_for_control_of_an_armed_robot(run: Run) -> None:
 
 
 def test_reset_waits_for_another_driver(run: Run) -> None:
-    """The reason passed on is the robot's message."""
     robot = run(held_by="Grace")
     sentences: list[str] = []
 
@@ -425,7 +400,6 @@ def test_reset_waits_for_another_driver(run: Run) -> None:
 
 
 def test_the_reset_routine_of_the_profile_runs(run: Run) -> None:
-    """Each step lasts its duration on the robot's clock."""
     robot = run(reset=(((0.0, -0.5), 0.5), ((1.0, 0.0), 0.2)))
     env = made(robot, on_reset="routine")
     env.reset(seed=0)
@@ -436,7 +410,6 @@ def test_the_reset_routine_of_the_profile_runs(run: Run) -> None:
 
 
 def test_a_missing_reset_routine_is_an_error(run: Run) -> None:
-    """The error says how to add one, and the robot is not armed."""
     robot = run()
     env = made(robot, on_reset="routine")
     with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
@@ -446,7 +419,6 @@ def test_a_missing_reset_routine_is_an_error(run: Run) -> None:
 
 
 def test_on_reset_gets_the_seed(run: Run) -> None:
-    """The callback can choose the start by the seed."""
     seeds: list[int | None] = []
     env = made(run(), on_reset=seeds.append)
     env.reset(seed=3)
@@ -456,7 +428,6 @@ def test_on_reset_gets_the_seed(run: Run) -> None:
 
 
 def test_steps_last_a_control_period(run: Run) -> None:
-    """In real time, 20 steps take at least 20 periods, less 10 %."""
     robot = run(control_hz=50.0, clock="real")
     env = made(robot, pace="realtime")
     env.reset(seed=0)
@@ -472,7 +443,6 @@ def test_steps_last_a_control_period(run: Run) -> None:
 def test_late_steps_are_counted(
     run: Run, monkeypatch: pytest.MonkeyPatch, pace: str, missed: list[int]
 ) -> None:
-    """In real time each late step counts, from 0 in every episode; in lockstep none is late."""
     late = itertools.cycle((True, False))
     monkeypatch.setattr(Schedule, "advance", lambda *_: next(late))
     env = made(run(control_hz=50.0, clock="real"), pace=pace)
@@ -484,13 +454,11 @@ def test_late_steps_are_counted(
 
 
 def test_a_twins_clock_is_driven_in_lockstep_only(run: Run) -> None:
-    """Real-time commands would be too old, since a twin's time advances with observations."""
     with pytest.raises(RobotRefused, match="pass pace='lockstep'"):
         RemoteVehicleEnv(**run(clock="twin").arguments)
 
 
 def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
-    """Actions are 0 to 1, and without a camera the observation is the state."""
     robot = run(
         actions=TENDONS,
         state=tuple(Feature(f"{f.name}/applied", "1", 0.0, 1.0, f.element) for f in TENDONS),
@@ -514,7 +482,6 @@ def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
 
 
 def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
-    """`EnvRef` makes it from its id and arguments, so other processes can too."""
     remember(run().known)
     with EnvRef(ID, {"robot": "tin", "pace": "lockstep"}).make() as env:
         env.reset(seed=0)
@@ -533,13 +500,11 @@ def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
 def test_invalid_arguments_are_errors(
     run: Run, how: dict[str, Any], error: type[Exception]
 ) -> None:
-    """No connection remains open."""
     with pytest.raises(error):
         RemoteVehicleEnv(**run().arguments, **how)
 
 
 def test_closing_gives_control_back(run: Run) -> None:
-    """`close` is idempotent."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -549,7 +514,6 @@ def test_closing_gives_control_back(run: Run) -> None:
 
 
 def test_a_dropped_env_gives_control_back(run: Run) -> None:
-    """Garbage collection releases control, so that another env can be made."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -560,7 +524,6 @@ def test_a_dropped_env_gives_control_back(run: Run) -> None:
 
 
 def test_four_keys_drive_as_in_2017(run: Run) -> None:
-    """The order is that of labels.csv, and steering keys do not drive."""
     env = DiscreteDriving(made(run()), throttle=0.6, steering=0.4)
     env.reset(seed=0)
     applied = {
@@ -576,7 +539,6 @@ def test_four_keys_drive_as_in_2017(run: Run) -> None:
 
 
 def test_four_keys_need_steering_and_throttle(run: Run) -> None:
-    """Other actions raise SpaceMismatch."""
     env = made(run(actions=(THROTTLE,)))
     with pytest.raises(SpaceMismatch, match="steering, throttle"):
         DiscreteDriving(env)
@@ -585,7 +547,6 @@ def test_four_keys_need_steering_and_throttle(run: Run) -> None:
 
 @pytest.mark.parametrize("key", [4, -1, 1.5, "forward", [0.0, 1.0], None])
 def test_an_invalid_key_of_the_four_is_an_error(run: Run, key: Any) -> None:
-    """The error lists the keys."""
     env = DiscreteDriving(made(run()))
     with pytest.raises(SpaceMismatch, match=r"0 \(forward\), 1 \(backward\)"):
         env.action(key)

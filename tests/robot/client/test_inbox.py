@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation
-from shapechanger.robot.client.inbox import Inbox
+from shapechanger.robot.client.connection import Inbox
 from shapechanger.robot.link.messages import Observation
 
 
@@ -36,7 +36,6 @@ def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observatio
 
 
 def test_the_inbox_holds_only_the_newest_observation() -> None:
-    """A slow reader skips older ones."""
     inbox = Inbox(lambda: 5.0)
     for seq in (1, 2, 3):
         inbox.put(seen(seq))
@@ -45,7 +44,6 @@ def test_the_inbox_holds_only_the_newest_observation() -> None:
 
 
 def test_an_observation_is_returned_once() -> None:
-    """Waiting for a newer one raises, with the age of the newest."""
     now = [10.0]
     inbox = Inbox(lambda: now[0])
     inbox.put(seen(1))
@@ -59,7 +57,6 @@ def test_an_observation_is_returned_once() -> None:
 
 @pytest.mark.parametrize("seq", [1, 2])
 def test_a_replay_is_an_error(seq: int) -> None:
-    """A sequence number that does not increase raises an error."""
     inbox = Inbox(lambda: 0.0)
     inbox.put(seen(2))
     with pytest.raises(LinkError, match="as in a replay"):
@@ -67,7 +64,6 @@ def test_a_replay_is_an_error(seq: int) -> None:
 
 
 def test_a_frame_outlives_its_observation() -> None:
-    """A frame is sent once, and kept for later observations with its number."""
     inbox = Inbox(lambda: 0.0)
     inbox.put(seen(1, frame_seq=7, frame=b"seven"))
     inbox.put(seen(2, frame_seq=7))
@@ -77,7 +73,6 @@ def test_a_frame_outlives_its_observation() -> None:
 
 
 def test_a_lost_link_ends_all_waits_at_once() -> None:
-    """All waits and later calls raise the first error."""
     inbox = Inbox(lambda: 0.0)
     errors: list[LinkError] = []
 

@@ -19,7 +19,6 @@ from shapechanger.robot.client.teleop import (
 
 @pytest.mark.parametrize(("key", "meaning"), DIRECTIONS.items())
 def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) -> None:
-    """W is forward and A is left, and so are the arrow keys."""
     keys = HeldKeys()
     assert keys.press(key, 0.0)
     action, value = meaning
@@ -28,7 +27,6 @@ def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) 
 
 
 def test_a_press_expires() -> None:
-    """A press ends after its hold, so that a dead terminal does not leave the robot running."""
     keys = HeldKeys()
     keys.press("w", 10.0)
     assert keys.value("throttle", 10.0 + FIRST_HOLD_S) == 1.0
@@ -36,7 +34,6 @@ def test_a_press_expires() -> None:
 
 
 def test_a_held_key_ends_after_its_last_repeat() -> None:
-    """Once the terminal repeats a key, the hold is short."""
     keys = HeldKeys()
     for n in range(20):
         keys.press("up", n * 0.03 + (0.5 if n else 0.0))
@@ -46,7 +43,6 @@ def test_a_held_key_ends_after_its_last_repeat() -> None:
 
 
 def test_the_opposite_key_takes_over_at_once() -> None:
-    """S replaces W at once, although W is still held."""
     keys = HeldKeys()
     keys.press("w", 0.0)
     keys.press("s", 0.1)
@@ -54,7 +50,6 @@ def test_the_opposite_key_takes_over_at_once() -> None:
 
 
 def test_other_keys_are_ignored() -> None:
-    """Keys without a direction are ignored, and `let_go` releases all."""
     keys = HeldKeys()
     assert not keys.press("x", 0.0)
     keys.press("a", 0.0)
@@ -63,12 +58,10 @@ def test_other_keys_are_ignored() -> None:
 
 
 def test_arrow_keys_have_two_encodings() -> None:
-    """Arrows are recognised in normal and in application mode."""
     assert keys_in("\x1b[A\x1bOBq\x1b[C\x1b[D") == ["up", "down", "q", "right", "left"]
 
 
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Standard input that is not a terminal raises NoTerminal."""
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(NoTerminal, match="needs a terminal"):
@@ -78,7 +71,6 @@ def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_terminal_is_unbuffered_and_restored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Keys arrive without Enter within the block, and the settings are restored after it."""
     import termios
 
     ours, theirs = pty.openpty()
@@ -94,7 +86,6 @@ def test_the_terminal_is_unbuffered_and_restored(
 
 
 def test_a_held_key_continues_when_another_is_pressed() -> None:
-    """A second key stops the repeats of the first, which continues for one hold."""
     keys = HeldKeys()
     for n in range(30):
         keys.press("w", 0.03 * n)
@@ -105,7 +96,6 @@ def test_a_held_key_continues_when_another_is_pressed() -> None:
 
 
 def test_another_key_does_not_extend_a_hold() -> None:
-    """A key that was let go ends after one hold, although another one is held."""
     keys = HeldKeys()
     for n in range(30):
         keys.press("w", 0.03 * n)
@@ -116,7 +106,6 @@ def test_another_key_does_not_extend_a_hold() -> None:
 
 
 def test_another_key_does_not_revive_an_expired_one() -> None:
-    """An expired key stays expired when another one is pressed."""
     keys = HeldKeys()
     keys.press("w", 0.0)
     keys.press("w", 0.5)

@@ -22,7 +22,6 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_known_robot_round_trips() -> None:
-    """A robot is recalled by its name until it is forgotten."""
     robot = KnownRobot("new-bright", "car.local:5000", new_key(), PRINT)
     path = remember(robot)
     assert recall("new-bright") == robot
@@ -36,7 +35,6 @@ def test_a_known_robot_round_trips() -> None:
 
 
 def test_a_new_address_replaces_the_old() -> None:
-    """The same file is updated."""
     key = new_key()
     remember(KnownRobot("car", "car.local", key, PRINT))
     path = remember(KnownRobot("car", "10.0.0.7", key, PRINT))
@@ -45,14 +43,12 @@ def test_a_new_address_replaces_the_old() -> None:
 
 
 def test_a_misspelt_name_gets_a_suggestion() -> None:
-    """The error suggests the nearest name."""
     remember(KnownRobot("new-bright", "car.local", new_key(), PRINT))
     with pytest.raises(UnknownName, match="Did you mean 'new-bright'"):
         recall("new-brigt")
 
 
 def test_a_key_that_other_users_can_read_is_refused() -> None:
-    """The error gives the chmod command, as ssh does."""
     path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
     path.chmod(0o644)
     with pytest.raises(LinkError, match="chmod 600"):
@@ -61,7 +57,6 @@ def test_a_key_that_other_users_can_read_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["adress = 1", "not toml", 'address = "a"\nkey = 1\n'])
 def test_a_broken_file_is_named(text: str) -> None:
-    """The error gives the path of the file."""
     path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
     path.write_text(text)
     with pytest.raises(LinkError, match=r"car\.toml"):
@@ -79,17 +74,14 @@ def test_a_broken_file_is_named(text: str) -> None:
     ],
 )
 def test_invalid_attributes_are_errors(name: str, address: str, key: str, fingerprint: str) -> None:
-    """Invalid names, addresses, keys and fingerprints raise errors."""
     with pytest.raises(LinkError):
         KnownRobot(name, address, key, fingerprint)
 
 
 def test_without_encryption_there_may_be_no_key() -> None:
-    """The key may be empty with the fingerprint "insecure"."""
     assert KnownRobot("car", "car.local", "", "insecure").key == ""
 
 
 def test_a_key_is_not_in_the_repr() -> None:
-    """`repr` omits the key, so that it is not logged."""
     key = new_key()
     assert key not in repr(KnownRobot("car", "car.local", key, PRINT))

@@ -73,7 +73,6 @@ def reaches(namespace: str, port: int) -> bool:
 
 
 def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
-    """The robot stops at its deadline, and can be driven again after the cable is rejoined."""
     profile = write_profile(tmp_path)
     wiring = TwinWiring(profile.guard_plan(), None)
     within = ("ip", "netns", "exec", namespace)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shapechanger.errors import LinkError
 from shapechanger.layout import Layout
 from shapechanger.robot.client import observations
-from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.observations import RobotSpaces, decode_picture, resize_picture
 from shapechanger.robot.link.messages import Observation, Welcome
 from tests.robot.client.robot import picture
@@ -19,7 +19,6 @@ sides = st.integers(1, 12)
 
 
 def test_a_frame_decodes_as_upright_rgb() -> None:
-    """The shape is (height, width, 3), with red in the first channel."""
     seen = decode_picture(picture((160, 120), number=10))
     assert seen.shape == (120, 160, 3)
     assert seen.dtype == np.uint8
@@ -30,20 +29,17 @@ def test_a_frame_decodes_as_upright_rgb() -> None:
 
 @given(data=st.binary(max_size=200))
 def test_invalid_jpegs_are_errors(data: bytes) -> None:
-    """Any invalid bytes raise LinkError."""
     with pytest.raises(LinkError, match="invalid JPEG"):
         decode_picture(data)
 
 
 def test_a_truncated_jpeg_is_an_error() -> None:
-    """Half a JPEG does not decode."""
     whole = picture((160, 120), 1)
     with pytest.raises(LinkError, match="invalid JPEG"):
         decode_picture(whole[: len(whole) // 2])
 
 
 def test_an_oversized_frame_is_refused() -> None:
-    """The size in the header is checked before decoding."""
     whole = bytearray(picture((16, 16), 1))
     frame = whole.index(b"\xff\xc0")
     whole[frame + 5 : frame + 9] = (20_000).to_bytes(2, "big") * 2
@@ -55,7 +51,6 @@ def test_an_oversized_frame_is_refused() -> None:
 def test_resizing_keeps_a_uniform_colour(
     width: int, height: int, wide: int, high: int, level: int
 ) -> None:
-    """Holds for any source and target size."""
     small = resize_picture(np.full((height, width, 3), level, np.uint8), (wide, high))
     assert small.shape == (high, wide, 3)
     assert small.dtype == np.uint8
@@ -66,14 +61,12 @@ def test_resizing_keeps_a_uniform_colour(
 def test_shrinking_by_a_whole_number_keeps_the_mean(
     data: st.DataObject, wide: int, high: int, by: int
 ) -> None:
-    """The mean is kept up to rounding."""
     seed = data.draw(st.integers(0, 2**32 - 1))
     whole = np.random.default_rng(seed).integers(0, 256, (by * high, by * wide, 3), np.uint8)
     assert abs(float(resize_picture(whole, (wide, high)).mean()) - float(whole.mean())) <= 0.5
 
 
 def test_other_sizes_take_the_nearest_pixel() -> None:
-    """Resizing neither mirrors nor shifts."""
     row = np.arange(5, dtype=np.uint8)
     whole = np.repeat(np.repeat(row[None, :, None], 2, axis=0), 3, axis=2)
     assert resize_picture(whole, (2, 2))[0, :, 0].tolist() == [1, 3]
@@ -81,7 +74,6 @@ def test_other_sizes_take_the_nearest_pixel() -> None:
 
 
 def test_an_equal_size_returns_the_same_array() -> None:
-    """No copy is made."""
     whole = np.zeros((2, 3, 3), np.uint8)
     assert resize_picture(whole, (3, 2)) is whole
 
@@ -133,7 +125,6 @@ def seen(frame_seq: int, jpeg: bytes | None) -> Received:
 
 
 def test_a_restarted_robot_shows_its_new_frame() -> None:
-    """After a reconnect, an equal frame number is a new frame."""
     robot = spaces()
     before = robot.view(seen(1, picture((16, 12), 1)))
     robot.reconnect()
@@ -143,7 +134,6 @@ def test_a_restarted_robot_shows_its_new_frame() -> None:
 
 
 def test_an_invalid_frame_is_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The image remains the last valid one."""
     robot = spaces()
     good = robot.view(seen(1, picture((16, 12), 1)))
     tried: list[bytes] = []

@@ -21,7 +21,6 @@ PAGE = Path(__file__).parents[3] / "docs" / "remote.md"
 def test_the_examples_drive_a_robot(
     run: Callable[..., Robot], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The blocks run in order, with a known robot of the page's name."""
     robot = run(control_hz=100.0, clock="real")
     remember(dataclasses.replace(robot.known, name="new-bright"))
     names: dict[str, Any] = {"__name__": "__main__"}

@@ -110,7 +110,6 @@ def made(robot: Served, **how: Any) -> gym.Env[Any, Any]:
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) -> None:
-    """The guard applies the actions, and the reward comes from its sensors."""
     robot = serve(arming="anyone")
     env = made(robot, pace=pace, state=True)
     seen, info = env.reset(seed=0)
@@ -140,7 +139,6 @@ def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) 
 
 
 def test_a_person_takes_control_from_a_program(serve: Callable[..., Served]) -> None:
-    """The episode is truncated with the person's name, and the next reset waits."""
     robot = serve(arming="anyone")
     env = made(robot, pace="lockstep", reset_timeout_s=0.3)
     env.reset(seed=0)
@@ -155,7 +153,6 @@ def test_a_person_takes_control_from_a_program(serve: Callable[..., Served]) -> 
 
 
 def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
-    """The program waits for the person, then drives; an emergency stop ends the episode."""
     robot = serve()
     with RobotClient.connect(robot.known, role="person", name="Grace") as person:
 
@@ -176,7 +173,6 @@ def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
 
 
 def test_a_command_must_answer_an_observation_that_was_sent(serve: Callable[..., Served]) -> None:
-    """The error is the daemon's message."""
     robot = serve(arming="anyone")
     with RobotClient.connect(robot.known, pace="lockstep") as client:
         client.take()
@@ -188,7 +184,6 @@ def test_a_command_must_answer_an_observation_that_was_sent(serve: Callable[...,
 
 
 def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None:
-    """`arm` first asks for a new observation."""
     robot = serve(max_observation_age_ms=100)
     with RobotClient.connect(robot.known, role="person") as person:
         person.take()

@@ -20,7 +20,6 @@ Run = Callable[..., Robot]
 
 
 def test_frames_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
-    """Frames match byte for byte, with the robot's times and applied outputs."""
     robot = run(arm_by_itself=True)
     options: dict[str, Any] = {"pace": "lockstep", "state": True} | robot.arguments
     with gym.make("shapechanger/RemoteVehicle-v1", **options) as made:

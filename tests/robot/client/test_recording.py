@@ -35,7 +35,6 @@ def drive(client: RobotClient, steps: int) -> None:
 
 
 def test_a_person_records_marks_and_undoes(robot: Served, tmp_path: Path) -> None:
-    """Each call returns after the change is on the disk."""
     with RobotClient.connect(robot.known, role="person", name="Ada") as client:
         assert client.welcome.can_record
         assert client.recorder is None
@@ -64,7 +63,6 @@ def test_a_person_records_marks_and_undoes(robot: Served, tmp_path: Path) -> Non
 
 
 def test_refused_requests_leave_the_link_up(robot: Served) -> None:
-    """The client rejects invalid fields; the robot refuses the rest."""
     with RobotClient.connect(robot.known, role="person") as client:
         for invalid in (
             lambda: client.record(name="x" * 65),
@@ -90,7 +88,6 @@ def test_refused_requests_leave_the_link_up(robot: Served) -> None:
 
 
 def test_a_program_suggests_while_a_person_drives(robot: Served) -> None:
-    """Person and program each see the other's values."""
     with (
         RobotClient.connect(robot.known, role="person", name="Ada") as person,
         RobotClient.connect(robot.known, name="net") as program,

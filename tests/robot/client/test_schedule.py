@@ -24,7 +24,6 @@ class Clock:
 
 @given(late=st.lists(st.floats(0.0, 0.99 * LATE * PERIOD), min_size=1, max_size=100))
 def test_steps_that_end_a_little_late_keep_the_rate(late: list[float]) -> None:
-    """Only the delay of the last step remains."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     for each in late:
@@ -36,7 +35,6 @@ def test_steps_that_end_a_little_late_keep_the_rate(late: list[float]) -> None:
 
 @given(slower=st.floats(1.0, 1.0 + 0.9 * LATE), steps=st.integers(1, 200))
 def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) -> None:
-    """The difference between the clocks does not accumulate to a missed deadline."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     for i in range(1, steps + 1):
@@ -46,7 +44,6 @@ def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) ->
 
 
 def test_a_late_step_is_counted_and_not_compensated() -> None:
-    """The next step has a full period."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     clock.now += 3.7 * PERIOD
@@ -55,7 +52,6 @@ def test_a_late_step_is_counted_and_not_compensated() -> None:
 
 
 def test_a_schedule_starts_with_the_first_step() -> None:
-    """The time since the reset is not a delay."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     clock.now += 60.0

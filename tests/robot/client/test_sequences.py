@@ -26,7 +26,6 @@ from tests.robot.client.sequences import ARROWS, UNKNOWN
 
 @pytest.mark.parametrize(("sequence", "key"), ARROWS.items())
 def test_an_arrow_is_one_key_however_it_is_split(sequence: bytes, key: str) -> None:
-    """The rest of an arrow is awaited; after the key Escape it is nothing."""
     for place in range(1, len(sequence)):
         for gap_s in (0.0, 0.9 * ESCAPE_WAIT_S, 0.9 * REST_WAIT_S):
             keys = pieces((sequence[:place], sequence[place:]), gap_s)
@@ -36,7 +35,6 @@ def test_an_arrow_is_one_key_however_it_is_split(sequence: bytes, key: str) -> N
 
 @pytest.mark.parametrize("sequence", UNKNOWN, ids=repr)
 def test_an_unknown_sequence_is_no_key_however_it_is_split(sequence: bytes) -> None:
-    """Whole, in two pieces with a pause, and byte by byte; a late rest may only stop."""
     assert set(keys_in_bytes(sequence)) == {OTHER}
     for place in range(1, len(sequence)):
         for gap_s in (0.9 * ESCAPE_WAIT_S, 0.9 * REST_WAIT_S):
@@ -57,7 +55,6 @@ def test_an_unknown_sequence_is_no_key_however_it_is_split(sequence: bytes) -> N
     )
 )
 def test_sequences_in_any_order_give_no_letter(parts: list[tuple[bytes, int, float]]) -> None:
-    """Neither do reads that end anywhere, with pauses anywhere within the time to wait."""
     parser, now_s, keys = KeyParser(), 0.0, list[str]()
     for sequence, size, gap_s in parts:
         for start in range(0, len(sequence), size):
@@ -69,7 +66,6 @@ def test_sequences_in_any_order_give_no_letter(parts: list[tuple[bytes, int, flo
 
 @given(st.binary(max_size=40), st.lists(st.integers(0, 40), max_size=3))
 def test_space_and_escape_always_stop(noise: bytes, splits: list[int]) -> None:
-    """No input before them can hide them, and Escape ends pasted text."""
     ends = sorted({0, *splits, len(noise)})
     for stop, data in (("space", b" "), ("escape", b"\x1b")):
         parser = KeyParser()
@@ -81,7 +77,6 @@ def test_space_and_escape_always_stop(noise: bytes, splits: list[int]) -> None:
 
 @given(st.sampled_from(UNKNOWN), st.integers(0, 40))
 def test_keys_work_again_after_a_part_of_a_sequence(sequence: bytes, size: int) -> None:
-    """Alt+[ begins a sequence that never ends."""
     part = sequence[:size]
     if part.startswith(b"\x1b[200~") or "\ufffd" in part.decode(errors="replace"):
         return
@@ -109,14 +104,12 @@ def test_keys_work_again_after_a_part_of_a_sequence(sequence: bytes, size: int) 
     ids=repr,
 )
 def test_a_stop_has_many_encodings(sequence: bytes, key: str) -> None:
-    """Alone, with Ctrl or Alt, in other protocols and in pasted text; the rest is nothing."""
     keys = keys_in_bytes(sequence)
     assert key in keys
     assert set(keys) <= {key, OTHER}
 
 
 def test_a_held_escape_stops_at_once() -> None:
-    """Repeats do not put it off."""
     parser, now_s = KeyParser(), 0.0
     while "escape" not in parser.feed(b"\x1b", now_s):
         now_s += 0.033
@@ -135,7 +128,6 @@ def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[int, Terminal]]:
 
 
 def test_a_read_split_anywhere_moves_nothing(typed: tuple[int, Terminal]) -> None:
-    """Each sequence through the terminal's driver, in two reads at each place."""
     keyboard, terminal = typed
     for sequence in UNKNOWN:
         if sequence in {b"\x03", b"\x1a"}:
@@ -152,7 +144,6 @@ def test_a_read_split_anywhere_moves_nothing(typed: tuple[int, Terminal]) -> Non
 
 
 def test_escape_is_a_key_after_a_moment(typed: tuple[int, Terminal]) -> None:
-    """A call waits for it only as long as asked."""
     keyboard, terminal = typed
     os.write(keyboard, b"\x1b")
     assert terminal.keys(0.0) == []
@@ -172,7 +163,6 @@ def test_escape_is_a_key_after_a_moment(typed: tuple[int, Terminal]) -> None:
 def test_a_read_with_many_keys_is_no_typing(
     typed: tuple[int, Terminal], data: bytes, keys: list[str]
 ) -> None:
-    """Some terminals do not mark pasted text; a stop cancels the other keys."""
     keyboard, terminal = typed
     os.write(keyboard, data)
     assert terminal.keys(5.0) == keys
@@ -196,5 +186,4 @@ def orders(keys: list[str]) -> list[str]:
 
 
 def test_a_text_is_one_read() -> None:
-    """`keys_in` waits for the rest of the last sequence, in vain."""
     assert keys_in("w\x1b") == ["w", "escape"]

@@ -55,7 +55,6 @@ def _step_until(
 
 
 def test_a_person_takes_over_and_gives_back(robot: RunningRobot) -> None:
-    """`info` has the person's commands, and the person sees the program's."""
     with _made(robot, interventions=True) as env, robot.client(role="person") as person:
         env.reset()
         info = _step_until(env, lambda info: info["action_applied"][1] > 0.0)
@@ -80,7 +79,6 @@ def test_a_person_takes_over_and_gives_back(robot: RunningRobot) -> None:
 
 
 def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
-    """Emergency stops and disarming truncate the episode."""
     with _made(robot, interventions=True) as env, robot.client(role="person") as person:
         env.reset()
         _step_until(env, lambda info: info["action_applied"][1] > 0.0)
@@ -96,7 +94,6 @@ def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
 
 
 def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) -> None:
-    """Without `interventions`, a takeover truncates the episode."""
     with _made(robot) as env, robot.client(role="person") as person:
         env.reset()
         person.take()

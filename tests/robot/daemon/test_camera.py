@@ -59,7 +59,6 @@ def watched(camera: FakeCamera) -> Iterator[Watched]:
 
 
 def test_valid_new_frames_are_accepted() -> None:
-    """Frames with increasing capture times pass all checks."""
     checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
     assert checks.refusal(Frame(picture(2), 2)) == ""
@@ -81,7 +80,6 @@ GOOD = picture(3)
     ],
 )
 def test_invalid_frames_are_rejected(jpeg: bytes, captured_ns: int, words: str) -> None:
-    """A rejected frame does not change the newest capture time."""
     checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
     assert words in checks.refusal(Frame(jpeg, captured_ns))
@@ -91,7 +89,6 @@ def test_invalid_frames_are_rejected(jpeg: bytes, captured_ns: int, words: str) 
 def test_a_frozen_camera_delivers_nothing_and_is_reported_once(
     camera: FakeCamera, watched: Watched
 ) -> None:
-    """A repeated frame with a new time is rejected; the next new frame ends the failure."""
     for at in range(1, 6):
         camera.put(Frame(picture(1), at))
     camera.put(Frame(picture(2), 6))
@@ -103,7 +100,6 @@ def test_a_frozen_camera_delivers_nothing_and_is_reported_once(
 
 
 def test_a_camera_that_fails_is_reopened(camera: FakeCamera, watched: Watched) -> None:
-    """Failure and recovery are both reported."""
     camera.put(Frame(picture(1), 1))
     camera.fail("The camera was unplugged.")
     camera.put(Frame(picture(2), 2))
@@ -114,7 +110,6 @@ def test_a_camera_that_fails_is_reopened(camera: FakeCamera, watched: Watched) -
 def test_a_camera_that_cannot_be_opened_is_tried_again(
     camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Meanwhile the robot is served without frames."""
     opens: list[int] = []
 
     def fail_once(plan: CameraPlan) -> FakeCamera:
@@ -132,7 +127,6 @@ def test_a_camera_that_cannot_be_opened_is_tried_again(
 
 
 def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watched: Watched) -> None:
-    """Ten invalid frames in a row reopen the camera."""
     for at in range(10):
         camera.put(Frame(b"garbage", at))
     camera.put(Frame(picture(1), 100))
@@ -142,7 +136,6 @@ def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watche
 
 
 def test_bytes_between_frames_are_reported_once(camera: FakeCamera, watched: Watched) -> None:
-    """Some streams have bytes between all frames, such as the headers of HTTP."""
     for at in range(1, 4):
         camera.put(Frame(picture(at), at, skipped=62))
     watched.until(lambda: len(watched.frames) == 3)
@@ -153,7 +146,6 @@ def test_bytes_between_frames_are_reported_once(camera: FakeCamera, watched: Wat
 
 
 def test_closing_ends_a_camera_without_frames(watched: Watched) -> None:
-    """A camera that hangs does not keep the daemon from exiting."""
     watched.reader.close()
     assert not watched.reader._thread.is_alive()
     assert watched.reports == []

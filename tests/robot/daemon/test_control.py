@@ -28,7 +28,6 @@ def held_by(client: ClientIdentity) -> ControlLease:
 
 
 def test_a_person_takes_control_from_a_program_at_once() -> None:
-    """`take` returns the program that lost the lease."""
     lease = held_by(SAC)
     assert lease.refusal(ANN) == ""
     assert lease.take(ANN) == SAC
@@ -40,14 +39,12 @@ def test_a_person_takes_control_from_a_program_at_once() -> None:
     ("holder", "other"), [(ANN, SAC), (ANN, BOB), (SAC, PPO)], ids=lambda client: client.name
 )
 def test_no_other_client_takes_control(holder: ClientIdentity, other: ClientIdentity) -> None:
-    """A program cannot take it from a person, nor any client from one of its own role."""
     refusal = held_by(holder).refusal(other)
     assert refusal.startswith(f"{holder.name} has control")
     assert other.role in refusal
 
 
 def test_taking_control_twice_changes_nothing() -> None:
-    """The lease keeps its number, so commands in flight stay valid."""
     lease = held_by(SAC)
     assert lease.take(SAC) is None
     assert lease.number == 1
@@ -59,7 +56,6 @@ def test_taking_control_twice_changes_nothing() -> None:
     )
 )
 def test_there_is_one_holder_and_numbers_only_rise(moves: list[tuple[str, ClientIdentity]]) -> None:
-    """Each number belongs to one holder, and no person loses control to another client."""
     lease = ControlLease()
     holder: ClientIdentity | None = None
     of_number: dict[int, ClientIdentity] = {}
@@ -81,7 +77,6 @@ def test_there_is_one_holder_and_numbers_only_rise(moves: list[tuple[str, Client
 
 @given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))
 def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: int) -> None:
-    """A command expires at the earlier of its TTL and the robot's deadline."""
     now_ns = 0
     hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
     assert hub.commanded() == ()
@@ -96,7 +91,6 @@ def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: in
 
 
 def test_the_newest_suggestion_counts_until_it_expires() -> None:
-    """A suggestion replaces that of another client, and expires after the deadline."""
     now_ns = 0
     hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
     assert hub.suggested() is None

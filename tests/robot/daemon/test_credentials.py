@@ -26,14 +26,12 @@ from tests.robot.daemon.plans import car_plan
 
 
 def test_credentials_are_made_once(tmp_path: Path) -> None:
-    """Existing credentials are kept, since clients have pinned them."""
     made = make_credentials(tmp_path / "car", "car")
     assert make_credentials(tmp_path / "car", "car") == made == load_credentials(tmp_path / "car")
     assert len(read_key(made.key_file)) == 16
 
 
 def test_a_new_folder_has_a_new_key_and_a_new_certificate(tmp_path: Path) -> None:
-    """Deleting the folder revokes the key, the certificate and its private key."""
     folder = tmp_path / "car"
     old = make_credentials(folder, "car")
     key, private = read_key(old.key_file), old.private_key.read_text()
@@ -45,7 +43,6 @@ def test_a_new_folder_has_a_new_key_and_a_new_certificate(tmp_path: Path) -> Non
 
 
 def test_only_the_owner_can_read_credentials(tmp_path: Path) -> None:
-    """Key files have mode 600, and their folder 700."""
     made = make_credentials(tmp_path / "a" / "car", "car")
     assert made.key_file.stat().st_mode & 0o777 == 0o600
     assert made.private_key.stat().st_mode & 0o777 == 0o600
@@ -53,7 +50,6 @@ def test_only_the_owner_can_read_credentials(tmp_path: Path) -> None:
 
 
 def test_the_certificate_fields(tmp_path: Path) -> None:
-    """Name, fingerprint and validity; it is valid even if the robot's clock is years behind."""
     made = make_credentials(tmp_path, "my car")
     certificate = x509.load_pem_x509_certificate(made.certificate.read_bytes())
     assert certificate.subject.rfc4514_string() == "CN=my car"
@@ -64,7 +60,6 @@ def test_the_certificate_fields(tmp_path: Path) -> None:
 
 
 def test_tls_1_3_is_required(tmp_path: Path) -> None:
-    """The server context accepts TLS 1.3 only."""
     made = make_credentials(tmp_path, "car")
     context, fingerprint = server_tls(made.certificate, made.private_key)
     assert context.minimum_version is ssl.TLSVersion.TLSv1_3
@@ -72,14 +67,12 @@ def test_tls_1_3_is_required(tmp_path: Path) -> None:
 
 
 def test_missing_credentials_name_the_command(tmp_path: Path) -> None:
-    """The error names the command that creates them."""
     with pytest.raises(RobotError, match="shapechanger robot init"):
         load_credentials(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["key", "certificate.key"])
 def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> None:
-    """The error gives the chmod command."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).chmod(0o640)
     with pytest.raises(RobotError, match="chmod 600"):
@@ -88,7 +81,6 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> Non
 
 @pytest.mark.parametrize("name", ["key", "certificate.pem", "certificate.key"])
 def test_incomplete_credentials_are_not_completed(tmp_path: Path, name: str) -> None:
-    """If only some files exist, none is created."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).unlink()
     with pytest.raises(RobotError, match="only some"):
@@ -107,7 +99,6 @@ def test_incomplete_credentials_are_not_completed(tmp_path: Path, name: str) -> 
     ],
 )
 def test_malformed_credentials_are_refused(tmp_path: Path, name: str, garbage: bytes) -> None:
-    """The error names the file."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).write_bytes(garbage)
     with pytest.raises(RobotError, match=name):
@@ -115,14 +106,12 @@ def test_malformed_credentials_are_refused(tmp_path: Path, name: str, garbage: b
 
 
 def test_a_certificate_of_another_key_is_refused(tmp_path: Path) -> None:
-    """Certificate and private key must match."""
     one, two = (make_credentials(tmp_path / name, name) for name in ("one", "two"))
     with pytest.raises(RobotError, match="do not match"):
         server_tls(one.certificate, two.private_key)
 
 
 def test_a_folder_that_cannot_be_created_raises(tmp_path: Path) -> None:
-    """OutputError replaces the OSError."""
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="Cannot write"):
         make_credentials(tmp_path / "file" / "car", "car")
@@ -131,7 +120,6 @@ def test_a_folder_that_cannot_be_created_raises(tmp_path: Path) -> None:
 def test_the_folder_follows_xdg_config_home(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Relative values of XDG_CONFIG_HOME are ignored."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     assert credentials_folder("car") == tmp_path / "shapechanger/robots/car"
     monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
@@ -140,13 +128,11 @@ def test_the_folder_follows_xdg_config_home(
 
 @pytest.mark.parametrize("name", ["", "..", ".hidden", "a/b", "a\0b"])
 def test_a_name_cannot_leave_the_folder(name: str) -> None:
-    """The robot's name must be a valid folder name."""
     with pytest.raises(RobotError, match="valid folder name"):
         credentials_folder(name)
 
 
 def test_serving_other_machines_needs_a_key() -> None:
-    """Serving beyond loopback needs TLS and a key, or `insecure`."""
     check_exposure(car_plan(host="127.0.0.1"))
     check_exposure(car_plan(host="0.0.0.0", insecure=True))
     secured = {"certificate": "c", "private_key": "p", "key_file": "k"}
@@ -157,7 +143,6 @@ def test_serving_other_machines_needs_a_key() -> None:
 
 
 def test_reading_credentials_does_not_import_the_certificate_builder() -> None:
-    """Importing `cryptography` would cost the daemon 10 MB."""
     script = (
         "import sys, shapechanger.robot.daemon.process; "
         "assert 'cryptography' not in sys.modules and 'gpiozero' not in sys.modules"

@@ -35,7 +35,6 @@ class FakeZeroconf:
 
 
 def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The announcement has what `shapechanger robot find` shows."""
     fake = FakeZeroconf()
     monkeypatch.setattr(discovery, "AsyncZeroconf", lambda: fake)
 
@@ -62,8 +61,6 @@ def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -
 def test_a_failed_announcement_is_only_a_warning(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The robot is served anyway."""
-
     def broken() -> None:
         raise OSError("Network is unreachable")
 

@@ -17,7 +17,6 @@ pytestmark = pytest.mark.realtime
 
 
 def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
-    """Clients stay unauthenticated, and those without control send no command."""
     counts = fuzz(5_000, seed=1)
     assert counts["strangers refused"] == 1_250
     assert counts["connections ended"] > 1_000
@@ -25,7 +24,6 @@ def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
 
 
 def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The daemon refuses or closes, and serves the next client."""
     secret = tmp_path / "secret"
     secret.mkdir()
     (secret / "episode.json").write_text("{}")

@@ -46,7 +46,6 @@ def ends() -> Iterator[Ends]:
 
 
 def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
-    """Only the invalid datagram is lost."""
     ends.guard.send(encode(guard_state(at_ns=1)))
     ends.guard.send(b"nonsense")
     ends.guard.send(b'{"at_ns": 3}')
@@ -56,7 +55,6 @@ def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None
 
 
 def test_a_lost_guard_is_reported_once(ends: Ends) -> None:
-    """The end of the socket is reported, and later orders are dropped."""
     ends.guard.close()
     ends.port.drain()
     ends.port.drain()
@@ -65,15 +63,12 @@ def test_a_lost_guard_is_reported_once(ends: Ends) -> None:
 
 
 def test_a_lost_guard_is_detected_on_send(ends: Ends) -> None:
-    """Sending to a closed socket reports the loss."""
     ends.guard.close()
     ends.port.send(Order(kind="command"))
     assert ends.lost == [True]
 
 
 def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
-    """Stops are queued and sent later; commands are dropped."""
-
     async def play() -> list[Order]:
         ends.port.attach(asyncio.get_running_loop())
         for seq in range(5_000):

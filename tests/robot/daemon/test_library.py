@@ -65,7 +65,6 @@ def record(folder: Path, count: int, outcome: str = "") -> Path:
 
 @pytest.mark.parametrize("count", [1, 2, 7, 100_000])
 def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int) -> None:
-    """The bytes match for any number of lines per request."""
     path = record(tmp_path, 60)
     lines, shown, pictures = b"", None, []
     at, total = 0, 1
@@ -86,7 +85,6 @@ def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int)
 
 
 def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
-    """A large line is sent alone, and one beyond the limit is refused."""
     large = b"\xff\xd8" + bytes(MAX_PIECE)
     with EpisodeWriter.create(tmp_path, HEADER) as writer:
         for jpeg in (picture(1), large, picture(2), b"\xff\xd8" + bytes(5 << 20)):
@@ -108,7 +106,6 @@ def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
 def test_a_summary_agrees_with_the_whole_episode(
     tmp_path_factory: pytest.TempPathFactory, count: int, judgements: list[tuple[bool, int, int]]
 ) -> None:
-    """Counts match after each judgement."""
     folder = tmp_path_factory.mktemp("kept")
     path = record(folder, count, "time")
     recordings = RecordingFolder(folder)
@@ -124,7 +121,6 @@ def test_a_summary_agrees_with_the_whole_episode(
 
 
 def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
-    """`before` continues the list; folders that are not episodes are skipped."""
     (tmp_path / "notes.txt").touch()
     (tmp_path / "empty").mkdir()
     (tmp_path / ".hidden").mkdir()
@@ -149,7 +145,6 @@ def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
 
 
 def test_episodes_outside_the_folder_are_refused(ask: Ask, tmp_path: Path) -> None:
-    """Paths, parents and symbolic links are refused."""
     elsewhere = record(tmp_path / "elsewhere", 2)
     (tmp_path / "linked").symlink_to(elsewhere)
     for name in ("linked", "elsewhere", f"elsewhere/{elsewhere.name}", "..", ".", ""):
@@ -162,7 +157,6 @@ def test_episodes_outside_the_folder_are_refused(ask: Ask, tmp_path: Path) -> No
 
 
 def test_a_line_cannot_refer_outside_the_episode(ask: Ask, tmp_path: Path) -> None:
-    """The file name of a frame is checked."""
     path = record(tmp_path, 1)
     (tmp_path / "secret.jpg").write_bytes(b"secret")
     (path / "steps.jsonl").write_text(
@@ -174,7 +168,6 @@ def test_a_line_cannot_refer_outside_the_episode(ask: Ask, tmp_path: Path) -> No
 
 
 def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -> None:
-    """An incomplete last line is ignored; missing frames and bad headers are reported."""
     path = record(tmp_path, 4)
     with (path / "steps.jsonl").open("ab") as file:
         file.write(b'{"kind":"drop","first":0,"la')
@@ -196,7 +189,6 @@ _parts = st.lists(st.sampled_from((b"a", b"bb\n", b"\n", b"c\rd\n", b"x" * 70_00
 
 @given(parts=_parts)
 def test_every_complete_line_of_a_growing_file_is_found(parts: list[bytes]) -> None:
-    """Each refresh finds all complete lines and no partial one."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "lines"
         path.touch()
@@ -213,7 +205,6 @@ def test_every_complete_line_of_a_growing_file_is_found(parts: list[bytes]) -> N
 
 
 def test_a_replaced_or_truncated_file_is_read_again(tmp_path: Path) -> None:
-    """The index is rebuilt, as after `repair`."""
     path = tmp_path / "lines"
     path.write_bytes(b"one\ntwo\nthree\n")
     index = LineIndex(path)

@@ -23,7 +23,6 @@ class Seconds:
 
 
 def test_the_message_rate_allows_one_second_of_messages_at_once() -> None:
-    """The bucket holds one second of messages and refills over time."""
     clock = Seconds()
     rate = MessageRate(10.0, clock)
     assert [rate.spend() for _ in range(11)] == [True] * 10 + [False]
@@ -40,7 +39,6 @@ def drained(outbox: Outbox) -> list[object]:
 
 
 def test_the_outbox_keeps_only_the_newest_lease() -> None:
-    """A newer lease replaces a queued one."""
     outbox = Outbox()
     outbox.put(Lease(mine=True, holder="a"))
     outbox.put(Pong(token=1, now_ns=0))
@@ -49,7 +47,6 @@ def test_the_outbox_keeps_only_the_newest_lease() -> None:
 
 
 def test_the_outbox_keeps_the_newest_events() -> None:
-    """The newest 32 events are kept, in order."""
     outbox = Outbox()
     for number in range(1_000):
         outbox.put(Event(name="bump", text=str(number), at_ns=number))
@@ -57,7 +54,6 @@ def test_the_outbox_keeps_the_newest_events() -> None:
 
 
 def test_too_many_unread_answers_do_not_fit() -> None:
-    """A client with more than 256 unread answers is disconnected."""
     outbox = Outbox()
     for number in range(256):
         outbox.put(Pong(token=number, now_ns=0))
@@ -69,7 +65,6 @@ def test_too_many_unread_answers_do_not_fit() -> None:
 
 
 def test_an_observation_may_be_answered_up_to_its_age_limit() -> None:
-    """The limit is exact to the nanosecond."""
     sent = SentObservations(400)
     sent.add(1, 1_000)
     assert sent.refusal(1, 1_000 + 400 * MS) == ""
@@ -77,13 +72,11 @@ def test_an_observation_may_be_answered_up_to_its_age_limit() -> None:
 
 
 def test_an_observation_that_was_not_sent_cannot_be_answered() -> None:
-    """Observations sent to other clients do not count."""
     assert "not sent to this client" in SentObservations(400).refusal(0, 0)
 
 
 @given(gaps=st.lists(st.integers(0, 200 * MS), min_size=1, max_size=40), answers=st.integers(0, 45))
 def test_the_window_agrees_with_an_unbounded_list(gaps: list[int], answers: int) -> None:
-    """The bounded window refuses only observations that are too old or outside of it."""
     sent, times, now = SentObservations(400, window=8), dict[int, int](), 0
     for seq, gap in enumerate(gaps, start=1):
         now += gap

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
+from shapechanger.robot.daemon.control import NumberedFrame, StateReader, build_observation
 from tests.robot.daemon.plans import ACTIONS, STATE, guard_state
 
 READER = StateReader(STATE, ACTIONS)
@@ -30,7 +30,6 @@ def observation(**changes: Any) -> Any:
 
 
 def test_an_absent_quantity_is_nan() -> None:
-    """Absent quantities are NaN, not 0."""
     seen = observation(state=guard_state(applied=(0.1, 0.5)))
     assert seen.state[0] == 0.25
     assert math.isnan(seen.state[1])
@@ -39,7 +38,6 @@ def test_an_absent_quantity_is_nan() -> None:
 
 
 def test_without_a_state_of_the_guard_all_is_unknown() -> None:
-    """All values are NaN, and the robot does not count as armed."""
     seen = observation(state=None)
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
@@ -48,26 +46,22 @@ def test_without_a_state_of_the_guard_all_is_unknown() -> None:
 
 
 def test_a_frame_is_sent_once() -> None:
-    """A frame already sent is omitted, but keeps its number and time."""
     assert observation().frame == b"jpeg"
     again = observation(frame_sent=3)
     assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
 
 
 def test_a_client_may_decline_frames() -> None:
-    """The capture time of the newest frame is sent anyway."""
     seen = observation(frame_sent=None)
     assert (seen.frame, seen.captured_ns) == (None, 30)
 
 
 def test_without_a_camera_the_time_is_that_of_the_state() -> None:
-    """`captured_ns` is then the time of the state."""
     seen = observation(newest=None)
     assert (seen.frame, seen.frame_seq, seen.captured_ns) == (None, 0, 40)
 
 
 def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
-    """Its number could equal one of this client's."""
     state = guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39)
     own = observation(state=state, command_ns=38)
     assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)

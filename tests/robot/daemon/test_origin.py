@@ -26,5 +26,4 @@ from shapechanger.robot.daemon.server import origin_refusal
 def test_only_the_robots_own_page_may_connect(
     origin: str | None, host: str, is_open: bool, allowed: bool
 ) -> None:
-    """Other origins are refused, also after DNS rebinding."""
     assert (origin_refusal(origin, host, is_open=is_open) == "") == allowed

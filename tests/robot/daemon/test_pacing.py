@@ -37,7 +37,6 @@ STEPPED = car_plan(clock="twin", control_hz=20.0, tick_hz=100.0, arming="anyone"
 
 
 def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A command takes exactly one control period; other orders take one guard tick."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -60,7 +59,6 @@ def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_lockstep_waits_for_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The observation waits for the frame of its time, even if the camera is slow."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -80,7 +78,6 @@ def test_lockstep_waits_for_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An observer does not advance the time."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -98,8 +95,6 @@ def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.Monkey
 
 
 def test_lockstep_may_exceed_the_message_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In lockstep the robot sets the pace, so the rate limit does not apply."""
-
     async def script(robot: Running) -> None:
         async with robot.client(pace="lockstep") as client:
             for _ in range(1_000):
@@ -109,8 +104,6 @@ def test_lockstep_may_exceed_the_message_rate(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Acknowledgements do not accumulate, and frames in between are skipped."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             robot.show()
@@ -134,8 +127,6 @@ def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPa
 def test_without_frames_observations_are_sent_once_a_period(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Asking faster does not help."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             first = await client.observe()
@@ -147,8 +138,6 @@ def test_without_frames_observations_are_sent_once_a_period(
 
 
 def test_a_frozen_camera_keeps_its_capture_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Guard and client see the age of the last new frame."""
-
     async def script(robot: Running) -> None:
         robot.show()
         async with robot.client(role="person") as client:

@@ -12,7 +12,6 @@ from tests.robot.daemon.plans import car_plan
 
 
 def test_a_plan_round_trips() -> None:
-    """All fields survive JSON."""
     plan = car_plan(reward={"speed": 1.0}, reset=(((0.0, -0.3), 1.5), ((0.0, 0.0), 0.5)))
     assert DaemonPlan.from_dict(json.loads(json.dumps(plan.to_dict()))) == plan
 
@@ -30,7 +29,6 @@ def test_a_plan_round_trips() -> None:
     ],
 )
 def test_an_invalid_field_is_named(change: dict[str, object], words: str) -> None:
-    """The error names the field."""
     fields = car_plan().to_dict()
     name = next(iter(change))
     (fields["card"] if name in fields["card"] else fields).update(change)

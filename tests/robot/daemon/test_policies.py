@@ -68,8 +68,6 @@ def _play(
 
 
 def test_a_policy_starts_with_the_robot(folder: Path) -> None:
-    """It gets the robot's address and fingerprint, and its notes are told to all."""
-
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         await until(lambda: said and said[-1].text == "it drives", "it drives")
         assert [each.running for each in said] == ["student"] * len(said)
@@ -84,8 +82,6 @@ def test_a_policy_starts_with_the_robot(folder: Path) -> None:
 
 
 def test_another_policy_takes_the_place(folder: Path) -> None:
-    """The first one ends before the second starts; "" ends that."""
-
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.run("student") == ""
         await until(lambda: said and said[-1].text == "it drives", "the first drives")
@@ -108,8 +104,6 @@ def test_another_policy_takes_the_place(folder: Path) -> None:
     ],
 )
 def test_a_policy_that_ends_is_reported(folder: Path, name: str, words: str) -> None:
-    """With its reason; another one can start."""
-
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.run(name) == ""
         await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
@@ -121,7 +115,6 @@ def test_a_policy_that_ends_is_reported(folder: Path, name: str, words: str) -> 
 
 
 def test_a_deaf_policy_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that does not follow the end of its input."""
     monkeypatch.setattr(policies, "_END_S", 0.05)
 
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
@@ -134,8 +127,6 @@ def test_a_deaf_policy_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_an_unknown_policy_is_refused(folder: Path) -> None:
-    """The nearest name is suggested, and nothing starts."""
-
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert "Did you mean 'student'?" in one.run("studnt")
         assert one.run("../student") != ""
@@ -145,8 +136,6 @@ def test_an_unknown_policy_is_refused(folder: Path) -> None:
 
 
 def test_a_robot_without_policies_refuses() -> None:
-    """The refusal says how to serve it with one."""
-
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert "--policy" in one.run("student")
         assert one.state() == PolicyState(names=())
@@ -155,8 +144,6 @@ def test_a_robot_without_policies_refuses() -> None:
 
 
 def test_a_folder_that_is_gone_has_no_policies(tmp_path: Path) -> None:
-    """The robot is served all the same."""
-
     async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.state().names == ()
 
@@ -165,8 +152,6 @@ def test_a_folder_that_is_gone_has_no_policies(tmp_path: Path) -> None:
 
 @pytest.mark.realtime
 def test_only_a_person_starts_a_policy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each new client is told which there are; programs are refused."""
-
     async def script() -> None:
         async with running(car_plan(policies=str(folder)), monkeypatch) as robot:
             async with robot.client(role="program") as program:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.daemon.pre_auth import PreAuthConnections
+from shapechanger.robot.daemon.server import PreAuthConnections
 
 pytestmark = pytest.mark.realtime
 
@@ -28,8 +28,6 @@ class Fake:
 
 
 def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
-    """Connections of other addresses stay."""
-
     async def play() -> None:
         connections = PreAuthConnections(max_total=10, max_per_address=2)
         other, crowd = Fake("a"), [Fake("b") for _ in range(5)]
@@ -42,8 +40,6 @@ def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
 
 
 def test_a_full_set_drops_from_the_most_crowded_address() -> None:
-    """One address cannot displace connections of others."""
-
     async def play() -> None:
         connections = PreAuthConnections(max_total=4, max_per_address=4)
         crowd, other = [Fake("b") for _ in range(4)], Fake("a")
@@ -58,8 +54,6 @@ def test_a_full_set_drops_from_the_most_crowded_address() -> None:
 
 
 def test_a_served_request_restarts_the_timeout() -> None:
-    """A browser loads the console with many requests over the same sockets."""
-
     async def play() -> None:
         connections = PreAuthConnections(max_total=2, max_per_address=2, timeout_s=0.05)
         page, silent = Fake("a"), Fake("a")
@@ -82,8 +76,6 @@ def test_a_served_request_restarts_the_timeout() -> None:
 
 
 def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
-    """Connections that opened the link, authenticated or ended are exempt."""
-
     async def play() -> None:
         connections = PreAuthConnections(timeout_s=0.01)
         silent, asks, known = Fake("a"), Fake("a"), Fake("a")
@@ -109,8 +101,6 @@ def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
 def test_a_new_connection_always_fits_and_the_limits_hold(
     arrivals: list[tuple[str, bool]], max_total: int, max_per_address: int
 ) -> None:
-    """A new connection stays at least until the next one, and closed ones do not count."""
-
     async def play() -> None:
         connections = PreAuthConnections(max_total, max_per_address)
         sockets: list[Fake] = []

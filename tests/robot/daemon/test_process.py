@@ -95,7 +95,6 @@ def started(begun: Started) -> Started:
 
 
 def test_it_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> None:
-    """SIGTERM ends it with status 0, and the guard sees the socket close."""
     assert started.heart.recv(16) == b"."
     with socket.create_connection(("127.0.0.1", started.port), 20.0):
         pass
@@ -108,7 +107,6 @@ def test_it_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> No
 
 
 def test_the_lifeline_ends_when_it_is_killed(started: Started) -> None:
-    """The pipe closes when the daemon dies, and not before."""
     poll = select.poll()
     poll.register(started.life, select.POLLIN)
     assert poll.poll(50) == []
@@ -117,7 +115,6 @@ def test_the_lifeline_ends_when_it_is_killed(started: Started) -> None:
 
 
 def test_the_lifeline_thread_holds_no_other_file(started: Started) -> None:
-    """A connection closed by the daemon is really closed."""
     with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
         client.sendall(b"this is no request\r\n\r\n")
         while client.recv(4096):  # Until its end.
@@ -128,7 +125,6 @@ def test_the_lifeline_thread_holds_no_other_file(started: Started) -> None:
 
 
 def test_sending_the_lifeline_to_a_closed_socket_raises_nothing() -> None:
-    """The reader of the socket reports the loss."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.close()
     with theirs:
@@ -136,7 +132,6 @@ def test_sending_the_lifeline_to_a_closed_socket_raises_nothing() -> None:
 
 
 def test_no_client_connects_before_the_first_state(begun: Started) -> None:
-    """Without a state, the outputs are unknown, so the daemon does not listen."""
     assert begun.heart.recv(16) == b"."  # The daemon is running.
     begun.guard.close()
     status, log = begun.ended()
@@ -146,7 +141,6 @@ def test_no_client_connects_before_the_first_state(begun: Started) -> None:
 
 
 def test_the_daemon_exits_when_the_guard_is_lost(started: Started) -> None:
-    """The supervisor then restarts both."""
     started.guard.close()
     status, log = started.ended()
     assert status == 1
@@ -154,7 +148,6 @@ def test_the_daemon_exits_when_the_guard_is_lost(started: Started) -> None:
 
 
 def test_the_daemon_exits_when_the_supervisor_is_lost(started: Started) -> None:
-    """Without a supervisor, no process could stop the guard."""
     started.heart.close()
     status, log = started.ended()
     assert status == 1
@@ -162,7 +155,6 @@ def test_the_daemon_exits_when_the_supervisor_is_lost(started: Started) -> None:
 
 
 def test_a_closed_log_does_not_end_the_daemon(started: Started) -> None:
-    """The daemon continues to serve when standard error fails."""
     assert started.process.stderr is not None
     started.process.stderr.close()
     for _ in range(20):

@@ -24,8 +24,7 @@ from shapechanger.demos.episodes import (
     writer,
 )
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.control import ClientIdentity
-from shapechanger.robot.daemon.observation import NumberedFrame
+from shapechanger.robot.daemon.control import ClientIdentity, NumberedFrame
 from shapechanger.robot.daemon.recorder import (
     DISK_TOO_SLOW,
     EpisodeThread,
@@ -49,7 +48,6 @@ def step(number: int) -> tuple[Step, bytes]:
 
 
 def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
-    """Steps, marks and undo are applied in order, and the outcome is stored."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
     thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report))
@@ -73,7 +71,6 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
 def test_a_full_episode_goes_on_in_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every step is in one of the episodes, each with its picture, and marks hit the newest."""
     monkeypatch.setattr(writer, "FULL_BYTES", 2000)
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
@@ -101,7 +98,6 @@ def test_a_full_episode_goes_on_in_the_next(
 
 @pytest.mark.parametrize("bytes_each", [0, 1 << 20])
 def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_each: int) -> None:
-    """Queued steps and bytes are bounded; the disk is simulated as busy."""
     busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
     thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report), after=busy)
@@ -119,7 +115,6 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_
 
 
 def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
-    """It is reported once, and the episode does not start."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
     thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *report: reports.append(report))
@@ -146,7 +141,6 @@ while True:
 
 
 def test_an_episode_of_a_killed_daemon_can_be_repaired(tmp_path: Path) -> None:
-    """After SIGKILL at random moments, all reported steps are on the disk."""
     rng = random.Random(5)
     for number in range(2):
         folder = tmp_path / str(number)
@@ -221,7 +215,6 @@ def built() -> Built:
 
 
 def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
-    """The step gets applied outputs and stop reason from the next observation."""
     built.builder.observed(1, seen(1, 100, suggested=(0.9,)), frame(1))
     built.builder.decided(ADA, 1, (0.5,), 110)
     assert built.written == []
@@ -235,7 +228,6 @@ def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
 
 
 def test_the_later_of_two_decisions_counts(built: Built) -> None:
-    """A second command in answer to the same observation replaces the first."""
     built.builder.observed(1, seen(1, 100), None)
     built.builder.decided(ADA, 1, (0.5,), 110)
     built.builder.decided(ADA, 1, (0.0,), 115)
@@ -245,7 +237,6 @@ def test_the_later_of_two_decisions_counts(built: Built) -> None:
 
 
 def test_a_command_for_an_unknown_observation_is_skipped(built: Built) -> None:
-    """Commands that answer earlier observations or those of others are not recorded."""
     built.builder.observed(1, seen(1, 100), None)
     for who, answers in ((ADA, 2), (NET, 1)):
         built.builder.decided(who, answers, (0.5,), 110)
@@ -256,7 +247,6 @@ def test_a_command_for_an_unknown_observation_is_skipped(built: Built) -> None:
 
 
 def test_a_client_without_control_does_not_complete_applied_outputs(built: Built) -> None:
-    """Its step has no applied outputs, since those follow another client."""
     built.builder.observed(2, seen(1, 100), None)
     built.builder.decided(NET, 1, (0.5,), 110)
     built.builder.observed(2, seen(2, 120, mine=False), None)
@@ -272,7 +262,6 @@ def test_a_client_without_control_does_not_complete_applied_outputs(built: Built
 def test_times_increase_and_no_frame_repeats(
     events: list[tuple[bool, ClientIdentity, int]],
 ) -> None:
-    """Holds for any order of observations and commands."""
     built = Built()
     newest = {ADA.session: 0, NET.session: 0}
     for now_ns, (looks, who, back) in enumerate(events):

@@ -85,7 +85,6 @@ def only(folder: Path) -> Path:
 
 
 def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) -> None:
-    """Each step has the frame, the applied outputs and the robot's times."""
     seen: list[Observation] = []
 
     async def script(robot: Running) -> None:
@@ -127,8 +126,6 @@ def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) 
 
 
 def test_no_step_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
-    """The episode of a disarmed robot has no steps."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
             await person.obtain()
@@ -141,8 +138,6 @@ def test_no_step_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
 
 
 def test_an_episode_continues_after_a_change_of_control(play: Any, tmp_path: Path) -> None:
-    """Each step has its driver, and the program's suggestion while a person drives."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client(name="net") as program:
             await program.obtain()
@@ -167,8 +162,6 @@ def test_an_episode_continues_after_a_change_of_control(play: Any, tmp_path: Pat
 
 
 def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
-    """Dropped steps stay on the disk; undo without steps is refused."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
             await robot.armed(person)
@@ -191,8 +184,6 @@ def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
 
 
 def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
-    """Programs can only read recordings."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as program:
             for request in (
@@ -212,8 +203,6 @@ def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
 
 
 def test_a_robot_without_a_folder_does_not_record(play: Any) -> None:
-    """Its welcome reports this, and it refuses requests."""
-
     async def script(robot: Running) -> None:
         async with robot.connect() as person:
             assert (await person.greet(role="person")).can_record is False
@@ -225,7 +214,6 @@ def test_a_robot_without_a_folder_does_not_record(play: Any) -> None:
 
 
 def test_recording_is_refused_if_the_disk_fails(play: Any, tmp_path: Path) -> None:
-    """The person gets the reason, and all clients the state."""
     (tmp_path / "kept").write_text("in the way")
 
     async def script(robot: Running) -> None:
@@ -239,8 +227,6 @@ def test_recording_is_refused_if_the_disk_fails(play: Any, tmp_path: Path) -> No
 
 
 def test_a_failing_disk_ends_the_recording_and_not_the_drive(play: Any, tmp_path: Path) -> None:
-    """After the folder disappears, driving continues and a new recording can start."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
             await robot.armed(person)
@@ -265,7 +251,6 @@ def test_a_failing_disk_ends_the_recording_and_not_the_drive(play: Any, tmp_path
 
 
 def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None:
-    """This holds for two clients of one robot and for two robots."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
 
     async def script(robot: Running) -> None:
@@ -282,8 +267,6 @@ def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None
 
 
 def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -> None:
-    """Other clients are informed."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as program:
             async with robot.client(role="person") as one:
@@ -301,8 +284,6 @@ def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -
 
 
 def test_the_state_is_broadcast_each_second(play: Any) -> None:
-    """All clients get the number of steps."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client() as program:
             await robot.armed(person)
@@ -319,8 +300,6 @@ def test_the_state_is_broadcast_each_second(play: Any) -> None:
 def test_the_episode_is_closed_when_the_daemon_ends(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The episode is closed as if a person had stopped it."""
-
     async def run() -> None:
         async with (
             running(car_plan(recordings=str(tmp_path)), monkeypatch) as robot,
@@ -339,7 +318,6 @@ def test_the_episode_is_closed_when_the_daemon_ends(
 
 
 def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) -> None:
-    """Lines and frames match the disk, and judged steps are excluded."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(30):
@@ -382,7 +360,6 @@ def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) 
 
 
 def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> None:
-    """A second request is refused, since answers are large."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(200):
@@ -406,7 +383,6 @@ def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> N
 
 
 def test_a_client_that_only_listens_gets_all_events(play: Any, tmp_path: Path) -> None:
-    """Events are flushed without further messages, over TLS too."""
     made = make_credentials(tmp_path / "credentials", "test car")
     secured = {"certificate": str(made.certificate), "private_key": str(made.private_key)}
 

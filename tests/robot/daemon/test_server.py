@@ -17,7 +17,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.daemon import connection, server
 from shapechanger.robot.daemon.credentials import make_credentials, read_key
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.pre_auth import PreAuthConnections
+from shapechanger.robot.daemon.server import PreAuthConnections
 from shapechanger.robot.link.authentication import make_proof
 from shapechanger.robot.link.messages import (
     MAX_CLIENT_MESSAGE,
@@ -74,7 +74,6 @@ def secured(tmp_path: Path) -> tuple[DaemonPlan, bytes]:
 
 
 def test_a_client_with_the_key_is_welcomed(play: Any, secured: tuple[DaemonPlan, bytes]) -> None:
-    """The connection uses TLS 1.3, and the welcome describes the robot."""
     plan, key = secured
 
     async def script(robot: Running) -> None:
@@ -91,7 +90,6 @@ def test_a_client_with_the_key_is_welcomed(play: Any, secured: tuple[DaemonPlan,
 def test_a_wrong_key_is_refused_slowly(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each wrong key is delayed; the right key is accepted at once from the same address."""
     plan, key = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.05)
 
@@ -118,7 +116,6 @@ def test_a_wrong_key_is_refused_slowly(
 def test_a_proof_for_another_challenge_is_refused(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, spoiled: str
 ) -> None:
-    """Proofs are bound to nonce, certificate and role."""
     plan, key = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.0)
 
@@ -136,8 +133,6 @@ def test_a_proof_for_another_challenge_is_refused(
 
 
 def test_another_version_is_refused_with_both_numbers(play: Any) -> None:
-    """The error gives both versions."""
-
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
             await client.send(Hello(version=VERSION + 1, proof=b""))
@@ -200,8 +195,6 @@ async def _pong_flood(client: Client) -> None:
 def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
     play: Any, misbehave: Callable[[Client], Awaitable[None]], words: str
 ) -> None:
-    """The client gets the reason, and the robot is disarmed."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
@@ -215,8 +208,6 @@ def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
 
 
 def test_a_huge_message_ends_the_connection_early(play: Any) -> None:
-    """A message of 100 MB is not buffered."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             with contextlib.suppress(ConnectionError, aiohttp.ClientError):
@@ -231,7 +222,6 @@ def test_a_huge_message_ends_the_connection_early(play: Any) -> None:
 def test_a_client_without_a_hello_is_disconnected(
     play: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The hello has a timeout."""
     monkeypatch.setattr(connection, "HELLO_TIMEOUT_S", 0.05)
 
     async def script(robot: Running) -> None:
@@ -276,8 +266,6 @@ def test_connections_are_limited_before_and_after_authentication(play: Any) -> N
 
 
 def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
-    """All clients are told of the holder, and commands of the previous holder are refused."""
-
     async def script(robot: Running) -> None:
         async with (
             robot.client(name="sac") as sac,
@@ -302,8 +290,6 @@ def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
 
 
 def test_invalid_commands_do_not_reach_the_guard(play: Any) -> None:
-    """Repeated, out of order, unanswerable, of the wrong length, or not finite."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
@@ -326,8 +312,6 @@ def test_invalid_commands_do_not_reach_the_guard(play: Any) -> None:
 
 
 def test_an_invalid_command_ends_the_command_before_it(play: Any) -> None:
-    """The previous command ends at once; the robot stays armed."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
@@ -342,7 +326,6 @@ def test_an_invalid_command_ends_the_command_before_it(play: Any) -> None:
 
 
 def test_an_old_or_foreign_invalid_command_changes_nothing(play: Any) -> None:
-    """The newer command stays in force."""
     nan = float("nan")
 
     async def script(robot: Running) -> None:
@@ -358,8 +341,6 @@ def test_an_old_or_foreign_invalid_command_changes_nothing(play: Any) -> None:
 
 
 def test_a_late_request_to_arm_is_refused(play: Any) -> None:
-    """Requests that answer an old or unsent observation are refused."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await client.take()
@@ -377,8 +358,6 @@ def test_a_late_request_to_arm_is_refused(play: Any) -> None:
 
 
 def test_a_person_takes_over_an_armed_robot(play: Any) -> None:
-    """The robot halts and stays armed, since the person may have to steer at once."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as sac, robot.client(role="person") as ann:
             await robot.armed(sac)
@@ -395,7 +374,6 @@ def test_a_person_takes_over_an_armed_robot(play: Any) -> None:
 def test_a_hundred_silent_connections_keep_no_client_out(
     play: Any, secured: tuple[DaemonPlan, bytes], what: str
 ) -> None:
-    """Another client of the same address can still connect and stop the robot."""
     plan, key = secured
 
     async def script(robot: Running) -> None:
@@ -425,7 +403,6 @@ def test_a_hundred_silent_connections_keep_no_client_out(
 def test_a_connection_without_a_request_is_dropped(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, secure: bool
 ) -> None:
-    """Applies during and after the TLS handshake; authenticated clients stay."""
     plan, key = secured if secure else (car_plan(), b"")
     monkeypatch.setattr(server, "PreAuthConnections", lambda: PreAuthConnections(timeout_s=0.2))
 
@@ -449,8 +426,6 @@ def test_a_connection_without_a_request_is_dropped(
 
 
 def test_a_command_in_answer_to_an_old_observation_is_refused(play: Any) -> None:
-    """The age of the observation counts, not that of the command."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
@@ -464,8 +439,6 @@ def test_a_command_in_answer_to_an_old_observation_is_refused(play: Any) -> None
 
 
 def test_the_scale_multiplies_the_values(play: Any) -> None:
-    """The capture time of the frame is passed on."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
@@ -486,8 +459,6 @@ def test_the_scale_multiplies_the_values(play: Any) -> None:
 
 @pytest.mark.parametrize("how", ["release", "close", "abort"])
 def test_leaving_disarms_the_robot(play: Any, how: str) -> None:
-    """Release, close and abort all disarm."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person", name="Ann") as client:
             await robot.armed(client)
@@ -504,8 +475,6 @@ def test_leaving_disarms_the_robot(play: Any, how: str) -> None:
 
 
 def test_an_observer_that_leaves_stops_nothing(play: Any) -> None:
-    """Only the departure of the client in control disarms."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as driver:
             await robot.armed(driver)
@@ -518,8 +487,6 @@ def test_an_observer_that_leaves_stops_nothing(play: Any) -> None:
 
 
 def test_any_client_can_stop_the_robot_and_only_a_person_can_rearm(play: Any) -> None:
-    """Control is not needed to stop; all clients get the reason."""
-
     async def script(robot: Running) -> None:
         async with (
             robot.client(role="person", name="Ann") as ann,
@@ -545,8 +512,6 @@ def test_any_client_can_stop_the_robot_and_only_a_person_can_rearm(play: Any) ->
 
 @pytest.mark.parametrize("arming", ["person", "anyone"])
 def test_clients_that_may_arm(play: Any, arming: str) -> None:
-    """A program may arm only if the profile permits it, and only with control."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as one, robot.client() as two:
             await robot.arm(one)
@@ -574,8 +539,6 @@ def test_clients_that_may_arm(play: Any, arming: str) -> None:
 
 
 def test_a_refusal_of_the_guard_is_passed_on(play: Any) -> None:
-    """The client in control gets the reason and the number of its command."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             await client.take()
@@ -587,8 +550,6 @@ def test_a_refusal_of_the_guard_is_passed_on(play: Any) -> None:
 
 
 def test_a_ping_is_answered_with_the_time(play: Any) -> None:
-    """The pong has the ping's token and the robot's time."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             before = robot.clock.now_ns()
@@ -601,7 +562,6 @@ def test_a_ping_is_answered_with_the_time(play: Any) -> None:
 
 
 def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Meanwhile other clients are not delayed."""
     patience_s = 3.0
     monkeypatch.setattr(connection, "_SEND_S", patience_s)
 
@@ -636,8 +596,6 @@ def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.M
 
 
 def test_the_console_reveals_only_the_robots_name(play: Any) -> None:
-    """Security headers are set on every page."""
-
     async def script(robot: Running) -> None:
         async with robot.session.get(robot.url) as page:
             assert page.content_type == "text/html"
@@ -662,8 +620,6 @@ def test_the_console_reveals_only_the_robots_name(play: Any) -> None:
 
 
 def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
-    """WebSocket requests from another origin are refused."""
-
     async def script(robot: Running) -> None:
         with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
             async with robot.connect(origin="http://evil.example"):
@@ -675,8 +631,6 @@ def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
 
 
 def test_a_port_in_use_is_an_error(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error gives the likely reason."""
-
     async def script(robot: Running) -> None:
         with pytest.raises(RobotError, match="served already"):
             async with running(car_plan(port=robot.port), monkeypatch):
@@ -686,8 +640,6 @@ def test_a_port_in_use_is_an_error(play: Any, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_the_daemon_exits_when_the_guard_is_lost(play: Any) -> None:
-    """Connections are closed."""
-
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             robot.guard.close()
@@ -699,8 +651,6 @@ def test_the_daemon_exits_when_the_guard_is_lost(play: Any) -> None:
 
 
 def test_taking_control_twice_makes_no_new_lease(play: Any) -> None:
-    """Commands in flight stay valid."""
-
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)

@@ -23,7 +23,6 @@ def ends() -> Iterator[tuple[DaemonChannel, socket.socket]]:
 
 
 def test_a_closed_socket_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.socket]) -> None:
-    """Orders sent before the socket closed are still read."""
     channel, daemon = ends
     daemon.send(encode(Order(kind="halt")))
     daemon.close()
@@ -32,7 +31,6 @@ def test_a_closed_socket_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.s
 
 
 def test_a_closed_life_pipe_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.socket]) -> None:
-    """The pipe is polled like the socket, and its end counts although the socket is open."""
     channel, daemon = ends
     watched, held = os.pipe()
     assert len(channel.filenos()) == 1
@@ -47,7 +45,6 @@ def test_a_closed_life_pipe_means_a_lost_daemon(ends: tuple[DaemonChannel, socke
 
 
 def test_a_second_life_pipe_is_closed(ends: tuple[DaemonChannel, socket.socket]) -> None:
-    """Further descriptors are closed, so that they cannot accumulate."""
     channel, daemon = ends
     pipes = [os.pipe() for _ in range(2)]
     for watched, _ in pipes:

@@ -39,14 +39,12 @@ _SLOW = "Output steer: it turns no faster than its profile allows."
 def test_an_action_is_estimated_from_its_output(
     has: tuple[float, float], actions: tuple[float, float], reason: str
 ) -> None:
-    """Rounding of pulses makes no difference; a controller at neutral is at rest."""
     done = ActionEstimator(_CAR).estimate((0.5, -0.4), (-0.4, -0.05), has)
     assert done.actions == pytest.approx(actions)
     assert done.reason == reason
 
 
 def test_mixed_outputs_show_rest_only() -> None:
-    """Two tracks at rest give actions at rest; one track alone gives no estimate."""
     estimator = ActionEstimator(_TANK)
     assert estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
     one = estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
@@ -55,7 +53,6 @@ def test_mixed_outputs_show_rest_only() -> None:
 
 
 def test_an_action_with_two_outputs_is_active_while_one_moves() -> None:
-    """A second propeller whose controller still waits does not hide the first."""
     boat = GuardPlan(
         "boat",
         (ActionPlan("throttle", propels=True),),

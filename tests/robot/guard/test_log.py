@@ -29,7 +29,6 @@ def _emit(lines: logging.Handler, words: str) -> None:
 def test_a_full_pipe_drops_lines(
     pipe: tuple[int, int],
 ) -> None:
-    """Lost lines are counted, and the flags of the shared descriptor do not change."""
     read, write = pipe
     flags = fcntl.fcntl(write, fcntl.F_GETFL)
     lines = _Lines(write)
@@ -46,7 +45,6 @@ def test_a_full_pipe_drops_lines(
 
 
 def test_a_line_is_cut_to_the_size_of_a_pipe(pipe: tuple[int, int]) -> None:
-    """Longer lines would block; characters that cannot be encoded are escaped."""
     read, write = pipe
     _emit(_Lines(write), "\ud800" * 10_000)
     data = os.read(read, 1 << 16)
@@ -78,7 +76,6 @@ class _Unprintable:
 def test_a_line_that_cannot_be_formatted_is_replaced(
     pipe: tuple[int, int], words: str, args: tuple[object, ...], error: str
 ) -> None:
-    """The line names its place and the error, and the guard goes on."""
     read, write = pipe
     record = logging.LogRecord("robot", logging.INFO, "/x/rules.py", 7, words, args, None)
     _Lines(write).handle(record)
@@ -113,7 +110,6 @@ def _broken(kind: str, folder: Path) -> Iterator[int]:
 
 @pytest.mark.parametrize("kind", ["no reader", "closed", "read-only", "full disk"])
 def test_a_log_that_cannot_be_written_raises_nothing(kind: str, tmp_path: Path) -> None:
-    """Lines are lost and counted, whatever becomes of the descriptor, and of any text."""
     with _broken(kind, tmp_path) as fd:
         lines = _Lines(fd)
         for words in ("Hello.", "\ud800", "\0", "a\nb", "x" * 100_000):
@@ -122,7 +118,6 @@ def test_a_log_that_cannot_be_written_raises_nothing(kind: str, tmp_path: Path) 
 
 
 def test_a_descriptor_that_closes_later_raises_nothing() -> None:
-    """Nothing tells the log that its descriptor is closed."""
     read, write = os.pipe()
     lines = _Lines(write)
     os.close(write)

@@ -22,7 +22,6 @@ from shapechanger.robot.guard.sensors import merge
 def test_the_order_of_sensors_does_not_matter(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
-    """A pressed bumper overrides a free one and a near obstacle a far one, in either order."""
     for pair in itertools.permutations(zip(values, ("one", "two"), strict=True)):
         quantities: dict[str, float] = {}
         sources: dict[str, str] = {}
@@ -33,7 +32,6 @@ def test_the_order_of_sensors_does_not_matter(
 
 
 def test_the_last_reading_of_other_quantities_counts() -> None:
-    """The value and the source of the last sensor are kept."""
     quantities = {"yaw_rate": 1.0}
     sources = {"yaw_rate": "one"}
     merge(quantities, sources, {"yaw_rate": 0.5}, "two")

@@ -17,13 +17,11 @@ _PLAN = GuardPlan(
 
 
 def test_an_output_is_its_offset_plus_its_weighted_actions() -> None:
-    """The result is clipped to the output's range."""
     assert output_values(_PLAN, [0.25, 0.5]) == (0.75, 0.5)
     assert output_values(_PLAN, [1.0, 1.0]) == (1.0, 0.25)
 
 
 @pytest.mark.parametrize("actions", [[], [0.5], [0.0, 0.5, 0.0]])
 def test_a_wrong_number_of_actions_is_refused(actions: list[float]) -> None:
-    """The error names the actions."""
     with pytest.raises(ValueError, match=r"tank has 2 actions \(steering, throttle\), got "):
         output_values(_PLAN, actions)

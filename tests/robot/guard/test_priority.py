@@ -15,7 +15,6 @@ from shapechanger.robot.guard.priority import run_normally
 def test_a_child_runs_normally(
     before: int, after: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A priority above normal is lowered; no other needs a permission."""
     changes: list[int] = []
     monkeypatch.setattr(os, "getpriority", lambda *_: before)
     monkeypatch.setattr(os, "setpriority", lambda _kind, _pid, value: changes.append(value))
@@ -24,7 +23,6 @@ def test_a_child_runs_normally(
 
 
 def test_a_child_that_has_ended() -> None:
-    """Is left alone."""
     with subprocess.Popen([sys.executable, "-c", ""]) as child:
         child.wait()
     run_normally(child.pid)

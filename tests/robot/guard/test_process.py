@@ -122,7 +122,6 @@ _Make = Callable[..., _Bench]
 
 
 def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
-    """A command acts on arrival and ends at its deadline, not at the next tick."""
     bench = make(_plan())
     duties: dict[int, float] = {}
     _drives(bench)
@@ -139,12 +138,10 @@ def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> 
 
 
 def test_the_drive_is_written_before_the_steering(make: _Make) -> None:
-    """Propelling outputs come first, so that a slow servo bus cannot delay a stop."""
     assert list(make(_plan()).run(10).outputs) == ["drive", "steer"]
 
 
 def test_states_are_sent_on_change_and_at_50_hz(make: _Make) -> None:
-    """A state is sent on each change, and at least every 20 ms."""
     bench = make(_plan())
     _drives(bench)
     bench.run(100)
@@ -155,7 +152,6 @@ def test_states_are_sent_on_change_and_at_50_hz(make: _Make) -> None:
 
 
 def test_a_refusal_is_sent_once(make: _Make) -> None:
-    """One state carries the refusal and the number of its command."""
     bench = make(_plan())
     bench.clock.at(5, lambda: bench.send(command(7, _T0)))
     bench.run(50)
@@ -164,7 +160,6 @@ def test_a_refusal_is_sent_once(make: _Make) -> None:
 
 
 def test_garbage_is_refused(make: _Make) -> None:
-    """Malformed and oversized datagrams are reported as refused."""
     bench = make(_plan())
     bench.clock.at(5, lambda: bench.daemon.send(b"\xff{"))
     bench.clock.at(6, lambda: bench.daemon.send(b"[" * 20_000))
@@ -173,7 +168,6 @@ def test_garbage_is_refused(make: _Make) -> None:
 
 
 def test_a_full_socket_drops_states_and_does_not_stop_the_guard(make: _Make) -> None:
-    """The guard does not block on a daemon that stopped reading."""
     bench = make(_plan())
     bench.daemon.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
     bench.clock.at(20_000, lambda: bench.send(arm(bench.clock.time_ns)))
@@ -182,7 +176,6 @@ def test_a_full_socket_drops_states_and_does_not_stop_the_guard(make: _Make) -> 
 
 
 def test_the_enable_pin_is_toggled_at_every_tick(make: _Make) -> None:
-    """Edges drive the motors' one-shot, and the pin is low after `close`."""
     bench = make(_plan(enable_pin=5))
     pin = bench.factory.pin(5)
     bench.clock.at(1, pin.clear_states)
@@ -193,7 +186,6 @@ def test_the_enable_pin_is_toggled_at_every_tick(make: _Make) -> None:
 
 
 def test_the_button_is_an_emergency_stop(make: _Make) -> None:
-    """A low button pin stops the robot, and refuses arming while pressed."""
     bench = make(_plan(stop_pin=6))
     _drives(bench)
     bench.clock.at(45, lambda: bench.factory.pin(6).drive_low())
@@ -205,7 +197,6 @@ def test_the_button_is_an_emergency_stop(make: _Make) -> None:
 
 
 def test_a_lost_daemon_disarms(make: _Make) -> None:
-    """When the daemon's socket closes, the drive rests at once."""
     bench = make(_plan())
     _drives(bench)
     duties: list[float] = []
@@ -218,7 +209,6 @@ def test_a_lost_daemon_disarms(make: _Make) -> None:
 
 
 def test_a_daemon_that_exits_with_unread_states_is_lost(make: _Make) -> None:
-    """The kernel then reports a reset instead of an end of file."""
     bench = make(_plan())
     _drives(bench)
     bench.clock.at(15, bench.daemon.close)
@@ -228,7 +218,6 @@ def test_a_daemon_that_exits_with_unread_states_is_lost(make: _Make) -> None:
 
 
 def test_a_lost_supervisor_ends_the_guard(make: _Make) -> None:
-    """The guard exits when its supervisor does, since its own death would go unnoticed."""
     bench = make(_plan())
     bench.clock.at(15, bench.supervisor.close)
     bench.guard.run(bench.heartbeat)
@@ -236,7 +225,6 @@ def test_a_lost_supervisor_ends_the_guard(make: _Make) -> None:
 
 
 def test_the_guard_sends_heartbeats(make: _Make) -> None:
-    """Heartbeats are sent in every round, and an unread socket does not stop the guard."""
     bench = make(_plan())
     bench.run(10_000)
     assert len(bench.supervisor.recv(1 << 20)) > 100
@@ -245,7 +233,6 @@ def test_the_guard_sends_heartbeats(make: _Make) -> None:
 def test_a_failed_output_stops_all_until_rearmed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While an output fails, the enable pin is not toggled and arming fails."""
     bench = make(_plan(enable_pin=5))
     _drives(bench)
     drive, steer = (driver for _, driver in bench.guard._outputs._drivers)
@@ -275,7 +262,6 @@ def test_a_failed_output_stops_all_until_rearmed(
 
 
 def test_outputs_are_released_once_per_stop(make: _Make) -> None:
-    """Outputs are released at the start and once at each stop."""
     plan = _plan()
     bench = make(replace(plan, stop=replace(plan.stop, then="release")))
     released: list[str] = []
@@ -291,7 +277,6 @@ def test_outputs_are_released_once_per_stop(make: _Make) -> None:
 
 
 def test_a_restart_after_a_failure_starts_in_emergency_stop(make: _Make) -> None:
-    """Only a person can clear the emergency stop."""
     bench = make(_plan(), after_failure=True)
     bench.clock.at(1, lambda: bench.send(arm(_T0, 1, person=False), command(1, _T0)))
     state = bench.run(20)
@@ -305,7 +290,6 @@ def test_a_restart_after_a_failure_starts_in_emergency_stop(make: _Make) -> None
 
 
 def test_an_invalid_order_ends_the_previous_command(make: _Make) -> None:
-    """The previous command ends at once, not at its deadline."""
     bench = make(_plan())
     _drives(bench)
     duties: list[float] = []
@@ -321,7 +305,6 @@ def test_an_invalid_order_ends_the_previous_command(make: _Make) -> None:
 def test_a_controller_that_does_not_follow_yet_is_reported(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The applied action is what the outputs do, with the reason for the difference."""
     plan = _plan()
     bench = make(plan)
     drive = bench.guard._outputs._drivers[0][1]
@@ -353,7 +336,6 @@ class _Sensor:
 def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Errors and non-finite values of a protective sensor stop the robot."""
     sensor = _Sensor()
     monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: sensor)
     bench = make(_plan(sensors=(SensorPlan("bumper", "switch", "bump"),)))
@@ -407,7 +389,6 @@ def _with(
 
 
 def test_no_stop_waits_for_a_sensor(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At its deadline the drive rests before sensors are read, and reading time counts."""
     sensor = _SlowSensor(takes_ms=15)
     bench = _with(make, monkeypatch, {"wheel": sensor}, "speed")
     _drives(bench)
@@ -423,7 +404,6 @@ def test_no_stop_waits_for_a_sensor(make: _Make, monkeypatch: pytest.MonkeyPatch
 def test_a_sensor_that_is_slow_stops_the_robot(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A slow sensor delays stops, so the robot rests until it answers in time."""
     sensor = _SlowSensor(takes_ms=0)
     bench = _with(make, monkeypatch, {"wheel": sensor}, "speed")
     _drives(bench)
@@ -442,7 +422,6 @@ def test_a_sensor_that_is_slow_stops_the_robot(
 def test_a_pressed_bumper_is_not_hidden_by_a_free_one(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot stops when either of two bumpers is pressed."""
     front, other = _Sensor(), _Sensor()
     front.reading = {"bump": 1.0}
     bench = _with(make, monkeypatch, {"front": front, "other": other}, "bump")
@@ -454,7 +433,6 @@ def test_a_pressed_bumper_is_not_hidden_by_a_free_one(
 
 
 def test_all_distance_sensors_must_report(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A distance sensor without an echo yet may face an obstacle."""
     left, right = _Sensor(), _Sensor()
     left.reading, right.reading = {"distance": 2.0}, {}
     eyes = {"left": left, "right": right}
@@ -472,7 +450,6 @@ def test_all_distance_sensors_must_report(make: _Make, monkeypatch: pytest.Monke
 def test_the_outputs_rest_before_anything_is_closed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Closing sensors and pins can take time, so outputs rest first."""
     sensor = _Sensor()
     bench = _with(make, monkeypatch, {"bumper": sensor}, "bump")
     _drives(bench)
@@ -487,7 +464,6 @@ def test_the_outputs_rest_before_anything_is_closed(
 def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Sensors and outputs opened before the failure are closed."""
     opened = [_Sensor()]
 
     def open_sensor(plan: SensorPlan, hardware: object) -> _Sensor:
@@ -514,7 +490,6 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
 
 
 def test_wrong_arguments_exit_with_one_line(capfd: pytest.CaptureFixture[str]) -> None:
-    """The exit code is 1, with one line on standard error."""
     with pytest.raises(SystemExit) as ended:
         main(["--plan-fd", "3"])
     assert ended.value.code == 1

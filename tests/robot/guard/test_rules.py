@@ -29,7 +29,6 @@ def _driving(plan: GuardPlan, values: tuple[float, ...] = (0.5, 0.5)) -> Rules:
 
 
 def test_a_new_guard_is_not_armed() -> None:
-    """Commands are refused before arming."""
     rules = Rules(quick_car(), _T0)
     assert "Not armed" in rules.offer(command(1, _T0), _T0)
     decision = rules.tick(_T0)
@@ -39,7 +38,6 @@ def test_a_new_guard_is_not_armed() -> None:
 
 
 def test_a_command_ends_exactly_at_its_deadline() -> None:
-    """The deadline counts from when the daemon received the command."""
     rules = _armed(quick_car())
     assert rules.tick(_T0).stop_reason == "No fresh command."
     assert not rules.offer(command(1, _T0 - 10 * MS), _T0)
@@ -52,7 +50,6 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
 
 
 def test_a_ttl_can_shorten_but_not_extend_the_deadline() -> None:
-    """The earlier of TTL and deadline counts."""
     rules = _armed(quick_car())
     assert not rules.offer(command(1, _T0, ttl_ms=20), _T0)
     assert rules.tick(_T0 + 20 * MS - 1).seq == 1
@@ -60,7 +57,6 @@ def test_a_ttl_can_shorten_but_not_extend_the_deadline() -> None:
 
 
 def test_a_command_slightly_in_the_future_counts_from_now() -> None:
-    """A timestamp up to 50 ms ahead is accepted, but never extends the deadline."""
     rules = _armed(quick_car())
     assert not rules.offer(command(1, _T0 + 50 * MS), _T0)
     assert rules.tick(_T0 + 250 * MS).seq is None
@@ -79,7 +75,6 @@ def test_a_command_slightly_in_the_future_counts_from_now() -> None:
     ],
 )
 def test_stale_commands_are_refused(order: Order, words: str) -> None:
-    """Repeated, older, late, future and old-session commands leave the newest in effect."""
     rules = _armed(quick_car())
     assert not rules.offer(command(5, _T0, session=2), _T0)
     assert words in rules.offer(order, _T0)
@@ -87,7 +82,6 @@ def test_stale_commands_are_refused(order: Order, words: str) -> None:
 
 
 def test_an_invalid_command_ends_the_previous_one() -> None:
-    """An invalid newer command ends the previous one; an invalid older one is ignored."""
     rules = _driving(quick_car())
     assert "1 values" in rules.offer(command(5, _T0, (0.1,)), _T0)
     assert rules.tick(_T0).stop_reason == "No fresh command."
@@ -97,14 +91,12 @@ def test_an_invalid_command_ends_the_previous_one() -> None:
 
 
 def test_a_refused_command_supersedes_older_ones() -> None:
-    """A command older than a refused one is not newer."""
     rules = _armed(quick_car())
     assert rules.offer(command(7, _T0 - 300 * MS), _T0)
     assert "not newer" in rules.offer(command(6, _T0), _T0)
 
 
 def test_stale_orders_have_no_effect() -> None:
-    """After a pause of the guard, queued orders to arm and to move are too old."""
     rules = Rules(quick_car(), _T0)
     late = _T0 + 5_000 * MS
     orders = [arm(_T0), *(command(i, _T0 + i * 20 * MS) for i in range(1, 100))]
@@ -115,7 +107,6 @@ def test_stale_orders_have_no_effect() -> None:
 
 
 def test_commands_before_arming_have_no_effect() -> None:
-    """Disarming ends a command for good, even if it is still fresh after arming."""
     rules = _driving(quick_car())
     assert not rules.offer(Order("disarm", reason="the lease was lost."), _T0 + 1)
     stopped = rules.tick(_T0 + 1)
@@ -128,14 +119,12 @@ def test_commands_before_arming_have_no_effect() -> None:
 
 
 def test_ending_disarms() -> None:
-    """After the order to end, no command acts."""
     rules = _driving(quick_car())
     assert not rules.offer(Order("end"), _T0)
     assert rules.tick(_T0).seq is None
 
 
 def test_a_halt_ends_the_newest_command_and_leaves_the_robot_armed() -> None:
-    """After a halt, the next controller can drive without arming."""
     rules = _driving(quick_car())
     assert not rules.offer(Order("halt"), _T0)
     assert rules.tick(_T0).seq is None
@@ -143,7 +132,6 @@ def test_a_halt_ends_the_newest_command_and_leaves_the_robot_armed() -> None:
 
 
 def test_an_emergency_stop_latches_until_acknowledged() -> None:
-    """An order to arm must name the current count of emergency stops."""
     rules = _driving(quick_car())
     rules.offer(Order("emergency", reason="a child."), _T0)
     rules.offer(Order("emergency"), _T0)
@@ -162,7 +150,6 @@ def test_an_emergency_stop_latches_until_acknowledged() -> None:
 
 
 def test_only_a_person_ends_an_emergency_stop() -> None:
-    """A program can arm the robot, but not after an emergency stop."""
     rules = Rules(quick_car(), _T0)
     assert not rules.offer(arm(_T0, person=False), _T0)
     rules.stop("a child.")
@@ -173,7 +160,6 @@ def test_only_a_person_ends_an_emergency_stop() -> None:
 
 
 def test_reasons_are_truncated() -> None:
-    """A state must fit into a datagram, so reasons are cut."""
     rules = _driving(quick_car())
     rules.disarm("\N{GRINNING FACE}" * 1024)
     assert len(rules.tick(_T0).stop_reason.encode()) < 250
@@ -182,7 +168,6 @@ def test_reasons_are_truncated() -> None:
 
 
 def test_a_pressed_button_stops_and_prevents_arming() -> None:
-    """Each press counts as one emergency stop, however long it is held."""
     rules = _driving(quick_car())
     rules.press(True)
     rules.press(True)
@@ -194,7 +179,6 @@ def test_a_pressed_button_stops_and_prevents_arming() -> None:
 
 
 def test_values_stay_within_the_caps() -> None:
-    """Values beyond the profile's caps are clipped and reported."""
     rules = _driving(quick_car(), (0.0, 0.0))
     rules.offer(command(2, _T0, (-9.0, 9)), _T0)
     decision = rules.tick(_T0)
@@ -205,14 +189,12 @@ def test_values_stay_within_the_caps() -> None:
 
 
 def test_an_action_that_rests_outside_its_caps_is_refused() -> None:
-    """A rest value outside of the caps raises an error."""
     action = ActionPlan("throttle", 0.2, 0.6)
     with pytest.raises(RobotError, match="'throttle' rests at 0, outside its caps"):
         Rules(replace(car(), actions=(action,)), 0)
 
 
 def test_slew_limits_moves_away_from_rest_only() -> None:
-    """Moves towards rest are immediate, and a change of sign passes through rest."""
     rules = _armed(car())
 
     def at(ms: int, throttle: float) -> float:
@@ -229,7 +211,6 @@ def test_slew_limits_moves_away_from_rest_only() -> None:
 
 
 def test_a_tension_falls_no_faster_than_it_rises() -> None:
-    """With a limit towards rest, a chattering command has its own mean; a stop ramps as ever."""
     tension = ActionPlan("FDP", 0.0, slew_per_s=20.0, slew_down_per_s=20.0, one_sided=True)
     rules = _armed(replace(car(stop=StopPlan(hold_ms=0, ramp_ms=40)), actions=(tension,)))
     seen: list[float] = []
@@ -245,7 +226,6 @@ def test_a_tension_falls_no_faster_than_it_rises() -> None:
 
 
 def test_slew_is_limited_after_a_pause() -> None:
-    """After a pause of the guard, slew allows at most the change of two ticks."""
     rules = _armed(car())
     later = _T0 + 10_000 * MS
     rules.offer(command(1, later, (0.0, 0.6)), later)
@@ -253,7 +233,6 @@ def test_slew_is_limited_after_a_pause() -> None:
 
 
 def test_three_levels() -> None:
-    """An action with three levels takes its low, rest or high value, without slew."""
     steering = ActionPlan("steering", -0.4, 0.4, slew_per_s=1.0, levels="three", threshold=0.3)
     rules = _armed(replace(car(), actions=(steering,)))
     seen: list[float] = []
@@ -264,7 +243,6 @@ def test_three_levels() -> None:
 
 
 def test_a_stop_holds_and_ramps_what_does_not_propel() -> None:
-    """On a stop, steering holds and ramps to rest; the drive rests at once."""
     rules = _driving(quick_car(stop=StopPlan(hold_ms=100, ramp_ms=200, then="release")))
     rules.disarm("")
     assert rules.tick(_T0).actions == (0.5, 0.0)
@@ -280,7 +258,6 @@ def test_a_stop_holds_and_ramps_what_does_not_propel() -> None:
 
 
 def test_a_new_guard_starts_released() -> None:
-    """With then = "release", outputs start released until a command acts."""
     rules = Rules(quick_car(stop=StopPlan(hold_ms=100, then="release")), _T0)
     assert rules.tick(_T0).release
     rules.offer(arm(_T0), _T0)
@@ -289,7 +266,6 @@ def test_a_new_guard_starts_released() -> None:
 
 
 def test_an_output_that_fails_stops_everything_without_hold() -> None:
-    """A failed output stops all actions at once, without hold or ramp."""
     rules = _driving(quick_car(stop=StopPlan(hold_ms=100)))
     rules.fail("Output drive: no answer", _T0)
     decision = rules.tick(_T0)
@@ -298,7 +274,6 @@ def test_an_output_that_fails_stops_everything_without_hold() -> None:
 
 
 def test_a_stale_frame_stops_the_robot() -> None:
-    """The newest frame counts, whichever command reported it."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     rules.offer(command(1, _T0), _T0)
     assert rules.tick(_T0).stop_reason == "Blind: no picture yet."
@@ -315,7 +290,6 @@ def test_a_stale_frame_stops_the_robot() -> None:
 
 
 def test_without_a_command_no_stale_frame_is_reported() -> None:
-    """Commands report frames, so their absence is the reason given."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     assert rules.tick(_T0).stop_reason == "No fresh command."
     rules.offer(command(1, _T0, frame_ns=_T0), _T0)
@@ -323,7 +297,6 @@ def test_without_a_command_no_stale_frame_is_reported() -> None:
 
 
 def test_a_frame_slightly_in_the_future_counts_from_now() -> None:
-    """A frame time up to 50 ms ahead never extends the limit."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     rules.offer(command(1, _T0, frame_ns=_T0 + 50 * MS), _T0)
     assert rules.tick(_T0 + 100 * MS - 1).seq == 1
@@ -344,7 +317,6 @@ def _ask(rules: Rules, seq: int, now_ns: int, throttle: float) -> tuple[float, s
 
 
 def test_a_bump_prevents_driving_forward() -> None:
-    """While pressed and for a hold time, only backward is allowed; one press is one bump."""
     rules = _driving(quick_car())
     words = "Not forward: the bumper touched something."
     _sense(rules, _T0, bump=1.0)
@@ -362,7 +334,6 @@ def test_a_bump_prevents_driving_forward() -> None:
 
 
 def test_a_near_obstacle_prevents_driving_forward() -> None:
-    """Without `stop_distance_m`, distances are ignored."""
     rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
     _sense(rules, _T0, distance=0.29)
     assert _ask(rules, 2, _T0, 0.5) == (0.0, "Not forward: something is near.")
@@ -380,7 +351,6 @@ def test_a_near_obstacle_prevents_driving_forward() -> None:
     [Sensing(), Sensing({"distance": 2.0}, {"distance": "eye"}, silent=frozenset({"other"}))],
 )
 def test_an_unknown_distance_prevents_driving_forward(sensing: Sensing) -> None:
-    """Applies when any distance sensor has no reading, and only with `stop_distance_m`."""
     rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
     rules.sense(sensing, _T0)
     assert _ask(rules, 2, _T0, 0.5) == (0.0, "Not forward: the distance ahead is not known.")
@@ -394,7 +364,6 @@ def test_an_unknown_distance_prevents_driving_forward(sensing: Sensing) -> None:
 
 
 def test_a_controller_at_neutral_does_not_stall() -> None:
-    """While outputs do not follow yet, there is no stall and no direction."""
     rules = _driving(quick_car())
     for ms in range(0, 1_000, 10):
         now_ns = _T0 + ms * MS
@@ -407,7 +376,6 @@ def test_a_controller_at_neutral_does_not_stall() -> None:
 
 @pytest.mark.parametrize("name", ["wheel", "bumper"])
 def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
-    """A slow sensor delays every stop, so any slow sensor stops the robot."""
     rules = _driving(quick_car())
     rules.sense(Sensing(failures={name: "Slow."}, slow=frozenset({name})), _T0)
     decision = rules.tick(_T0)
@@ -417,7 +385,6 @@ def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
 
 @pytest.mark.parametrize(("throttle", "way"), [(0.5, "forward"), (-0.4, "backward")])
 def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
-    """The same throttle is refused after a stall until another value was commanded."""
     rules = _driving(quick_car(), (0.5, throttle))
     words = f"Not {way}: it pushes and does not move."
     _sense(rules, _T0, speed=0.0)
@@ -436,7 +403,6 @@ def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
 
 
 def test_no_stall_while_moving_or_at_low_throttle() -> None:
-    """Occasional motion resets the time, and small throttle values do not count."""
     rules = _driving(quick_car())
     for ms in range(0, 4_000, 100):
         _sense(rules, _T0 + ms * MS, speed=0.2 if ms % 300 == 0 else 0.0)
@@ -448,7 +414,6 @@ def test_no_stall_while_moving_or_at_low_throttle() -> None:
 
 
 def test_no_stall_without_a_speed_or_limit() -> None:
-    """Without a measured speed, or with `stall_s = 0`, no stall is estimated."""
     rules = _driving(quick_car())
     _sense(rules, _T0)
     assert rules.senses.quantities == {}
@@ -458,7 +423,6 @@ def test_no_stall_without_a_speed_or_limit() -> None:
 
 
 def test_a_low_battery_is_debounced_and_latched() -> None:
-    """Short dips are ignored; once detected, the stop lasts until arming."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
     _sense(rules, _T0, battery=6.0)
     _sense(rules, _T0 + 400 * MS, battery=6.5)
@@ -477,7 +441,6 @@ def test_a_low_battery_is_debounced_and_latched() -> None:
 
 @pytest.mark.parametrize(("name", "bad"), [("battery", 6.3), ("temperature", 80.5)])
 def test_a_low_battery_and_a_hot_computer_count_after_half_a_second(name: str, bad: float) -> None:
-    """The debounce time is exactly 500 ms."""
     limits = LimitPlan(low_battery_v=6.4, high_temperature_c=80.0, stall_s=0.0)
     half_a_second = 500 * MS
     for after_ns, stops in ((half_a_second - 1, False), (half_a_second, True)):
@@ -489,7 +452,6 @@ def test_a_low_battery_and_a_hot_computer_count_after_half_a_second(name: str, b
 
 
 def test_a_battery_exactly_at_its_limit_is_not_low() -> None:
-    """A reading at or above the limit restarts the debounce time."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
     for ms in range(0, 1200, 100):
         _sense(rules, _T0 + ms * MS, battery=6.4 if ms < 700 else 6.39)
@@ -499,7 +461,6 @@ def test_a_battery_exactly_at_its_limit_is_not_low() -> None:
 
 
 def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
-    """Rearming does not restart the debounce time."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
     for ms in range(0, 600, 100):
         _sense(rules, _T0 + ms * MS, battery=6.0)
@@ -510,7 +471,6 @@ def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
 
 
 def test_a_hot_computer_rests_until_it_has_cooled() -> None:
-    """The temperature is debounced, and the stop ends once it is at the limit."""
     rules = _driving(quick_car(LimitPlan(high_temperature_c=80.0)))
     _sense(rules, _T0, temperature=81.0)
     _sense(rules, _T0 + 500 * MS, temperature=82.0)
@@ -533,7 +493,6 @@ def test_a_hot_computer_rests_until_it_has_cooled() -> None:
     ],
 )
 def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
-    """A failure of a sensor that only informs is ignored."""
     rules = _driving(quick_car(limits))
     rules.sense(Sensing(failures={name: "No answer."}), _T0)
     decision = rules.tick(_T0)
@@ -547,7 +506,6 @@ def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: b
 
 
 def test_an_unmeasured_speed_is_estimated() -> None:
-    """With a gain in m/s, the speed is estimated from the applied throttle."""
     plan = quick_car()
     steering, throttle = plan.actions
     plan = replace(plan, actions=(steering, replace(throttle, unit="m/s", gain=3.0)))
@@ -570,7 +528,6 @@ def test_an_unmeasured_speed_is_estimated() -> None:
 def test_a_collision_names_its_source(
     sensed: dict[str, float], collision: float, source: str
 ) -> None:
-    """A bumper takes precedence over an estimated stall."""
     rules = _driving(quick_car())
     _sense(rules, _T0, **sensed)
     assert rules.senses.quantities["collision"] == collision
@@ -578,7 +535,6 @@ def test_a_collision_names_its_source(
 
 
 def test_the_direction_is_that_of_the_propulsion() -> None:
-    """The direction is for encoders with one channel; turning a tank has none."""
     rules = _driving(quick_car())
     assert rules.direction == 1.0
     _ask(rules, 2, _T0, 0.0)
@@ -596,7 +552,6 @@ def test_the_direction_is_that_of_the_propulsion() -> None:
 
 
 def test_a_failed_thermometer_stops() -> None:
-    """A thermometer protects when a temperature limit is set."""
     plan = replace(
         quick_car(LimitPlan(high_temperature_c=80.0)),
         sensors=(SensorPlan("chip", "cpu_temperature", "temperature"),),
@@ -608,7 +563,6 @@ def test_a_failed_thermometer_stops() -> None:
 
 @pytest.mark.parametrize(("slow", "armed"), [(False, False), (True, True)])
 def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool) -> None:
-    """Failed servos have released their tendons, so a person must rearm; slow ones need not."""
     plan = replace(quick_car(), sensors=(SensorPlan("spools", "bus_servo", "tendons"),))
     rules = _driving(plan)
     late = frozenset({"spools"}) if slow else frozenset[str]()

@@ -28,20 +28,17 @@ _PLAN = ServePlan(car(), {"port": 5000, "nested": {"a": [1, 2]}}, ("module:funct
 
 
 def test_a_plan_round_trips() -> None:
-    """JSON keeps all values, including infinite slew."""
     plan = replace(_PLAN, guard=replace(car(), actions=(ActionPlan("throttle"),)))
     assert ServePlan.from_json(plan.to_json()) == plan
 
 
 def test_processes_may_be_silent_for_their_limits() -> None:
-    """The guard for its deadline, the daemon for two seconds, or `patience_ms` on a twin."""
     assert (_PLAN.guard_silence_ms, _PLAN.daemon_silence_ms) == (250, 2_000)
     patient = replace(_PLAN, patience_ms=5_000)
     assert (patient.guard_silence_ms, patient.daemon_silence_ms) == (5_000, 5_000)
 
 
 def test_several_processes_can_read_the_plan() -> None:
-    """The descriptor is inheritable, and reading does not move its offset."""
     fd = plan_fd(_PLAN)
     try:
         assert os.get_inheritable(fd)
@@ -55,7 +52,6 @@ def test_several_processes_can_read_the_plan() -> None:
 
 
 def test_a_plan_is_read_only() -> None:
-    """Writing to the descriptor and truncating it raise PermissionError."""
     fd = plan_fd(_PLAN)
     try:
         for change in (lambda: os.pwrite(fd, b"x", 0), lambda: os.ftruncate(fd, 0)):
@@ -67,7 +63,6 @@ def test_a_plan_is_read_only() -> None:
 
 
 def test_outputs_are_mixed_from_actions_and_clipped() -> None:
-    """The tracks of a tank are throttle plus and minus steering."""
     plan = GuardPlan(
         "tank",
         (ActionPlan("steering"), ActionPlan("throttle")),
@@ -84,7 +79,6 @@ def test_outputs_are_mixed_from_actions_and_clipped() -> None:
 
 
 def test_restarts_are_limited_per_period() -> None:
-    """Restarts older than the period do not count."""
     restarts = Restarts(most=2, within_s=60.0)
     second = 10**9
     assert [restarts.may_restart(t * second) for t in (0, 30, 59, 60, 61, 90)] == [
@@ -98,7 +92,6 @@ def test_restarts_are_limited_per_period() -> None:
 
 
 def test_restarts_back_off() -> None:
-    """The first restart has no delay; later delays double."""
     restarts = Restarts()
     pauses = [restarts.pause_s for t in range(5) if restarts.may_restart(t)]
     assert pauses == pytest.approx([0.0, 0.2, 0.6, 1.4, 3.0])
@@ -106,13 +99,11 @@ def test_restarts_back_off() -> None:
 
 @pytest.mark.parametrize("arguments", [["--a", "1"], ["--a", "1", "--c", "2"], ["--a"]])
 def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
-    """Missing, unknown and incomplete arguments raise ValueError."""
     with pytest.raises(ValueError, match=r"This takes --a N --b N|argument 2 is"):
         descriptors(arguments, ("--a", "--b"))
 
 
 def test_processes_ignore_the_working_folder() -> None:
-    """The guard runs in isolated mode, and the daemon without the working folder on its path."""
     commands = supervisor.ProcessCommands.of(_PLAN)
     assert commands.guard == (sys.executable, "-I", start.__file__, "guard")
     assert supervisor_command(_PLAN, 7)[1:] == ["-I", start.__file__, "supervise", "--plan-fd", "7"]
@@ -120,7 +111,6 @@ def test_processes_ignore_the_working_folder() -> None:
 
 
 def test_make_safe_continues_after_a_failed_output(tmp_path: Path) -> None:
-    """All other outputs and the enable pin are put to rest."""
     record = Record(tmp_path / "record")
     (tmp_path / "stuck-GPIO17").touch()
     plan = replace(car(), enable_pin=5)
@@ -152,7 +142,6 @@ print(*sys.modules)
 
 
 def test_guard_and_supervisor_import_only_their_drivers() -> None:
-    """Fewer imports mean fewer failures and less memory."""
     command = [sys.executable, "-I", "-c", _LISTS_MODULES, start.__file__]
     before = "import sys; print(*sys.modules)"
     bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()

@@ -46,7 +46,6 @@ def _log(folder: Path) -> str:
 
 
 def test_sigterm_stops_the_robot(tmp_path: Path) -> None:
-    """After SIGTERM pins rest and all processes exit; the guard's memory is within its limit."""
     with running(tmp_path) as robot:
         robot.drive()
         status = Path(f"/proc/{robot.pids('hardware')[0]}/status").read_text()
@@ -59,14 +58,12 @@ def test_sigterm_stops_the_robot(tmp_path: Path) -> None:
 
 
 def test_the_daemon_can_end_the_robot(tmp_path: Path) -> None:
-    """After the order "end", guard and supervisor exit with code 0."""
     with running(tmp_path, commands=5, ends=True) as robot:
         assert robot.process.wait(20) == 0
         assert robot.record.is_at_rest()
 
 
 def test_killed_daemon(tmp_path: Path) -> None:
-    """The guard detects the closed socket; both processes restart in emergency stop."""
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
@@ -81,7 +78,6 @@ def test_killed_daemon(tmp_path: Path) -> None:
 
 
 def test_silent_daemon(tmp_path: Path) -> None:
-    """A daemon that sends no commands: the last one acts until its deadline."""
     with running(tmp_path, commands=20) as robot:
         until(lambda: len(robot.commands()) == 20)
         last_ns = robot.commands()[-1]
@@ -90,7 +86,6 @@ def test_silent_daemon(tmp_path: Path) -> None:
 
 
 def test_stopped_daemon(tmp_path: Path) -> None:
-    """A daemon stopped by SIGSTOP is silent, and is killed after two seconds."""
     with running(tmp_path) as robot:
         robot.drive()
         stopped_ns = robot.kill("daemon", signal.SIGSTOP)
@@ -101,7 +96,6 @@ def test_stopped_daemon(tmp_path: Path) -> None:
 
 
 def test_killed_guard(tmp_path: Path) -> None:
-    """Pins keep their levels, so the supervisor first puts them to rest."""
     with running(tmp_path) as robot:
         robot.drive()
         killed_ns = robot.kill("hardware", signal.SIGKILL)
@@ -111,7 +105,6 @@ def test_killed_guard(tmp_path: Path) -> None:
 
 
 def test_stopped_guard(tmp_path: Path) -> None:
-    """A guard without heartbeats is killed, and the supervisor puts the pins to rest."""
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
@@ -121,7 +114,6 @@ def test_stopped_guard(tmp_path: Path) -> None:
 
 
 def test_killed_supervisor(tmp_path: Path) -> None:
-    """Without a supervisor, guard and daemon put the pins to rest and exit."""
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
@@ -133,7 +125,6 @@ def test_killed_supervisor(tmp_path: Path) -> None:
 
 
 def test_a_resumed_supervisor_restarts_nothing(tmp_path: Path) -> None:
-    """Heartbeats that were not read while the supervisor was stopped do not count as silence."""
     with running(tmp_path) as robot:
         robot.drive()
         os.kill(robot.process.pid, signal.SIGSTOP)
@@ -145,7 +136,6 @@ def test_a_resumed_supervisor_restarts_nothing(tmp_path: Path) -> None:
 
 
 def test_the_supervisor_gives_up_after_too_many_failures(tmp_path: Path) -> None:
-    """A daemon that cannot start ends the supervisor with code 1."""
     with running(tmp_path, record="/nowhere/record") as robot:
         assert robot.process.wait(60) == 1
         assert robot.record.is_at_rest()
@@ -153,7 +143,6 @@ def test_the_supervisor_gives_up_after_too_many_failures(tmp_path: Path) -> None
 
 
 def test_a_stuck_output_is_reported_as_unsafe(tmp_path: Path) -> None:
-    """Other outputs rest, and the exit code is 3."""
     with running(tmp_path) as robot:
         robot.drive()
         stuck_ns = robot.record.lines()[-1]["t"]
@@ -169,7 +158,6 @@ def test_a_stuck_output_is_reported_as_unsafe(tmp_path: Path) -> None:
 
 
 def test_a_stuck_output_is_retried(tmp_path: Path) -> None:
-    """No process restarts before all outputs are at rest."""
     with running(tmp_path) as robot:
         robot.drive()
         (tmp_path / "stuck-GPIO22").touch()
@@ -191,7 +179,6 @@ def test_a_stuck_output_is_retried(tmp_path: Path) -> None:
 
 
 def test_a_stuck_output_at_the_start_ends_the_supervisor(tmp_path: Path) -> None:
-    """A robot that is not wired as its profile says exits with code 3."""
     (tmp_path / "stuck-GPIO22").touch()
     with running(tmp_path) as robot:
         assert robot.process.wait(30) == 3
@@ -251,7 +238,6 @@ def _supervisor(end_reason: str, **daemon: object) -> Iterator[Supervisor]:
 def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
     monkeypatch: pytest.MonkeyPatch, end_reason: str
 ) -> None:
-    """Pins are put to rest at once, and again after the guard exits, since it may have written."""
     attempts: list[int | None] = []
     guard = _Stuck(looks=4)
 
@@ -270,7 +256,6 @@ def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
 def test_a_guard_that_never_exits_is_given_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """On SIGTERM the supervisor stops waiting, and does not report the outputs as safe."""
     monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
     monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.01)
@@ -286,7 +271,6 @@ def test_the_ready_file_goes_with_its_daemon(
     tmp_path: Path,
     ready_file: str,
 ) -> None:
-    """A file that cannot be removed is logged, and does not keep the supervisor from its work."""
     (tmp_path / "ready.json").write_text("{}")
     (tmp_path / "folder").mkdir()
     monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
@@ -298,7 +282,6 @@ def test_the_ready_file_goes_with_its_daemon(
 
 
 def test_garbage_is_counted_and_refused(tmp_path: Path) -> None:
-    """Invalid datagrams do not end the guard."""
     garbage = ["{", "[]", '{"kind": "command", "values": [1e999]}', "x" * 20_000]
     with running(tmp_path, garbage=garbage) as robot:
         robot.drive()
@@ -308,7 +291,6 @@ def test_garbage_is_counted_and_refused(tmp_path: Path) -> None:
 
 
 def test_an_unknown_driver_ends_the_supervisor(tmp_path: Path) -> None:
-    """The log names the driver, and the exit code is 2."""
     plan = quick_car(LimitPlan())
     plan = replace(plan, outputs=(replace(plan.outputs[0], driver="magic"),), sensors=())
     with running(tmp_path, plan) as robot:

@@ -23,7 +23,6 @@ _STATE = GuardState(
 
 
 def test_orders_and_states_round_trip() -> None:
-    """Decoding an encoded message returns an equal one."""
     assert decode_order(encode(_ORDER)) == _ORDER
     assert decode_state(encode(_STATE)) == _STATE
 
@@ -51,14 +50,12 @@ def test_orders_and_states_round_trip() -> None:
     ],
 )
 def test_an_invalid_order_is_refused(field: str, value: object) -> None:
-    """Each field is checked for its type, and numbers must be finite."""
     data = json.dumps(asdict(_ORDER) | {field: value}).encode()
     with pytest.raises(ValueError, match=r"^Invalid order: "):
         decode_order(data)
 
 
 def test_a_state_with_long_reasons_fits_into_a_datagram() -> None:
-    """Characters that cannot be encoded are replaced."""
     words = "\N{GRINNING FACE}" * 250
     state = replace(_STATE, stop_reason=words, refused=words + "\ud800")
     assert len(encode(state)) < MAX_DATAGRAM // 4
@@ -67,7 +64,6 @@ def test_a_state_with_long_reasons_fits_into_a_datagram() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"\xff", b"[]", b"1", b"[" * 16_000, b"{}", b"\x00"])
 def test_anything_but_a_json_object_is_refused(data: bytes) -> None:
-    """Both decoders raise ValueError."""
     for decode in (decode_order, decode_state):
         with pytest.raises(ValueError, match=r"."):
             decode(data)
@@ -75,7 +71,6 @@ def test_anything_but_a_json_object_is_refused(data: bytes) -> None:
 
 @given(st.binary(max_size=200))
 def test_decoding_bytes_gives_an_order_or_a_value_error(data: bytes) -> None:
-    """No other exception is raised."""
     try:
         assert isinstance(decode_order(data), Order)
     except ValueError:
@@ -93,7 +88,6 @@ def test_decoding_bytes_gives_an_order_or_a_value_error(data: bytes) -> None:
     )
 )
 def test_decoding_objects_gives_an_order_or_a_value_error(fields: dict[str, object]) -> None:
-    """The values of a decoded order are finite."""
     try:
         order = decode_order(json.dumps({"kind": "command"} | fields).encode())
     except ValueError:

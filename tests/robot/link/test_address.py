@@ -24,7 +24,6 @@ from shapechanger.robot.link.address import DEFAULT_PORT, Address, is_loopback, 
     ],
 )
 def test_addresses_are_parsed(text: str, address: Address) -> None:
-    """Names, IPv4 and IPv6, with and without a port."""
     assert parse_address(text) == address
     assert parse_address(str(address)) == address
 
@@ -53,7 +52,6 @@ def test_addresses_are_parsed(text: str, address: Address) -> None:
     ],
 )
 def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> None:
-    """The error shows valid addresses."""
     with pytest.raises(LinkError, match=words) as refused:
         parse_address(text)
     assert "192.168.42.1:5000" in str(refused.value)
@@ -61,7 +59,6 @@ def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> 
 
 @given(text=st.text(max_size=30))
 def test_any_text_is_an_address_or_an_error(text: str) -> None:
-    """An address round-trips; any other text raises LinkError."""
     try:
         address = parse_address(text)
     except LinkError:
@@ -70,11 +67,9 @@ def test_any_text_is_an_address_or_an_error(text: str) -> None:
 
 
 def test_the_port_of_2017_is_the_default() -> None:
-    """The default port is 5000."""
     assert DEFAULT_PORT == 5000
 
 
 def test_loopback_addresses() -> None:
-    """Only loopback addresses and localhost count; other names may resolve to anything."""
     assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
     assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.42.1", "car.local", "")))

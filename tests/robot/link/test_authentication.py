@@ -26,7 +26,6 @@ _roles = st.sampled_from(("person", "program"))
 
 @given(key=_parts, nonce=_parts, certificate=_parts, role=_roles)
 def test_a_proof_verifies(key: bytes, nonce: bytes, certificate: bytes, role: str) -> None:
-    """Both sides compute the same proof."""
     assert is_proof(make_proof(key, nonce, certificate, role), key, nonce, certificate, role)
 
 
@@ -34,7 +33,6 @@ def test_a_proof_verifies(key: bytes, nonce: bytes, certificate: bytes, role: st
 def test_a_proof_is_bound_to_all_its_inputs(
     one: tuple[bytes, bytes, bytes, str], two: tuple[bytes, bytes, bytes, str]
 ) -> None:
-    """Another key, nonce, certificate or role needs another proof."""
     # HMAC pads short keys with zeros (RFC 2104); real keys have 16 bytes.
     one, two = (one[0].ljust(64, b"\0"), *one[1:]), (two[0].ljust(64, b"\0"), *two[1:])
     assert is_proof(make_proof(*one), *two) == (one == two)
@@ -42,18 +40,15 @@ def test_a_proof_is_bound_to_all_its_inputs(
 
 @given(proof=st.binary(max_size=64))
 def test_random_bytes_do_not_verify(proof: bytes) -> None:
-    """Bytes of any length are refused."""
     assert not is_proof(proof, b"k" * 16, b"n" * NONCE_BYTES, b"", "program")
 
 
 def test_keys_and_nonces_are_unique() -> None:
-    """100 generated keys and nonces differ."""
     assert len({new_key() for _ in range(100)}) == 100
     assert len({new_nonce() for _ in range(100)}) == 100
 
 
 def test_a_key_can_be_copied_by_hand() -> None:
-    """Groups, spaces, case and misread digits do not matter."""
     key = new_key()
     assert len(parse_key(key)) == 16
     for written in (
@@ -77,14 +72,12 @@ def test_a_key_can_be_copied_by_hand() -> None:
     ],
 )
 def test_an_invalid_key_is_an_error(text: str, words: str) -> None:
-    """The error says what a key looks like."""
     with pytest.raises(LinkError, match=words):
         parse_key(text)
 
 
 @given(certificate=st.binary(max_size=64))
 def test_a_fingerprint_round_trips(certificate: bytes) -> None:
-    """It parses as hexadecimal digits, also with colons and capitals as OpenSSL prints it."""
     fingerprint = fingerprint_of(certificate)
     text = fingerprint_hex(fingerprint)
     pairs = ":".join(text[i : i + 2] for i in range(0, len(text), 2)).upper()
@@ -92,13 +85,11 @@ def test_a_fingerprint_round_trips(certificate: bytes) -> None:
 
 
 def test_the_short_form_has_four_groups() -> None:
-    """The short form has four groups of four characters."""
     short = fingerprint_short(fingerprint_of(b"certificate"))
     assert [len(group) for group in short.split("-")] == [4, 4, 4, 4]
 
 
 @pytest.mark.parametrize("text", ["", "ab" * 31, "ab" * 33, "zz" * 32])
 def test_an_invalid_fingerprint_is_an_error(text: str) -> None:
-    """The error shows the expected form."""
     with pytest.raises(LinkError, match="64 hexadecimal digits"):
         parse_fingerprint(text)

@@ -19,7 +19,6 @@ from shapechanger.robot.profile.load import find_profile, load_profile, shipped_
 
 @pytest.mark.parametrize("kind", list(shipped_profiles()))
 def test_every_shipped_robot_has_a_card_that_a_client_reads(kind: str) -> None:
-    """Its numbers survive JSON and msgpack, and its layouts are those of the profile."""
     profile = load_profile(find_profile(kind))
     card = card_of(profile)
     assert msgspec.json.decode(json.dumps(msgspec.to_builtins(card)), type=RobotCard) == card
@@ -34,7 +33,6 @@ def test_every_shipped_robot_has_a_card_that_a_client_reads(kind: str) -> None:
 
 
 def test_a_card_states_the_numbers_of_the_profile() -> None:
-    """Each fact comes from its own key; 0 is no limit of a slew, and defaults are stated too."""
     card = card_of(load_profile(find_profile("lab-car")))
     assert (card.robot, card.body, card.image_size) == ("lab-car", "car", (160, 120))
     assert (card.control_hz, card.tick_hz) == (20.0, 100.0)
@@ -51,7 +49,6 @@ def test_a_card_states_the_numbers_of_the_profile() -> None:
 
 
 def test_a_twin_may_be_armed_by_anyone_and_needs_no_pictures() -> None:
-    """What a service changes is said when the card is made."""
     profile = load_profile(find_profile("lab-car"))
     card = card_of(profile, arming="anyone", clock="twin", pictures=False)
     assert (card.arming, card.clock, card.image_size) == ("anyone", "twin", None)
@@ -62,7 +59,6 @@ def test_a_twin_may_be_armed_by_anyone_and_needs_no_pictures() -> None:
     "missing", ["deadline_ms", "control_hz", "arming", "max_observation_age_ms"]
 )
 def test_a_welcome_without_a_limit_is_refused(missing: str) -> None:
-    """No limit of a robot is guessed by its clients."""
     fields = msgspec.to_builtins(Welcome.of(card_of(load_profile(find_profile("car"))), 1))
     del fields[missing]
     with pytest.raises(LinkError, match=missing):
@@ -70,7 +66,6 @@ def test_a_welcome_without_a_limit_is_refused(missing: str) -> None:
 
 
 def test_headers_of_episodes_share_its_names() -> None:
-    """A recorder copies them by name."""
     shared = {f.name for f in dataclasses.fields(EpisodeHeader)} & {*RobotCard.__struct_fields__}
     assert shared == {
         *("robot", "body", "action_layout", "state_layout", "image_size", "control_hz", "clock"),

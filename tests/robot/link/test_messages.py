@@ -29,18 +29,15 @@ DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
 
 @given(message=client_messages)
 def test_client_messages_round_trip(message: ClientMessage) -> None:
-    """Decoding an encoded message returns an equal one."""
     assert decode_client_message(encode(message)) == message
 
 
 @given(message=robot_messages)
 def test_robot_messages_round_trip(message: RobotMessage) -> None:
-    """Decoding an encoded message returns an equal one."""
     assert decode_robot_message(encode(message)) == message
 
 
 def test_every_message_has_a_strategy() -> None:
-    """A new type of message must be added to the strategies."""
     for union, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
         tried = {kind.__name__ for kind in get_args(union)}
         assert all(f"{name}" in repr(strategy) for name in tried)
@@ -49,7 +46,6 @@ def test_every_message_has_a_strategy() -> None:
 @pytest.mark.parametrize("side", DECODERS)
 @given(data=st.binary(max_size=300))
 def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
-    """A decoder raises only LinkError."""
     with contextlib.suppress(LinkError):
         DECODERS[side](data)
 
@@ -58,7 +54,6 @@ def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
 def test_a_truncated_message_is_refused(
     message: ClientMessage | RobotMessage, data: st.DataObject
 ) -> None:
-    """No message is a prefix of another."""
     whole = encode(message)
     cut = whole[: data.draw(st.integers(0, len(whole) - 1))]
     for decode in DECODERS.values():
@@ -70,7 +65,6 @@ def test_a_truncated_message_is_refused(
 def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
     message: ClientMessage, data: st.DataObject
 ) -> None:
-    """Damaged bytes that decode give a message that encodes again."""
     damaged = bytearray(encode(message))
     bit = data.draw(st.integers(0, 8 * len(damaged) - 1))
     damaged[bit // 8] ^= 1 << bit % 8
@@ -82,13 +76,11 @@ def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
 
 
 def test_trailing_bytes_are_refused() -> None:
-    """A WebSocket message holds exactly one message."""
     with pytest.raises(LinkError):
         decode_client_message(encode(messages.Take()) + b"\x00")
 
 
 def test_a_large_message_is_refused_before_it_is_read() -> None:
-    """The size is checked before the content."""
     with pytest.raises(LinkError, match="larger than the 65536 allowed"):
         decode_client_message(bytes(MAX_CLIENT_MESSAGE + 1))
 
@@ -105,7 +97,6 @@ def test_a_large_message_is_refused_before_it_is_read() -> None:
     ],
 )
 def test_a_false_length_costs_no_memory(data: bytes) -> None:
-    """False lengths and deep nesting raise without allocating memory or exhausting the stack."""
     with pytest.raises(LinkError):
         decode_client_message(data)
 
@@ -132,20 +123,17 @@ def test_a_false_length_costs_no_memory(data: bytes) -> None:
     ],
 )
 def test_values_out_of_bounds_are_refused(fields: object) -> None:
-    """Types and bounds of each field are checked."""
     with pytest.raises(LinkError, match="Not a valid message"):
         decode_client_message(msgspec.msgpack.encode(fields))
 
 
 def test_unknown_keys_are_ignored() -> None:
-    """A newer minor version may add keys."""
     fields = {"kind": "command", "seq": 1, "answers": 2, "values": [1], "mood": {"is": ["good"]}}
     decoded = decode_client_message(msgspec.msgpack.encode(fields))
     assert decoded == Command(seq=1, answers=2, values=(1.0,))
 
 
 def test_a_frame_is_sent_as_bytes() -> None:
-    """A JPEG adds only its own bytes and a few for its length, without base64."""
     jpeg = bytes(range(256)) * 20
     fields = {name: 0 for name in Observation.__struct_fields__}
     empty = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": b""})
@@ -155,7 +143,6 @@ def test_a_frame_is_sent_as_bytes() -> None:
 
 
 def test_bytes_are_not_in_the_repr() -> None:
-    """`repr` gives the size of bytes, so that logs hold no frames or proofs."""
     fields = {name: 0 for name in Observation.__struct_fields__}
     seen = Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
     assert "frame=<5000 bytes>" in repr(seen)
@@ -167,6 +154,5 @@ def test_bytes_are_not_in_the_repr() -> None:
 
 
 def test_a_request_to_arm_must_answer_an_observation() -> None:
-    """Without `answers` it is not a valid message."""
     with pytest.raises(LinkError, match="answers"):
         decode_client_message(msgspec.msgpack.encode({"kind": "arm", "emergency": 0}))

@@ -36,7 +36,6 @@ def rows(head: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: message.__name__)
 def test_the_page_has_each_message_with_its_fields(message: Any) -> None:
-    """Each kind has a row, which names each of its fields."""
     kind = message.__struct_config__.tag
     fields = set(message.__struct_fields__)
     if message is Hello:
@@ -50,7 +49,6 @@ def test_the_page_has_each_message_with_its_fields(message: Any) -> None:
 
 
 def test_the_page_has_the_numbers_of_the_wire() -> None:
-    """Version, limits of sizes, and the fields of an episode in a list."""
     assert f"`version` ({VERSION})" in PAGE
     assert f"| size of a client's message | {MAX_CLIENT_MESSAGE // 1024} KiB |" in PAGE
     listed = rows("| `kind` | fields")["recordings"]

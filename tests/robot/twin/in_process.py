@@ -19,7 +19,7 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
+from shapechanger.robot.daemon.control import NumberedFrame, StateReader, build_observation
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.hardware import Clock

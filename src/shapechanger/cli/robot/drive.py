@@ -17,8 +17,7 @@ from rich.text import Text
 from shapechanger.cli.console import plain_console, say
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.robot.client.browser import can_open, open_console
-from shapechanger.robot.client.known_robots import KnownRobot, recall
+from shapechanger.robot.client.known_robots import KnownRobot, can_open, open_console, recall
 from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 from shapechanger.robot.link.messages import Observation
 

@@ -12,7 +12,7 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.errors import MissingExtra, UnknownName
-from shapechanger.robot.client.browser import console_address
+from shapechanger.robot.client.known_robots import console_address
 from shapechanger.robot.daemon.credentials import Credentials, credentials_folder, load_credentials
 from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
 from shapechanger.robot.serve import robot_at

@@ -21,8 +21,13 @@ from collections.abc import Callable, Sequence
 from typing import Final, Self, TypeVar
 
 from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.robot.client.connection import Access, RobotConnection, open_connection
-from shapechanger.robot.client.inbox import Inbox, Received
+from shapechanger.robot.client.connection import (
+    Access,
+    Inbox,
+    Received,
+    RobotConnection,
+    open_connection,
+)
 from shapechanger.robot.client.known_robots import KnownRobot, parse_trust, untrusted
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import parse_address

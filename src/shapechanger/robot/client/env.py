@@ -15,7 +15,7 @@ from shapechanger.contract.drive import DriveReward
 from shapechanger.errors import LinkError, RenderError, RobotRefused, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.known_robots import KnownRobot, known_names, recall
 from shapechanger.robot.client.observations import BUMP, RobotSpaces, StepMeter, View
 from shapechanger.robot.client.operator import Preparation, Takeover, interruption

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import LinkError, MissingExtra, RobotRefused, SpaceMismatch
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.connection import Received
 from shapechanger.robot.link.messages import Observation, Welcome
 
 try:
@@ -35,11 +35,7 @@ _QUANTITIES: Final = ("speed", "collision", "stall")
 
 
 def decode_picture(jpeg: bytes) -> NDArray[np.uint8]:
-    """Decode a JPEG to RGB, shape (height, width, 3).
-
-    Raises:
-        LinkError: If the bytes are not a JPEG, or the picture is too large.
-    """
+    """Decode a JPEG to RGB, shape (height, width, 3)."""
     try:
         height, width = (int(n) for n in simplejpeg.decode_jpeg_header(jpeg)[:2])
         if height * width > _MAX_PIXELS:
@@ -55,10 +51,6 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
     If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
     Otherwise it is the pixel nearest to its middle. Nothing is cropped, so a change of proportions
     stretches the picture.
-
-    Args:
-        picture: Shape (height, width, 3).
-        size: Width and height, pixels, each at least 1.
 
     Returns:
         Shape (size[1], size[0], 3); the picture itself if it has this size.
@@ -93,12 +85,6 @@ class View:
 class RobotSpaces:
     """Spaces and layouts of one robot, and observations from its messages.
 
-    Args:
-        welcome: Description of the robot.
-        size: Width and height of the pictures, pixels.
-        image: Whether observations have a picture; None if the robot has a camera.
-        state: Whether observations have the state besides the picture.
-
     Attributes:
         action_layout: Layout of an action.
         action_space: One number for each action of the robot.
@@ -106,10 +92,6 @@ class RobotSpaces:
         observation_space: Space of the picture, the state, or both.
         has_image: Whether observations have a picture.
         picture: The newest picture at the camera's size; None before the first.
-
-    Raises:
-        RobotRefused: If a picture is required and the robot has no camera.
-        SpaceMismatch: If the size is below 1 pixel.
     """
 
     def __init__(
@@ -157,11 +139,7 @@ class RobotSpaces:
         self._viewed_seq = 0
 
     def values(self, action: Any) -> tuple[float, ...]:
-        """Return the values of a command, clipped to the range of the action.
-
-        Raises:
-            SpaceMismatch: If the shape is wrong, or a number is not finite.
-        """
+        """Return the values of a command, clipped to the range of the action."""
         array = np.asarray(action, dtype=np.float64)
         if array.shape != self.action_space.shape or not np.isfinite(array).all():
             raise SpaceMismatch(
@@ -176,12 +154,7 @@ class RobotSpaces:
         return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
 
     def quantity(self, message: Observation, name: str) -> float | None:
-        """Return a quantity of the state by name, or None if no sensor measures it.
-
-        Args:
-            message: An observation.
-            name: Name of the quantity, such as "speed".
-        """
+        """Return a quantity of the state by name, or None if no sensor measures it."""
         place = self._places.get(name)
         if place is None or message.sources.get(name, _ABSENT) == _ABSENT:
             return None
@@ -189,12 +162,7 @@ class RobotSpaces:
         return None if math.isnan(value) else value
 
     def source(self, message: Observation, name: str) -> str:
-        """Return the source of a quantity: name of the sensor, "estimated" or "absent".
-
-        Args:
-            message: An observation.
-            name: Name of the quantity, such as "speed".
-        """
+        """Return the source of a quantity: name of the sensor, "estimated" or "absent"."""
         is_measured = self.quantity(message, name) is not None
         return message.sources[name] if is_measured else _ABSENT
 
@@ -220,11 +188,7 @@ class RobotSpaces:
         self._tried_seq = self._picture_seq = self._viewed_seq = 0
 
     def view(self, received: Received) -> View:
-        """Return the env's observation for an observation of the robot.
-
-        Raises:
-            LinkError: If the state does not fit the layout, or there is no picture yet.
-        """
+        """Return the env's observation for an observation of the robot."""
         message = received.message
         if len(message.state) != self._state_size:
             raise LinkError(
@@ -274,11 +238,7 @@ class StepMeasures(NamedTuple):
 
 
 class StepMeter:
-    """Measures one robot's steps, one after another.
-
-    Args:
-        spaces: Reads the robot's messages.
-    """
+    """Measures one robot's steps, one after another."""
 
     def __init__(self, spaces: RobotSpaces) -> None:
         self._spaces = spaces
@@ -289,13 +249,7 @@ class StepMeter:
         self._touched = bool(self._touches(seen)[0])
 
     def measure(self, before: Observation, seen: Observation, bumped: bool) -> StepMeasures:
-        """Return the measured quantities of a step.
-
-        Args:
-            before: The observation before the step.
-            seen: The observation after the step.
-            bumped: Whether there was a bump, which may be over by now.
-        """
+        """Return the measured quantities of a step."""
         touches = self._touches(seen)[0]
         stall = self._spaces.quantity(seen, "stall")
         hits = bool(touches) or bumped

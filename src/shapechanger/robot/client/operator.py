@@ -10,7 +10,7 @@ from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.connection import Received
 from shapechanger.robot.link.messages import Observation
 
 _POLL_S: Final = 0.05  # Period of checks for what a person does.

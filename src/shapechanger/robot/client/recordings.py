@@ -25,15 +25,7 @@ _LOOK_EVERY_S: Final = 0.1
 
 
 def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[EpisodeSummary]:
-    """Return the episodes on a robot, oldest first.
-
-    Args:
-        robot: The robot.
-        wanted: Ids of the episodes; empty for all.
-
-    Raises:
-        UnknownName: If one is not there.
-    """
+    """Return the episodes on a robot, oldest first."""
     found: list[EpisodeSummary] = []
     more = True
     while more:
@@ -65,16 +57,6 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
 
     An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
     here are kept after those of the robot, so that they override these.
-
-    Args:
-        robot: The robot.
-        name: Id of the episode.
-        data: Folder of the recording.
-
-    Raises:
-        DemosError: If the data is damaged, or the local steps are not those of the robot.
-        OutputError: If it cannot be written; the part before that is kept.
-        LinkError: If the robot does not respond or refuses.
     """
     here, part = data / name, data / f".{name}{_PART}"
     folder = here if is_episode(here) else part
@@ -176,23 +158,14 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
 
 
 def begin_recording(robot: RobotClient) -> set[str]:
-    """Begin to record on a robot, as a person, and return the ids of the episodes before.
-
-    Raises:
-        RobotRefused: If the robot refuses to record.
-    """
+    """Begin to record on a robot, as a person, and return the ids of the episodes before."""
     before = {episode.id for episode in episodes_there(robot)}
     robot.record(on=True)
     return before
 
 
 def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
-    """End a recording, if it has not ended by itself, and return its episodes.
-
-    Args:
-        robot: The robot.
-        before: What `begin_recording` returned.
-    """
+    """End a recording, if it has not ended by itself, and return its episodes."""
     state = robot.recorder
     if state is not None and state.recording:
         robot.record(on=False)

@@ -50,11 +50,7 @@ class FrameChecks:
 
 
 class FrameReader:
-    """Reads a camera in a thread, and reopens it after failures.
-
-    Attributes:
-        errors: Number of frames or attempts that failed.
-    """
+    """Reads a camera in a thread, and reopens it after failures."""
 
     def __init__(
         self,

@@ -12,9 +12,14 @@ from typing import Final, Protocol
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.control import ClientIdentity, ControlLease, PendingCommand
+from shapechanger.robot.daemon.control import (
+    ClientIdentity,
+    ControlLease,
+    NumberedFrame,
+    PendingCommand,
+    StateReader,
+)
 from shapechanger.robot.daemon.library import RecordingLibrary
-from shapechanger.robot.daemon.observation import NumberedFrame, StateReader
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.daemon.recorder import Recorder

@@ -17,8 +17,7 @@ import msgspec
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.robot.daemon.control import ClientIdentity
-from shapechanger.robot.daemon.observation import NumberedFrame
+from shapechanger.robot.daemon.control import ClientIdentity, NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (

@@ -1,13 +1,16 @@
-"""HTTP server of the robot: the link at `/link`, and the console for browsers."""
+"""HTTP server of the robot: its connections from acceptance on, the link, and the console."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import itertools
 import logging
+import os
 import socket
 import ssl
-from collections.abc import Awaitable, Callable
+from collections import Counter
+from collections.abc import Awaitable, Callable, Hashable
 from typing import Final
 from urllib.parse import urlsplit
 
@@ -22,13 +25,210 @@ from shapechanger.robot.daemon.connection import (
     new_socket,
 )
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.pre_auth import Listener, PreAuthConnections
 from shapechanger.robot.daemon.session import Authenticator, Session, WrongKey
 from shapechanger.robot.link.address import is_loopback, parse_address
 from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.messages import VERSION
 
+_PRE_AUTH_TIMEOUT_S: Final = 3.0
+"""Time that a connection has for its first request, and for each one after it, s."""
+
 _log = logging.getLogger(__name__)
+
+_MAX_TOTAL: Final = 48
+_MAX_PER_ADDRESS: Final = 16  # A browser opens six, and a person may have two pages open.
+_BACKLOG: Final = 32
+_SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few frames.
+_ACCEPT_PAUSE_S: Final = 0.05  # After a failed accept, most likely for want of descriptors.
+
+
+class PreAuthConnections:
+    """Bounded, short-lived set of connections before authentication.
+
+    A new connection is never turned away, because it may be the person who wants to stop the
+    robot: it replaces the oldest connection of the address that has the most.
+    """
+
+    def __init__(
+        self,
+        max_total: int = _MAX_TOTAL,
+        max_per_address: int = _MAX_PER_ADDRESS,
+        timeout_s: float = _PRE_AUTH_TIMEOUT_S,
+    ) -> None:
+        self._max_total = max_total
+        self._max_per_address = max_per_address
+        self._timeout_s = timeout_s
+        # Oldest first.
+        self._waiting: dict[Hashable, tuple[AcceptedSocket, asyncio.TimerHandle]] = {}
+
+    def __len__(self) -> int:
+        """Return the number of connections."""
+        return len(self._waiting)
+
+    def add(self, key: Hashable, connection: AcceptedSocket) -> None:
+        """Add a connection, and drop another one if there are too many."""
+        for other in [k for k, (known, _) in self._waiting.items() if known.is_gone]:
+            self.remove(other)
+        if self._counts()[connection.address] >= self._max_per_address:
+            self._drop_oldest(connection.address)
+        elif len(self._waiting) >= self._max_total:
+            self.drop_one()
+        self._insert(key, connection)
+
+    def renew(self, key: Hashable) -> None:
+        """Restart the timeout after a request was served; the connection becomes the youngest."""
+        if key in self._waiting:
+            connection, _ = self._waiting[key]
+            self.remove(key)
+            self._insert(key, connection)
+
+    def stop_timer(self, key: Hashable) -> None:
+        """End the timeout of a connection that opened the link, whose hello has its own limit."""
+        if key in self._waiting:
+            self._waiting[key][1].cancel()
+
+    def remove(self, key: Hashable) -> None:
+        """Forget a connection that has authenticated or ended."""
+        if key in self._waiting:
+            self._waiting.pop(key)[1].cancel()
+
+    def drop_one(self) -> None:
+        """Drop the oldest connection of the address that has the most."""
+        # Of addresses with equal counts, this is the one that connected first.
+        for address, _ in self._counts().most_common(1):
+            self._drop_oldest(address)
+
+    def close(self) -> None:
+        """Drop all connections."""
+        for key in list(self._waiting):
+            self._drop(key)
+
+    def _counts(self) -> Counter[str]:
+        return Counter(connection.address for connection, _ in self._waiting.values())
+
+    def _insert(self, key: Hashable, connection: AcceptedSocket) -> None:
+        timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
+        self._waiting[key] = connection, timer
+
+    def _drop_oldest(self, address: str) -> None:
+        self._drop(next(k for k, (c, _) in self._waiting.items() if c.address == address))
+
+    def _drop(self, key: Hashable) -> None:
+        connection, _ = self._waiting[key]
+        self.remove(key)
+        connection.drop()
+
+
+class Listener:
+    """Accepts connections, and registers each one before its TLS handshake."""
+
+    def __init__(
+        self,
+        connections: PreAuthConnections,
+        protocol: Callable[[], asyncio.Protocol],
+        tls: ssl.SSLContext | None,
+    ) -> None:
+        self._connections = connections
+        self._protocol = protocol
+        self._tls = tls
+        self._sockets: list[socket.socket] = []
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def start(self, host: str, port: int) -> int:
+        """Start listening.
+
+        Returns:
+            The port.
+        """
+        loop = asyncio.get_running_loop()
+        try:
+            found = await loop.getaddrinfo(
+                host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+            )
+            for family, *_, address in dict.fromkeys(found):
+                listening = socket.create_server(address, family=family, backlog=_BACKLOG)
+                self._sockets.append(listening)
+                listening.setblocking(False)
+        except OSError as error:
+            self._close_sockets()
+            why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+            raise RobotError(
+                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
+            ) from error
+        self._tasks = [asyncio.create_task(self._accept(each)) for each in self._sockets]
+        return self._sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        """Stop listening, and drop all connections that have not authenticated."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._close_sockets()
+        self._connections.close()
+
+    def _close_sockets(self) -> None:
+        for each in self._sockets:
+            each.close()
+
+    async def _accept(self, listening: socket.socket) -> None:
+        loop, fails = asyncio.get_running_loop(), False
+        while True:
+            try:
+                accepted, address = await loop.sock_accept(listening)
+                accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+            except OSError as error:
+                if not fails:
+                    _log.warning("Cannot accept connections: %s", error)
+                fails = True
+                self._connections.drop_one()
+                await asyncio.sleep(_ACCEPT_PAUSE_S)
+                continue
+            fails = False
+            protocol = self._protocol()
+            self._connections.add(
+                protocol, AcceptedSocket(accepted, address[0], protocol, self._tls)
+            )
+            await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
+
+
+class AcceptedSocket:
+    """A connection from its acceptance on, through the TLS handshake."""
+
+    def __init__(
+        self,
+        accepted: socket.socket,
+        address: str,
+        protocol: asyncio.Protocol,
+        tls: ssl.SSLContext | None,
+    ) -> None:
+        self.address = address
+        self._socket = accepted
+        self._transport: asyncio.Transport | None = None
+        self._task = asyncio.create_task(self._connect(protocol, tls))
+
+    @property
+    def is_gone(self) -> bool:
+        """True once the connection has closed by itself."""
+        return self._task.done() and (self._transport is None or self._transport.is_closing())
+
+    def drop(self) -> None:
+        """Close the connection without a message."""
+        if self._transport is not None:
+            self._transport.abort()
+            return
+        # The handshake then reads the end of the stream, however far it has come.
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+
+    async def _connect(self, protocol: asyncio.Protocol, tls: ssl.SSLContext | None) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            self._transport, _ = await loop.connect_accepted_socket(
+                lambda: protocol, self._socket, ssl=tls
+            )
+        except OSError as error:  # The other end speaks no TLS, or has left.
+            _log.debug("The TLS handshake with %s failed: %s", self.address, error)
+
 
 # A key of 128 bits cannot be guessed. The pause keeps an attempt from costing the robot more than
 # its sender, and does not delay a client with the right key at the same address.

@@ -11,10 +11,9 @@ from time import monotonic
 from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.robot.daemon.control import ClientIdentity
+from shapechanger.robot.daemon.control import ClientIdentity, build_observation
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.library import Answer, Question
-from shapechanger.robot.daemon.observation import build_observation
 from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.authentication import is_proof, new_nonce

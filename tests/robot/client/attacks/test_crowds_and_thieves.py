@@ -87,7 +87,6 @@ HOLDS = (
 def test_a_person_stops_the_robot_whoever_holds_its_connections(
     scene: Scene, hold: Callable[[Scene, str], Stranger]
 ) -> None:
-    """With 48 connections of six addresses held, or eight of clients with the key."""
     count = 9 if "thief" in hold.__name__ else 54
     held = [hold(scene, source) for _ in range(count // 6 + 1) for source in ELSEWHERE]
     person = scene.stranger()
@@ -103,7 +102,6 @@ def test_a_person_stops_the_robot_whoever_holds_its_connections(
 def test_a_slow_connection_ends_however_many_bytes_it_sends(
     scene: Scene, hold: Callable[[Scene, str], Stranger]
 ) -> None:
-    """The time for a request and for a hello counts from its beginning."""
     slow = [hold(scene, source) for source in ELSEWHERE]
     while slow:
         for stranger in slow:
@@ -116,7 +114,6 @@ def test_a_slow_connection_ends_however_many_bytes_it_sends(
 
 
 def test_a_thief_of_the_key_stays_within_the_limits_of_the_guard(robot: RunningRobot) -> None:
-    """Full speed for a minute is the profile's speed until the deadline; then the robot rests."""
     key = key_of(robot)
     before = len(read_ledger(robot.ledger_path))
     with Stranger(robot.port) as thief:
@@ -137,7 +134,6 @@ def test_a_thief_of_the_key_stays_within_the_limits_of_the_guard(robot: RunningR
 
 
 def test_any_client_with_the_key_stops_a_thief(robot: RunningRobot) -> None:
-    """A program stops a person; only a client that claims to be a person goes on."""
     key = key_of(robot)
     with Stranger(robot.port) as thief, Stranger(robot.port) as program:
         thief.enter(key, "person", name="thief")
@@ -171,7 +167,6 @@ def test_a_proof_can_be_passed_on_by_who_has_the_certificate(robot: RunningRobot
 
 
 def test_no_log_contains_a_key_or_a_proof(robot: RunningRobot) -> None:
-    """Nor do command lines, environments, pages and files outside of the credentials' folder."""
     text = (robot.folder / "credentials" / "key").read_text().strip()
     private = (robot.folder / "credentials" / "certificate.key").read_text().splitlines()[1:-1]
     key = key_of(robot)
@@ -210,7 +205,6 @@ def base64_of(secret: bytes) -> str:
 
 
 def test_an_honest_client_moves_the_robot(robot: RunningRobot) -> None:
-    """The same client, by the rules: the ledger shows what the attacks did not achieve."""
     key = key_of(robot)
     before = movements(robot)
     with Stranger(robot.port) as operator:

@@ -505,6 +505,5 @@ for invalid, (_, complaint) in UNUSABLE.items():
 
 @pytest.mark.parametrize("name", ATTACKS)
 def test_an_attack_is_refused_without_a_movement(scene: Scene, name: str) -> None:
-    """The robot says why, or closes the connection."""
     attack, words = ATTACKS[name]
     assert words.lower() in attack(scene).lower()
