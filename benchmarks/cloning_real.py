@@ -49,7 +49,7 @@ from torch.nn import functional
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.card import class_numbers
-from shapechanger.demos.cloning.judge import macro_f1, output_fields
+from shapechanger.demos.cloning.evaluation import macro_f1, output_fields
 from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy

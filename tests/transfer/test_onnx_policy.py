@@ -101,5 +101,5 @@ def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: P
             card["action"] = card["observation"]
             entry.value = json.dumps(card)
     (tmp_path / "mine.onnx").write_bytes(model.SerializeToString())
-    with pytest.raises(CorruptStudy, match="its layouts"):
+    with pytest.raises(CorruptStudy, match="its card says"):
         OnnxPolicy(tmp_path / "mine.onnx")

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import CorruptStudy, MissingExtra, StudyError, no_policy_file
+from shapechanger.errors import CorruptStudy, StudyError
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.onnx_file import OnnxNetwork
-from shapechanger.policy import refusal
 
 
 class OnnxCard(msgspec.Struct, frozen=True):
@@ -56,24 +55,8 @@ class OnnxPolicy:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            self._network = OnnxNetwork(path)
-            self.card = msgspec.json.decode(self._network.card, type=OnnxCard)
-            sizes = {
-                "observation": [self.card.observation.size],
-                "action": [self.card.action.size],
-            }
-            if self._network.shapes != sizes:
-                raise ValueError(f"its network has {self._network.shapes}, and its layouts {sizes}")
-        except FileNotFoundError as error:
-            raise CorruptStudy(no_policy_file(path)) from error
-        except MissingExtra:
-            raise
-        except Exception as error:  # The runtime's errors have no common base.
-            raise CorruptStudy(
-                f"{path} is not a policy that `shapechanger policies export` has written "
-                f"({refusal(error)})."
-            ) from error
+        self._network = OnnxNetwork(path, OnnxCard, _shapes, CorruptStudy)
+        self.card = self._network.card
 
     def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
         """Return the mean actions, shape (n, actions), for observations of shape (n, observations).
@@ -87,3 +70,7 @@ class OnnxPolicy:
                 f"{observations.shape}."
             )
         return self._network.run({"observation": np.asarray(observations, np.float64)})
+
+
+def _shapes(card: OnnxCard) -> dict[str, list[int]]:
+    return {"observation": [card.observation.size], "action": [card.action.size]}

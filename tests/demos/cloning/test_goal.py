@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shapechanger.demos.cloning.card import CloneCard, class_numbers
-from shapechanger.demos.cloning.judge import AskedHead, output_fields
+from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
 from shapechanger.demos.cloning.pictures import CloningError, Framing
 from shapechanger.layout import Feature, Layout
 

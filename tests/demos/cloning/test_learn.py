@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning.judge import judge
+from shapechanger.demos.cloning.evaluation import judge
 from shapechanger.demos.cloning.learn import Inputs, Training, learn
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy

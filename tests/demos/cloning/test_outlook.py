@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.judge import CORRECTED, EXPERT, Driven, duration_s, outlook
+from shapechanger.demos.cloning.evaluation import CORRECTED, EXPERT, Driven, duration_s, outlook
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.layout import Feature, Layout
 from tests.demos.cloning.data import KEYS, STATE, STEERS

@@ -18,7 +18,7 @@ from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import require_file, write_atomic
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.judge import Judgement
+    from shapechanger.demos.cloning.evaluation import EvaluationResult
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.vehicles.cloning import CloningSettings
@@ -63,8 +63,8 @@ class TrainClone:
         self._require_files()
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.demos.cloning.report")
+        from shapechanger.demos.cloning.evaluation import duration_s, judge, outlook
         from shapechanger.demos.cloning.examples import judged_steps
-        from shapechanger.demos.cloning.judge import duration_s, judge, outlook
         from shapechanger.demos.cloning.learn import learn
         from shapechanger.demos.cloning.report import clone_html, write_numbers
         from shapechanger.demos.cloning.settings import settings_for
@@ -205,9 +205,9 @@ class _Progress(StudyProgress):
         return f"network {member + 1}"
 
 
-def _print_judgement(judgement: Judgement) -> None:
+def _print_judgement(judgement: EvaluationResult) -> None:
     """Print an evaluation; the last line is the accuracy."""
-    always = f"always the same: {judgement.always:.3f}"
+    always = f"always the same: {judgement.majority_baseline:.3f}"
     say(f"{judgement.steps} steps; {always}")
     if judgement.head == "class":
         for name, row in zip(judgement.classes, judgement.confusion, strict=True):
@@ -246,7 +246,7 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate and print."""
-        from shapechanger.demos.cloning.judge import judge
+        from shapechanger.demos.cloning.evaluation import judge
         from shapechanger.demos.cloning.policy import CameraPolicy
         from shapechanger.demos.cloning.shrinking import ShrunkFrames
 

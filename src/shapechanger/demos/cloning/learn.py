@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
 from shapechanger.demos.cloning.examples import (
     Examples,
     Mirror,
@@ -23,7 +24,6 @@ from shapechanger.demos.cloning.examples import (
     steering_examples,
     stretch,
 )
-from shapechanger.demos.cloning.judge import AskedHead, output_fields
 from shapechanger.demos.cloning.pictures import CloningError, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings, settings_for

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import PolicyError, prepare
-from shapechanger.errors import MissingExtra, no_policy_file
 from shapechanger.onnx_file import OnnxNetwork, export_network
-from shapechanger.policy import refusal
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy
@@ -109,19 +107,8 @@ class OnnxClone:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            self._network = OnnxNetwork(path, _CARD)
-            whole = msgspec.json.decode(self._network.card, type=OnboardCard)
-            self._require_shapes(whole.clone)
-        except FileNotFoundError as error:
-            raise PolicyError(no_policy_file(path)) from error
-        except MissingExtra:
-            raise
-        except Exception as error:  # The runtime's errors have no common base.
-            raise PolicyError(
-                f"{path} is not a cloned policy that `shapechanger policies export` has written: "
-                f"{refusal(error)}."
-            ) from error
+        self._network = OnnxNetwork(path, OnboardCard, _shapes, PolicyError, _CARD)
+        whole = self._network.card
         self.card, self.body, self.control_hz = whole.clone, whole.body, whole.control_hz
         self.digest = self._network.digest
 
@@ -165,14 +152,13 @@ class OnnxClone:
             ]
         )
 
-    def _require_shapes(self, card: CloneCard) -> None:
-        """Require that inputs and output have the shapes that the card gives."""
-        wanted: dict[str, list[int]] = {}
-        if card.eyes != "none":
-            wanted[_PICTURE] = list(card.framing.shape)
-        if card.state_size:
-            wanted[_STATE] = [card.state_size]
-        wanted[_OUTPUT] = [card.outputs]
-        found = self._network.shapes
-        if found != wanted:
-            raise ValueError(f"its network takes and gives {found}, and its card says {wanted}")
+
+def _shapes(whole: OnboardCard) -> dict[str, list[int]]:
+    """Return the shapes of inputs and output that a card states."""
+    card = whole.clone
+    shapes: dict[str, list[int]] = {}
+    if card.eyes != "none":
+        shapes[_PICTURE] = list(card.framing.shape)
+    if card.state_size:
+        shapes[_STATE] = [card.state_size]
+    return shapes | {_OUTPUT: [card.outputs]}

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from shapechanger.demos.cloning.judge import Bin, Judgement, named, outlook
+from shapechanger.demos.cloning.evaluation import Bin, EvaluationResult, named, outlook
 from shapechanger.demos.cloning.learn import Training
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.files import write_json
@@ -26,7 +26,7 @@ _MAGNIFICATION: Final = 3
 
 
 def write_numbers(
-    path: Path, policy: CameraPolicy, judgement: Judgement, training: Training | None
+    path: Path, policy: CameraPolicy, judgement: EvaluationResult, training: Training | None
 ) -> None:
     """Write the report's numbers as JSON.
 
@@ -54,7 +54,7 @@ def clone_html(
     name: str,
     policy: CameraPolicy,
     data: Dataset,
-    judgement: Judgement,
+    judgement: EvaluationResult,
     training: Training | None,
     data_note: str,
 ) -> str:
@@ -79,7 +79,7 @@ def clone_html(
         verdict=(
             f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps; "
             "always choosing the driver's most frequent action is right on "
-            f"{judgement.always:.1%}. {data_note}"
+            f"{judgement.majority_baseline:.1%}. {data_note}"
         ),
         cards=_cards(judgement),
         outlook=outlook(policy.card),
@@ -107,16 +107,18 @@ def clone_html(
     )
 
 
-def _cards(judgement: Judgement) -> list[tuple[str, str]]:
+def _cards(judgement: EvaluationResult) -> list[tuple[str, str]]:
     shown = [("Accuracy", f"{judgement.accuracy:.3f}"), ("Macro-F1", f"{judgement.macro_f1:.3f}")]
     if judgement.ece is not None:
         shown.append(("Calibration error", f"{judgement.ece:.3f}"))
     else:
         shown.append((f"Within {judgement.tolerance:g}", f"{judgement.within:.3f}"))
-    return [*shown, ("Most frequent action", f"{judgement.always:.3f}")]
+    return [*shown, ("Most frequent action", f"{judgement.majority_baseline:.3f}")]
 
 
-def _worst(policy: CameraPolicy, data: Dataset, judgement: Judgement) -> list[dict[str, Any]]:
+def _worst(
+    policy: CameraPolicy, data: Dataset, judgement: EvaluationResult
+) -> list[dict[str, Any]]:
     """The steps with the largest errors: what the driver did, and what the policy did."""
     chosen = list(judgement.worst)
     pictures = None if data.pictures is None else data.pictures[chosen]
@@ -161,11 +163,11 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
 
     def draw(_: Figure, axes: Axes) -> None:
         axes.plot([0, 1], [0, 1], color="#777777", linestyle="--", linewidth=1.0)
-        sure, right = [b.sure for b in bins], [b.right for b in bins]
+        sure, right = [b.confidence for b in bins], [b.accuracy for b in bins]
         axes.plot(sure, right, color=BLUE, marker="o", linewidth=1.5)
         for one in bins:
             axes.annotate(
-                str(one.steps), (one.sure, one.right), (4, -12), textcoords="offset points"
+                str(one.steps), (one.confidence, one.accuracy), (4, -12), textcoords="offset points"
             )
         axes.set_xlim(0, 1)
         axes.set_ylim(0, 1.05)
@@ -175,12 +177,12 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
     return svg_chart(SQUARE, draw)
 
 
-def scatter_chart(judgement: Judgement, place: int) -> str:
+def scatter_chart(judgement: EvaluationResult, place: int) -> str:
     """Plot one number of each action: the policy's over the driver's."""
 
     def draw(_: Figure, axes: Axes) -> None:
-        wanted = [row[place] for row in judgement.wanted]
-        done = [row[place] for row in judgement.done]
+        wanted = [row[place] for row in judgement.target]
+        done = [row[place] for row in judgement.predicted]
         low, high = min(*wanted, *done), max(*wanted, *done)
         axes.plot([low, high], [low, high], color="#777777", linestyle="--", linewidth=1.0)
         axes.scatter(wanted, done, s=9, alpha=0.35, color=BLUE, linewidths=0, rasterized=True)

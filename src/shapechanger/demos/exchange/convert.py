@@ -26,13 +26,14 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
-from shapechanger.demos.exchange.exporting import consecutive_parts, exchange_episode
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
     ExportContext,
     Format,
     ImportContext,
+    consecutive_parts,
+    exchange_episode,
     kept_steps,
 )
 from shapechanger.errors import DemosError, OutputError, UnknownName

@@ -24,7 +24,6 @@ from msgspec import structs
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
-from shapechanger.demos.exchange.exporting import value_names
 from shapechanger.demos.exchange.files import (
     UNIT_UNKNOWN,
     cannot_read,
@@ -45,6 +44,7 @@ from shapechanger.demos.exchange.format import (
     ImportContext,
     fields_of,
     name_in,
+    value_names,
 )
 from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.exchange.times import TimedDrive, choose_rates, split_at_jumps

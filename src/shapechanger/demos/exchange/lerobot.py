@@ -42,8 +42,7 @@ from shapechanger.demos.exchange.format import (
 )
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
 from shapechanger.demos.exchange.lerobot_index import LocatedEpisode, locate, read_places
-from shapechanger.demos.exchange.pictures import PictureError, Pictures, as_jpeg
-from shapechanger.demos.exchange.video import read_pictures
+from shapechanger.demos.exchange.pictures import PictureError, Pictures, as_jpeg, read_pictures
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Feature, Layout

@@ -32,10 +32,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.demos.exchange.exporting import require_alike, value_names
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext, name_in
-from shapechanger.demos.exchange.video import VideoWriter
+from shapechanger.demos.exchange.format import (
+    ExchangeEpisode,
+    ExchangeStep,
+    ExportContext,
+    name_in,
+    require_alike,
+    value_names,
+)
+from shapechanger.demos.exchange.pictures import VideoWriter
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout

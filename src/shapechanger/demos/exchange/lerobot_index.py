@@ -28,7 +28,7 @@ from shapechanger.demos.exchange.files import (
 )
 from shapechanger.demos.exchange.format import ImportContext, few
 from shapechanger.demos.exchange.lerobot_export import EPISODES, INFO
-from shapechanger.demos.exchange.video import VideoTimes, read_times
+from shapechanger.demos.exchange.pictures import VideoTimes, read_times
 from shapechanger.errors import DemosError
 
 TOLERANCE_S: Final = 1e-4

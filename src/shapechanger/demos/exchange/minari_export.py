@@ -21,7 +21,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.exporting import require_alike
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
@@ -29,6 +28,7 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     fields_of,
     name_in,
+    require_alike,
 )
 from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size

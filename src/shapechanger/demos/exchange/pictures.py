@@ -1,20 +1,33 @@
-"""Pictures of strangers: each is checked, and turned into a JPEG if it is not one."""
+"""Pictures and videos of other projects: checked, and turned into JPEGs if they are none.
+
+MP4 videos are written and read by an FFmpeg process, the program of imageio-ffmpeg. Files of
+strangers are decoded in that process and not in this one: as MP4 only, without references to other
+files, and with a limit of pixels.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import io
+import os
+import re
+import subprocess
+import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
-from typing import Final
+from typing import IO, Any, Final, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES, read_file
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.format import ImportContext, counted
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture, picture_size
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, OutputError
 
 _JPEG: Final = b"\xff\xd8"
 _MAGIC: Final = {b"\x89PNG": "PNG", b"BM": "BMP"}
@@ -141,3 +154,254 @@ def check_pictures(
     if encoded:
         context.note(f"{counted(encoded, 'picture')} encoded as JPEG of quality 100.")
     return [size is not None and size == common for size in sizes], common
+
+
+# Constant quality, 0 to 51; see the measured error in docs/exchange.md.
+_QUALITY: Final = 18
+_KEY_FRAMES: Final = 2  # Each second picture stands alone, so that learners can read any quickly.
+_LONGEST_LINE: Final = 256
+_FLAGS: Final = re.compile(rb"F=0x([0-9A-F]+)")
+_LEFT_OUT: Final = 0x2 | 0x4  # Flags of packets: damaged, or cut off by the list of edits.
+_PIXELS: Final = re.compile(rb"Stream #0:.*: Video: [^,]*, (\w+)")
+
+
+def _ffmpeg(arguments: Sequence[str], log: str = "error") -> list[str]:
+    """Return the command line of FFmpeg, with the level of its log."""
+    try:
+        path = cast("str", library("imageio_ffmpeg", "lerobot").get_ffmpeg_exe())
+    except RuntimeError as error:  # Where its wheel brings none.
+        raise DemosError(f"Videos need FFmpeg: {error}") from error
+    return [path, "-hide_banner", "-nostats", "-loglevel", log, "-nostdin", *arguments]
+
+
+class VideoWriter:
+    """Writer of a video in H.264, with 4:2:0 colours and a constant rate.
+
+    Args:
+        path: The file to create.
+        size: Width and height in pixels; both even.
+        rate: Pictures per second.
+
+    Attributes:
+        frames: Number of pictures written.
+    """
+
+    CODEC: Final = "h264"
+    PIXELS: Final = "yuv420p"
+
+    def __init__(self, path: Path, size: tuple[int, int], rate: Fraction) -> None:
+        width, height = size
+        if width % 2 or height % 2:
+            raise DemosError(
+                f"A video needs an even width and height, and the pictures have {width} x "
+                f"{height} pixels: export them with --images."
+            )
+        _ffmpeg([])
+        self.frames = 0
+        self._path = path
+        coding = ["-crf", str(_QUALITY), "-g", str(_KEY_FRAMES), "-bf", "0"]
+        self._pictures: Any = library("imageio_ffmpeg", "lerobot").write_frames(
+            str(path.absolute()),
+            size,
+            fps=float(rate),
+            quality=None,
+            codec="libx264",
+            macro_block_size=1,
+            ffmpeg_log_level="quiet",
+            # Which of two rates counts is the last one; the first is rounded.
+            input_params=["-r", f"{rate.numerator}/{rate.denominator}"],
+            output_params=[*coding, "-movflags", "+faststart"],
+        )
+
+    @property
+    def bytes_written(self) -> int:
+        """Size of the file so far, bytes."""
+        return self._path.stat().st_size if self._path.exists() else 0
+
+    def add(self, pixels: NDArray[np.uint8]) -> None:
+        """Append a picture, shape (height, width, 3)."""
+        try:
+            if not self.frames:
+                self._pictures.send(None)  # It starts FFmpeg.
+            self._pictures.send(np.ascontiguousarray(pixels))
+        except OSError as error:
+            raise OutputError(f"Cannot write {self._path}: FFmpeg ended.") from error
+        self.frames += 1
+
+    def close(self) -> None:
+        """Finish the file, and check that it is whole."""
+        self._pictures.close()
+        written = 0
+        with contextlib.suppress(DemosError, OSError):
+            written = len(read_times(self._path).ticks) if self.frames else 0
+        if self.frames != written:
+            raise OutputError(
+                f"Cannot write {self._path}: it has {written} of {self.frames} pictures."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class VideoTimes:
+    """When each picture of a video is shown.
+
+    Attributes:
+        ticks: Times in ticks, ascending, shape (n,).
+        tick_s: Length of a tick, s.
+        size: Width and height of the pictures, pixels.
+        is_cut_off: Whether the end of the file is missing.
+    """
+
+    ticks: NDArray[np.int64]
+    tick_s: Fraction
+    size: tuple[int, int]
+    is_cut_off: bool
+
+    @property
+    def seconds(self) -> NDArray[np.float64]:
+        """Times in seconds, shape (n,)."""
+        return self.ticks.astype(np.float64) * float(self.tick_s)
+
+
+def read_times(path: Path) -> VideoTimes:
+    """Read the times of the pictures of an MP4 video, without decoding them."""
+    taken = ["-map", "0:v:0", "-c", "copy", "-copyinkf", "-f", "framecrc", "pipe:1"]
+    command = _ffmpeg([*_reading(path), *taken], log="info")
+    ticks: list[int] = []
+    about: dict[str, str] = {}
+    most = path.stat().st_size  # Each picture has at least one byte.
+    with tempfile.TemporaryFile() as log, _running(command, log) as (process, stream):
+        for line in iter(lambda: stream.readline(_LONGEST_LINE), b""):
+            if line.startswith(b"#"):
+                name, _, value = line[1:].decode(errors="replace").partition(":")
+                about[name.strip()] = value.strip()
+            elif not (flags := _FLAGS.search(line)) or not int(flags[1], 16) & _LEFT_OUT:
+                # A packet: "stream, decoding time, presentation time, ...".
+                ticks.append(int(line.split(b",")[2]))
+            if len(ticks) > most:
+                raise DemosError(f"{path} claims more pictures than it has bytes.")
+        process.wait()
+        if not ticks or process.returncode:
+            why = f" ({problem})" if (problem := _last_line(log)) else ""
+            raise DemosError(f"{path} has no pictures{why}: restore it.")
+        log.seek(0)
+        said = log.read(1 << 20)
+    found = _PIXELS.search(said)
+    pixels = found[1].decode() if found else "unknown"
+    if pixels.startswith(("gray", "ya")) and pixels.endswith(("le", "be")):
+        raise DemosError(
+            f"{path} has grey pictures of more than 8 bits ({pixels}), like those of a depth "
+            "camera, which cannot be imported."
+        )
+    try:
+        width, height = (int(n) for n in about["dimensions 0"].split("x"))
+        tick_s = Fraction(about["tb 0"])
+    except (KeyError, ValueError, ZeroDivisionError) as error:
+        raise DemosError(f"{path} has no size and no clock: restore it.") from error
+    shown = np.unique(np.array(ticks, np.int64))
+    return VideoTimes(shown, tick_s, (width, height), b"partial file" in said)
+
+
+def read_pictures(
+    path: Path,
+    times: VideoTimes,
+    wanted: Sequence[int],
+    size: tuple[int, int],
+    *,
+    from_start: bool = False,
+) -> Generator[NDArray[np.uint8]]:
+    """Yield the pictures of an MP4 video at some times, shape (height, width, 3).
+
+    Args:
+        path: The file.
+        times: Its times.
+        wanted: The times to read, of those, ascending, in ticks.
+        size: Width and height that the pictures must have, pixels.
+        from_start: Whether to decode the video from its start, not from the key frame before.
+    """
+    width, height = size
+    seek: list[str] = []
+    if wanted[0] > times.ticks[0] and not from_start:
+        # To the key frame before, by the file's own times; rounding must not miss it. An accurate
+        # seek would add the time of the first picture once more.
+        since_s = float(wanted[0] * times.tick_s) - 1e-3
+        seek = ["-noaccurate_seek", "-seek_timestamp", "1", "-ss", f"{since_s:.6f}"]
+    read_fd, write_fd = os.pipe()
+    taken = ["-map", "0:v:0", "-fps_mode", "passthrough"]
+    # A line for each picture, just before it: its time, as in the file.
+    timed = ["-stats_enc_pre", f"pipe:{write_fd}", "-stats_enc_pre_fmt", "{ptsi}"]
+    out = ["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "pipe:1"]
+    # Without these, damaged pictures would be filled up with others.
+    strict = ["-xerror", "-err_detect", "explode"]
+    command = _ffmpeg([*_reading(path, [*strict, *seek]), *taken, *timed, *out])
+    with (
+        tempfile.TemporaryFile() as log,
+        os.fdopen(read_fd, "rb") as lines,
+        _running(command, log, write_fd) as (process, stream),
+    ):
+        for tick in wanted:
+            shown, data = _next_picture(path, size, lines, stream)
+            while data and shown < tick:
+                shown, data = _next_picture(path, size, lines, stream)
+            if seek and tick == wanted[0] and shown != tick:  # That was no key frame.
+                yield from read_pictures(path, times, wanted, size, from_start=True)
+                return
+            if not data or shown != tick:
+                process.kill()
+                why = f" ({problem})" if (problem := _last_line(log)) else ""
+                raise DemosError(
+                    f"{path} is damaged: the picture at {float(tick * times.tick_s):.3f} s "
+                    f"cannot be decoded{why}."
+                )
+            yield np.frombuffer(data, np.uint8).reshape(height, width, 3)
+
+
+def _next_picture(
+    path: Path, size: tuple[int, int], lines: IO[bytes], stream: IO[bytes]
+) -> tuple[int, bytes]:
+    """Return the time of the next picture in ticks, and its pixels; b"" at the end."""
+    line = lines.readline(_LONGEST_LINE)
+    if not line.strip():
+        return 0, b""
+    # Each picture is a PPM: "P6", width and height, 255, and the pixels.
+    head = [stream.readline(_LONGEST_LINE) for _ in range(3)]
+    width, height = size
+    if head[0] and head != [b"P6\n", f"{width} {height}\n".encode(), b"255\n"]:
+        found = head[1].decode(errors="replace").strip().replace(" ", " x ")
+        raise DemosError(
+            f"The pictures in {path} have {found} pixels, but meta/info.json says "
+            f"{width} x {height}."
+        )
+    data = stream.read(width * height * 3)
+    return int(line), data if len(data) == width * height * 3 else b""
+
+
+def _reading(path: Path, seek: Sequence[str] = ()) -> list[str]:
+    """Return the options to read a file of a stranger, with its own times."""
+    limits = ["-protocol_whitelist", "file", "-max_pixels", str(MAX_PIXELS), "-copyts"]
+    return [*limits, "-f", "mov", *seek, "-i", f"file:{path.absolute()}"]
+
+
+@contextlib.contextmanager
+def _running(
+    command: Sequence[str], log: IO[bytes], *fds: int
+) -> Generator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
+    """Run FFmpeg, to which some further descriptors are handed over, and end it."""
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, pass_fds=fds
+    ) as process:
+        for fd in fds:
+            os.close(fd)
+        try:
+            assert process.stdout is not None
+            yield process, process.stdout
+        finally:
+            with contextlib.suppress(OSError):
+                process.kill()
+
+
+def _last_line(log: object) -> str:
+    """Return the last line of FFmpeg's log, without its end."""
+    file = cast("tempfile.SpooledTemporaryFile[bytes]", log)
+    file.seek(0)
+    lines = file.read(1 << 16).decode(errors="replace").strip().splitlines()
+    return lines[-1].strip().rstrip(".") if lines else ""

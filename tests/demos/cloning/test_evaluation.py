@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.judge import in_thirds, judge, macro_f1
+from shapechanger.demos.cloning.evaluation import judge, macro_f1, tercile_classes
 from shapechanger.demos.cloning.learn import best_temperature, learn
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -42,10 +42,10 @@ def test_the_metrics_are_consistent(keys: CameraPolicy) -> None:
     assert confusion.sum() == report.steps == 60
     assert np.trace(confusion) / 60 == pytest.approx(report.accuracy)
     assert sum(b.steps for b in report.calibration) == 60
-    right = sum(b.right * b.steps for b in report.calibration) / 60
+    right = sum(b.accuracy * b.steps for b in report.calibration) / 60
     assert right == pytest.approx(report.accuracy)
     assert report.ece == pytest.approx(
-        sum(b.steps * abs(b.sure - b.right) for b in report.calibration) / 60
+        sum(b.steps * abs(b.confidence - b.accuracy) for b in report.calibration) / 60
     )
     assert "backward" in report.classes
     assert set(range(5)) <= set(report.worst)
@@ -64,7 +64,7 @@ def test_only_the_chosen_steps_are_judged(keys: CameraPolicy) -> None:
 def test_regression_is_correct_in_the_same_third() -> None:
     """Thirds are left, straight and right; back, still and forward."""
     actions = np.array([[-1.0, 1.0], [-0.4, 0.4], [0.2, 0.0], [0.4, -0.9]])
-    names, numbers = in_thirds(actions, STEERS)
+    names, numbers = tercile_classes(actions, STEERS)
     assert [names[i] for i in numbers] == [
         "left forward",
         "left forward",
@@ -146,7 +146,7 @@ def test_regression_is_judged_by_errors() -> None:
     done = policy.predict_many(data.pictures)
     np.testing.assert_allclose(report.errors, np.abs(done - data.actions).mean(axis=0), rtol=1e-5)
     assert report.within == pytest.approx((np.abs(done - data.actions) <= 0.1).all(axis=1).mean())
-    np.testing.assert_allclose(report.done, done, rtol=1e-6)
+    np.testing.assert_allclose(report.predicted, done, rtol=1e-6)
     assert report.ece is None
 
 

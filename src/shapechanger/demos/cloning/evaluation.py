@@ -38,7 +38,7 @@ OUT_OF_RANGE: Final = "out of range"
 """Class of an action that is in no third."""
 
 
-def in_thirds(
+def tercile_classes(
     actions: NDArray[np.float64], layout: Layout, driver: NDArray[np.float64] | None = None
 ) -> tuple[list[str], NDArray[np.int64]]:
     """Return the third of its range that each value is in, one class per combination that occurs.
@@ -145,17 +145,17 @@ class Bin(msgspec.Struct, frozen=True):
     """Steps with similar confidence.
 
     Attributes:
-        sure: Mean probability of the chosen class.
-        right: Share of steps with the driver's class.
+        confidence: Mean probability of the chosen class.
+        accuracy: Share of steps with the driver's class.
         steps: Number of steps.
     """
 
-    sure: float
-    right: float
+    confidence: float
+    accuracy: float
     steps: int
 
 
-class Judgement(msgspec.Struct, frozen=True, kw_only=True):
+class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
     """Evaluation of a policy.
 
     Attributes:
@@ -166,7 +166,7 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
             and right. The range is the layout's, or where that has no bound the driver's.
         macro_f1: Mean F1 score over all classes that the driver or the policy chose; for continuous
             actions over the driver's.
-        always: Accuracy of always choosing the driver's most frequent class on these steps.
+        majority_baseline: Accuracy of always choosing the driver's most frequent class here.
         classes: Names of the classes, or of the thirds that occur.
         confusion: Number of steps by the driver's class (rows) and the policy's (columns).
         calibration: Steps grouped by confidence; () for continuous actions.
@@ -177,15 +177,15 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
         within: Share of steps with every value within the tolerance.
         tolerance: Maximum error of such a value, as a share of half its range.
         worst: Indices of the steps with the largest errors, worst first.
-        done: Actions of the policy at some steps, in time; () for classes.
-        wanted: Actions of the driver at the same steps.
+        predicted: Actions of the policy at some steps, in time; () for classes.
+        target: Actions of the driver at the same steps.
     """
 
     head: Head
     steps: int
     accuracy: float
     macro_f1: float
-    always: float
+    majority_baseline: float
     classes: tuple[str, ...]
     confusion: tuple[tuple[int, ...], ...]
     calibration: tuple[Bin, ...]
@@ -195,11 +195,13 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
     within: float
     tolerance: float
     worst: tuple[int, ...]
-    done: tuple[tuple[float, ...], ...]
-    wanted: tuple[tuple[float, ...], ...]
+    predicted: tuple[tuple[float, ...], ...]
+    target: tuple[tuple[float, ...], ...]
 
 
-def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None = None) -> Judgement:
+def judge(
+    policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None = None
+) -> EvaluationResult:
     """Compare a policy with the driver of demonstrations.
 
     Args:
@@ -217,23 +219,23 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         raise CloningError("There is no step to judge the policy on.")
     pictures = None if data.pictures is None else data.pictures[chosen]
     states = None if data.states is None else data.states[chosen]
-    wanted = data.actions[chosen].astype(np.float64)
+    target = data.actions[chosen].astype(np.float64)
     out = policy.outputs(pictures, states)
-    done = policy.predict_many(pictures, states).astype(np.float64)
+    predicted = policy.predict_many(pictures, states).astype(np.float64)
     layout = data.action_layout
-    apart = np.abs(done - wanted)
+    apart = np.abs(predicted - target)
     # From the driver alone: an absurd output would widen the range, and make all others seem right.
-    low, high = _ranges(wanted, layout)
+    low, high = _ranges(target, layout)
     half = 0.5 * (high - low)
     relative = apart / np.where(half > 0.0, half, 1.0)
     absurd: NDArray[np.bool_] | None = None
     calibration: tuple[Bin, ...] = ()
     ece: float | None = None
     if policy.card.classes:
-        did, truth = out.argmax(axis=1), class_numbers(wanted, policy.card.classes)
+        did, truth = out.argmax(axis=1), class_numbers(target, policy.card.classes)
         names = list(policy.card.class_names)
         for step in np.flatnonzero(truth < 0):  # Actions that are unknown to the policy.
-            name = named(wanted[step], layout)
+            name = named(target[step], layout)
             if name not in names:
                 names.append(name)
             truth[step] = names.index(name)
@@ -243,22 +245,22 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         given = np.where(truth < out.shape[1], out[np.arange(len(out)), known], 0.0)
         wrongness = 1.0 - given + (did != truth)
     else:
-        both = np.concatenate((np.clip(wanted, low, high), done))
-        names, numbers = in_thirds(both, layout, wanted)
-        truth, did = numbers[: len(wanted)], numbers[len(wanted) :]
+        both = np.concatenate((np.clip(target, low, high), predicted))
+        names, numbers = tercile_classes(both, layout, target)
+        truth, did = numbers[: len(target)], numbers[len(target) :]
         absurd = did == (names.index(OUT_OF_RANGE) if OUT_OF_RANGE in names else -1)
         wrongness = relative.max(axis=1)
     confusion = np.zeros((len(names), len(names)), np.int64)
     np.add.at(confusion, (truth, did), 1)
     # Evenly spaced steps, in order.
-    points = 0 if policy.card.classes else min(len(wanted), _MAX_POINTS)
-    shown = np.unique(np.linspace(0, len(wanted) - 1, points).round().astype(np.int64))
-    return Judgement(
+    points = 0 if policy.card.classes else min(len(target), _MAX_POINTS)
+    shown = np.unique(np.linspace(0, len(target) - 1, points).round().astype(np.int64))
+    return EvaluationResult(
         head=policy.card.head,
-        steps=len(wanted),
+        steps=len(target),
         accuracy=float((truth == did).mean()),
         macro_f1=macro_f1(did, truth, absurd),
-        always=float(confusion.sum(axis=1).max() / len(wanted)),
+        majority_baseline=float(confusion.sum(axis=1).max() / len(target)),
         classes=tuple(names),
         confusion=tuple(tuple(map(int, row)) for row in confusion),
         calibration=calibration,
@@ -268,27 +270,27 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         within=float((relative <= _TOLERANCE).all(axis=1).mean()),
         tolerance=_TOLERANCE,
         worst=tuple(map(int, chosen[np.argsort(-wrongness, kind="stable")[:_WORST]])),
-        done=tuple(tuple(map(float, row)) for row in done[shown]),
-        wanted=tuple(tuple(map(float, row)) for row in wanted[shown]),
+        predicted=tuple(tuple(map(float, row)) for row in predicted[shown]),
+        target=tuple(tuple(map(float, row)) for row in target[shown]),
     )
 
 
 def macro_f1(
-    done: NDArray[np.int64], truth: NDArray[np.int64], absurd: NDArray[np.bool_] | None = None
+    predicted: NDArray[np.int64], truth: NDArray[np.int64], absurd: NDArray[np.bool_] | None = None
 ) -> float:
     """Return the mean F1 score over every class that occurs in either array.
 
     Args:
-        done: Chosen classes, shape (n,).
+        predicted: Chosen classes, shape (n,).
         truth: Correct classes, shape (n,).
         absurd: Mask of outputs that belong to no class, shape (n,). Each counts as a wrong choice
             of every class, and only classes of `truth` count: the score would otherwise improve
             when a wrong choice becomes an absurd one. None if each output is a class.
     """
     scores: list[float] = []
-    for one in np.union1d(done, truth) if absurd is None else np.unique(truth):
-        hits = float(((done == one) & (truth == one)).sum())
-        chosen = done == one if absurd is None else (done == one) | absurd
+    for one in np.union1d(predicted, truth) if absurd is None else np.unique(truth):
+        hits = float(((predicted == one) & (truth == one)).sum())
+        chosen = predicted == one if absurd is None else (predicted == one) | absurd
         scores.append(2.0 * hits / float(chosen.sum() + (truth == one).sum()))
     return float(np.mean(scores))
 
@@ -304,7 +306,7 @@ def _calibration(
         for inside in (places == place for place in range(_BINS))
         if inside.any()
     )
-    return bins, sum(b.steps * abs(b.sure - b.right) for b in bins) / len(out)
+    return bins, sum(b.steps * abs(b.confidence - b.accuracy) for b in bins) / len(out)
 
 
 class Driven(NamedTuple):
