@@ -148,18 +148,7 @@ def record_demonstrations(
     seed: int,
     framing: Framing,
 ) -> Demonstrations:
-    """Record the demonstrator of an env.
-
-    Args:
-        env: An env with a camera and a demonstrator.
-        steps: Number of steps to record.
-        episode_steps: Maximum number of steps of an episode.
-        seed: Seed of the starts and of the demonstrator's mistakes.
-        framing: The part and size of a picture that a policy sees.
-
-    Raises:
-        StudyError: If the env has no demonstrator.
-    """
+    """Record the demonstrator of an env."""
     with closing(env.make(max_episode_steps=episode_steps)) as made:
         if not isinstance(made.unwrapped, HasDemonstrator):
             raise StudyError(f"{env} has no demonstrator to learn from.")
@@ -186,15 +175,7 @@ def record_demonstrations(
 def load_or_record(
     file: SharedFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
 ) -> Demonstrations:
-    """Load demonstrations from a file that has enough of them, or record and write it.
-
-    Args:
-        file: The file and the seed of the recording.
-        env: An env with a camera and a demonstrator.
-        steps: Number of steps.
-        episode_steps: Maximum number of steps of an episode.
-        framing: The part and size of a picture that a policy sees.
-    """
+    """Load demonstrations from a file that has enough of them, or record and write it."""
     path = file.path
     if path.exists():
         with np.load(path) as arrays:
@@ -310,11 +291,7 @@ class CloneLearner(Learner[CloningSettings]):
         return CameraPolicy.load(path)
 
     def origin(self, path: Path) -> PolicyOrigin:
-        """Read where a clone comes from.
-
-        Raises:
-            StudyError: If the policy is not a clone, or takes other pictures.
-        """
+        """Read where a clone comes from."""
         if kind_of(path) != KIND:
             card = load_policy(path).card
             raise StudyError(
@@ -342,25 +319,14 @@ class CloneLearner(Learner[CloningSettings]):
 
 
 def stated(policy: CameraPolicy, env: EnvRef, **data: Any) -> CameraPolicy:
-    """State in a clone's card its env, and what its actions mean.
-
-    Args:
-        policy: A clone of the env's demonstrator.
-        env: The env.
-        **data: Origin of the demonstrations besides the env.
-    """
+    """State in a clone's card its env, and what its actions mean."""
     identity = known({ENV: identify(env).identity})
     policy = state_actions(policy, env)
     return policy.described(identity=identity, env=env.id, arguments=env.kwargs, **data)
 
 
 def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
-    """State in a clone's card what its actions mean, unless they are steering and throttle.
-
-    Args:
-        policy: A clone of the env's demonstrator.
-        env: The env.
-    """
+    """State in a clone's card what its actions mean, unless they are steering and throttle."""
     with closing(env.make()) as made:
         _, layout = layouts_of(made)
     if layout.names == ("steering", "throttle"):

@@ -17,15 +17,7 @@ if TYPE_CHECKING:
 
 
 def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
-    """Read the numbers of a robot that its simulation needs.
-
-    Args:
-        robot: Path or name of its profile.
-
-    Raises:
-        UnknownName: If there is no such profile.
-        ProfileError: If it cannot be read or is not valid.
-    """
+    """Read the numbers of a robot that its simulation needs."""
     from shapechanger.vehicles.envs.drive import SimulatedRobot
 
     profile = load_profile(find_profile(robot))
@@ -46,13 +38,7 @@ def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
 
 
 def course_place(world: str, vehicle: str, lenses: Sequence[str] = ()) -> Place:
-    """Return a place that the process of a twin's board opens by `open_course`.
-
-    Args:
-        world: Kind of course, such as "corridor".
-        vehicle: Vehicle on it, such as "car".
-        lenses: Corruptions of the camera; see `shapechanger.vehicles.cameras.corruptions`.
-    """
+    """Return a place that the process of a twin's board opens by `open_course`."""
     arguments = {"world": world, "vehicle": vehicle, "lenses": list(lenses)}
     return Place(f"{__name__}:{open_course.__name__}", arguments)
 
@@ -67,14 +53,6 @@ def open_course(
     lenses: Sequence[str],
 ) -> World:
     """Open a course with a vehicle on it.
-
-    Args:
-        parts: Parts that the robot's outputs move.
-        camera: Camera of the profile, as which the world is shown; None without one.
-        seed: Seed of the course and of the start.
-        world: Kind of course.
-        vehicle: The vehicle.
-        lenses: Corruptions of the camera.
 
     Raises:
         UnknownName: If there is no such course, vehicle or corruption.

@@ -207,11 +207,7 @@ class MujocoWorld:
         self._updated_at = pose.x, pose.y
 
     def path(self) -> CoursePath:
-        """A path around the course for this vehicle, planned on the first call.
-
-        Raises:
-            WorldError: If there is no such path.
-        """
+        """A path around the course for this vehicle, planned on the first call."""
         return _planned(self.vehicle.name, self._world, self.course.seed)
 
     def put_back(self) -> None:

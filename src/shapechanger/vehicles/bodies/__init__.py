@@ -36,11 +36,7 @@ VEHICLES: Final[Mapping[str, VehicleModel]] = MappingProxyType(
 
 
 def vehicle_model(name: str) -> VehicleModel:
-    """Find a vehicle model by name.
-
-    Raises:
-        UnknownName: If no vehicle has this name.
-    """
+    """Find a vehicle model by name."""
     if name not in VEHICLES:
         raise UnknownName("vehicle", name, VEHICLES)
     return VEHICLES[name]
@@ -51,13 +47,7 @@ def add_vehicle(
 ) -> VehicleModel:
     """Add a vehicle at the origin of a model, and set the step and solver options that it needs.
 
-    Args:
-        spec: Model to extend.
-        name: Name of the vehicle.
-        light: Red, green and blue of the light on it, each 0 to 1, for views from outside.
-
-    Raises:
-        UnknownName: If no vehicle has this name.
+    `light` is the red, green and blue of the light on it, each 0 to 1, for views from outside.
     """
     model = vehicle_model(name)
     spec.option.timestep = SIM_DT
@@ -77,16 +67,7 @@ def add_vehicle(
 
 
 def require_fit(name: str, parts: Collection[str]) -> None:
-    """Check that a robot's parts fit a vehicle.
-
-    Args:
-        name: Name of the vehicle.
-        parts: Parts that the robot's outputs drive, such as "wheels" and "steering".
-
-    Raises:
-        UnknownName: If no vehicle has this name.
-        ProfileError: If a part is missing, or the vehicle does not have it.
-    """
+    """Check that a robot's parts fit a vehicle."""
     model = vehicle_model(name)
     given = frozenset(parts)
     foreign = given - model.parts - model.optional_parts

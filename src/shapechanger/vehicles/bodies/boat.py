@@ -208,10 +208,6 @@ class Floating(BoundVehicle):
 
     The simulated body has the dry mass. The applied force is that mass times the acceleration of
     the manoeuvring equations.
-
-    Args:
-        model: Compiled model with the boat.
-        data: Its state.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:

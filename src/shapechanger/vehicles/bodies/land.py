@@ -81,18 +81,10 @@ def add_chassis(
     seen: Sequence[tuple[mujoco.mjtGeom, Sequence[float], Sequence[float], str]] = (),
     shadow_m: float | None = None,
 ) -> mujoco.MjsBody:
-    """Add the body of a land vehicle, which moves freely, with its hull, looks and camera.
+    """Add the body of a land vehicle, which moves freely, with its hull, visuals and camera.
 
-    Args:
-        spec: Model to extend.
-        paint: Materials and meshes.
-        length_m: Length of the hull, m.
-        width_m: Width of the hull, m.
-        hull_z: Height of its middle, m.
-        mass: Mass without wheels, kg.
-        camera: Mount of its camera.
-        seen: What its own camera sees: shape, position, size and colour of each geom.
-        shadow_m: Width of its shadow, m; None for that of the hull.
+    `seen` lists shape, position, size and colour of each geom that its own camera sees. Sizes are
+    in m; the mass, kg, is without wheels.
     """
     chassis = spec.worldbody.add_body(name="vehicle/chassis")
     chassis.add_freejoint(name="vehicle/chassis")
@@ -115,13 +107,6 @@ def add_axles(
 
     The rear axle has a differential, modelled by a fixed tendon: its wheels share the torque, and
     their mean speed is the motor's.
-
-    Args:
-        spec: Model to extend.
-        chassis: Body of the vehicle.
-        axles: Dimensions.
-        motor: Motor of the rear axle.
-        paint: Materials of the wheels.
     """
     size = (axles.radius, axles.width, axles.wheel_kg)
     axle = motor.add(spec, "vehicle/wheels")
@@ -147,15 +132,7 @@ def add_axles(
 
 
 class Rolling(BoundVehicle):
-    """A vehicle on land.
-
-    Args:
-        model: Compiled model with the vehicle.
-        data: Its state.
-        motors: See `BoundVehicle`.
-        radius: Radius of the driven wheels, m.
-        axles: Its axles with Ackermann steering; None for tracks.
-    """
+    """A vehicle on land."""
 
     def __init__(
         self,

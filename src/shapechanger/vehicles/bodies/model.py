@@ -43,14 +43,7 @@ class Motion(NamedTuple):
 
 
 class MotorDrive:
-    """A motor in a running simulation, which turns the joints of a tendon.
-
-    Args:
-        model: Compiled model.
-        data: Its state.
-        name: Name of the actuator and the tendon.
-        motor: Properties of the motor.
-    """
+    """A motor in a running simulation, which turns the joints of a tendon."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, name: str, motor: DcMotor

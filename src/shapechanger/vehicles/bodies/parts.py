@@ -143,12 +143,7 @@ class CameraMount:
 
 
 def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
-    """Add the camera "vehicle/camera", which looks ahead.
-
-    Args:
-        body: Body to extend.
-        mount: Its pose and field of view.
-    """
+    """Add the camera "vehicle/camera", which looks ahead."""
     aim_camera(body.add_camera(name="vehicle/camera"), mount)
 
 
@@ -198,17 +193,7 @@ class CameraJitter:
 
 
 def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
-    """Add an error to the pose of a camera; a refused error changes nothing.
-
-    Args:
-        model: Compiled model to change.
-        camera: Name of the camera.
-        jitter: The error.
-
-    Raises:
-        WorldError: If the error is not finite, or moves the camera off its vehicle or into the
-            floor.
-    """
+    """Add an error to the pose of a camera; a refused error changes nothing."""
     place = model.camera(camera)
     position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
     turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
@@ -297,13 +282,6 @@ class DcMotor:
 
         MuJoCo's affine actuator implements the motor's equation:
         https://mujoco.readthedocs.io/en/stable/XMLreference.html#actuator-general
-
-        Args:
-            spec: Model to extend.
-            name: Name of the actuator and the tendon.
-
-        Returns:
-            The tendon, for joints to wrap.
         """
         shaft = spec.add_tendon(
             name=name,

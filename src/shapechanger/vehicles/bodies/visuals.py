@@ -121,9 +121,7 @@ class Paint:
     def lit(self, colour: str, *, turning: bool = False) -> str:
         """Name of a material for `_add_shape`, whose brightness is in the normals of its mesh.
 
-        Args:
-            colour: Name of the colour.
-            turning: Whether its part turns, so that it is equally bright in any direction.
+        A `turning` part is equally bright in any direction.
         """
         rgba, name = [*self._light * _COLOURS[colour], 1.0], "even" if turning else "shaded"
         emission = 0.85 if turning else 0.0
@@ -158,15 +156,6 @@ def _add_shape(
     Courses have one light, which shines straight up. So the normals are chosen for the brightness
     that they give, which turns about the vertical axis do not change. A brightness of 0 gives
     normals along y, so that a wheel's do not change as it rolls either.
-
-    Args:
-        body: Body to extend.
-        name: Name of the mesh; one that exists is used again.
-        faces: Faces, m, (n, 4, 3).
-        brightness: Brightness of each face, 0 to 1, (n,).
-        material: Name of its material.
-        paint: Materials.
-        pos: Its position, m.
     """
     if paint.spec.mesh(name) is None:
         triangles = faces[:, [[0, 1, 2], [0, 2, 3]]]

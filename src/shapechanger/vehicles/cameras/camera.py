@@ -29,13 +29,6 @@ class _Renderer:
 
     The OpenGL context is opened for the first picture, so that a process that has only built a
     camera, such as the parent of an `AsyncVectorEnv`, can be forked.
-
-    Args:
-        size: Width and height of the pictures in pixels.
-        hidden: Group of geoms that are not drawn.
-
-    Raises:
-        RenderError: If the width or the height is below 1.
     """
 
     def __init__(self, size: tuple[int, int], hidden: int) -> None:
@@ -77,11 +70,7 @@ class _Renderer:
             self._scene.flags[flag] = 0
 
     def _render(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """Return the picture of a state, (height, width, 3), upside down; it is overwritten.
-
-        Raises:
-            RenderError: If no model was selected, or no OpenGL context can be opened.
-        """
+        """Return the picture of a state, (height, width, 3), upside down; it is overwritten."""
         if self._wanted is not None:
             self._open(self._wanted)
             self._wanted = None
@@ -114,14 +103,7 @@ class _Renderer:
 
 
 class OnboardCamera(_Renderer):
-    """Renders the view of a camera in a model, without what is only seen from outside.
-
-    Args:
-        size: Width and height of the pictures in pixels.
-
-    Raises:
-        RenderError: If the width or the height is below 1.
-    """
+    """Renders the view of a camera in a model, without what is only seen from outside."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         super().__init__(size, OUTSIDE_VIEW)
@@ -146,14 +128,7 @@ _LARGEST: Final = 4096  # Width and height; software renderers draw no larger im
 
 
 class OutsideCamera(_Renderer):
-    """Renders a model from outside, with smooth edges.
-
-    Args:
-        size: Width and height of the pictures in pixels.
-
-    Raises:
-        RenderError: If the width or the height is out of range.
-    """
+    """Renders a model from outside, with smooth edges."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         _require_pixels(size)  # Before it is supersampled, so that the error has the asked size.
@@ -188,12 +163,6 @@ class OutsideCamera(_Renderer):
             distance_m: Distance from it.
             azimuth_rad: Direction of view seen from above, from the x axis, counter-clockwise.
             elevation_rad: Angle of view above the horizon; negative looks down.
-
-        Returns:
-            RGB picture, shape (height, width, 3), in a new array.
-
-        Raises:
-            RenderError: If no model was selected, or no OpenGL context can be opened.
         """
         self._camera.lookat[:] = middle
         self._camera.distance = distance_m

@@ -90,11 +90,7 @@ CORRUPTIONS: Final[Mapping[str, Corruption]] = MappingProxyType(
 
 
 def find_corruption(name: str) -> Corruption:
-    """Find a camera fault by name.
-
-    Raises:
-        UnknownName: If no camera fault has this name.
-    """
+    """Find a camera fault by name."""
     try:
         return CORRUPTIONS[name]
     except KeyError:

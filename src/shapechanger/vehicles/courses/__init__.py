@@ -29,10 +29,6 @@ def lay_out(world: str, seed: int) -> Course:
     Args:
         world: One of `WORLDS`.
         seed: Seed, >= 0; see `TRAINING` and `HELD_OUT` in `shapechanger.vehicles.courses.course`.
-
-    Raises:
-        UnknownName: If the world is unknown.
-        WorldError: If the seed is negative, or no random layout fits.
     """
     if world == FLOODED:
         return dataclasses.replace(lay_out("corridor", seed), world=world)

@@ -148,16 +148,7 @@ class Course:
 
 
 def require_element(vehicle: str, *, floats: bool, world: str) -> None:
-    """Check that a world has water if, and only if, the vehicle floats.
-
-    Args:
-        vehicle: Name of the vehicle.
-        floats: Whether it floats.
-        world: Kind of course.
-
-    Raises:
-        WorldError: If the vehicle cannot drive there.
-    """
+    """Check that a world has water if, and only if, the vehicle floats."""
     if floats != (world in WATER):
         reason = "floats" if floats else "does not float"
         raise WorldError(f"A {vehicle} {reason}: it cannot drive in a {world}.")
@@ -198,11 +189,7 @@ class Look:
 
     @staticmethod
     def of(world: str) -> Look:
-        """Usual look of a world.
-
-        Raises:
-            UnknownName: If the world is unknown.
-        """
+        """Usual look of a world."""
         try:
             return LOOKS[world]
         except KeyError:
@@ -215,13 +202,6 @@ class Look:
         All are uniform: `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3,
         `gloss` x 0.4 to 1.6, each channel of `wall` and `ground` x 0.75 to 1.0, and one of
         `VARIANTS` texture sets.
-
-        Args:
-            world: Kind of course.
-            rng: Random generator.
-
-        Raises:
-            UnknownName: If the world is unknown.
         """
         usual = Look.of(world)
 

@@ -205,10 +205,10 @@ def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.
 
 def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
     """Distance between two obstacles, m; 0 or less where they overlap."""
-    if other.is_round:
-        return _from_point(one, other.x, other.y) - other.length / 2.0
-    if one.is_round:
-        return _from_point(other, one.x, one.y) - one.length / 2.0
+    for box, round_one in ((one, other), (other, one)):
+        if round_one.is_round:
+            middle = np.array([[round_one.x, round_one.y]])
+            return float(_from_points(box, middle)[0]) - round_one.length / 2.0
     return float(
         min(
             distances_from_obstacle(one, box_sides(other)).min(),
@@ -217,11 +217,13 @@ def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
     )
 
 
-def _from_point(obstacle: Obstacle, x: float, y: float) -> float:
+def _from_points(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points, m, (n, 2), from an obstacle; 0 or less inside."""
     if obstacle.is_round:
-        return float(np.hypot(obstacle.x - x, obstacle.y - y)) - obstacle.length / 2.0
+        away = points - np.array([obstacle.x, obstacle.y])
+        return np.hypot(away[:, 0], away[:, 1]) - obstacle.length / 2.0
     half = np.array([obstacle.length, obstacle.width]) / 2.0
-    return float(_from_box(_into(obstacle, np.array([[x, y]])), half)[0])
+    return _from_box(_into(obstacle, points), half)
 
 
 def _from_box(points: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -275,8 +277,9 @@ class ClearanceField:
     """
 
     def __init__(self, course: Course) -> None:
-        walls = wall_segments(course.walls)
-        self._start, self._end = walls[:, :2], walls[:, 2:]
+        self._walls = wall_segments(course.walls)
+        self._low = np.minimum(self._walls[:, :2], self._walls[:, 2:])
+        self._high = np.maximum(self._walls[:, :2], self._walls[:, 2:])
         self._obstacles = course.obstacles
 
     def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -291,28 +294,11 @@ class ClearanceField:
     def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances of points that are close together."""
         low, high = points.min(axis=0) - FAR_M, points.max(axis=0) + FAR_M
-        start, end = self._start, self._end
-        near = (np.maximum(start, end) >= low) & (np.minimum(start, end) <= high)
-        start, end = start[near.all(axis=1)], end[near.all(axis=1)]
-        step = (end - start)[:, None]
-        away = points - start[:, None]  # (walls, points, 2)
-        share = np.einsum("wpj,wpj->wp", away, np.broadcast_to(step, away.shape))
-        squared = np.maximum(np.einsum("wpj,wpj->wp", step, step), 1e-12)
-        away -= np.clip(share / squared, 0.0, 1.0)[:, :, None] * step
-        squared = np.einsum("wpj,wpj->wp", away, away)
-        found = np.sqrt(squared.min(axis=0, initial=FAR_M**2))
-        for thing in self._obstacles:
-            reach = thing.length + thing.width
-            here = np.array((thing.x, thing.y))
-            if (here + reach < low).any() or (here - reach > high).any():
-                continue
-            dx, dy = (points - here).T
-            if thing.is_round:
-                off = np.hypot(dx, dy) - thing.length / 2
-            else:
-                cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
-                along = np.abs(cos * dx + sin * dy) - thing.length / 2
-                across = np.abs(cos * dy - sin * dx) - thing.width / 2
-                off = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
-            found = np.minimum(found, np.maximum(off, 0.0))
-        return found
+        near = ((self._high >= low) & (self._low <= high)).all(axis=1)
+        far = distances_to_segments(points, self._walls[near])
+        found = far.min(axis=1, initial=FAR_M)
+        for obstacle in self._obstacles:
+            reach, here = obstacle.length + obstacle.width, np.array((obstacle.x, obstacle.y))
+            if (here + reach >= low).all() and (here - reach <= high).all():
+                found = np.minimum(found, _from_points(obstacle, points))
+        return np.maximum(found, 0.0)

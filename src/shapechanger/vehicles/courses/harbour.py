@@ -121,16 +121,9 @@ def add_solids(
     *,
     reflected: bool = True,
 ) -> None:
-    """Add an object of `meshes/harbour.obj` at a place.
+    """Add an object of `meshes/harbour.obj`, turned by a yaw, rad, about its origin at a place, m.
 
-    Args:
-        mesh: Mesh to extend.
-        name: Name of the object. The wall of a fitting is along x, with the lane at y > 0.
-        place: Position of its origin, m.
-        yaw: Rotation about the vertical axis, rad.
-        scale: Factor on all sizes, or on each of them.
-        light: Brightness, 0 to 1.
-        reflected: See `QuadMesh.add`.
+    The wall of a fitting is along x, with the lane at y > 0.
     """
     faces, uvs, bright = _solid(name)
     cosine, sine = np.cos(yaw), np.sin(yaw)

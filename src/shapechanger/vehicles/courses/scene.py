@@ -89,11 +89,6 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     reflections would take most of the time of a small picture. The only light shines straight up,
     and only these meshes have normals made for it; vehicles need emissive materials. A glossy
     ground is a translucent sheet over a mirrored copy of the course.
-
-    Args:
-        spec: Model to extend; its headlight, clipping planes and antialiasing are set.
-        course: The course.
-        look: Light and colours.
     """
     spec.visual.headlight.active = 0
     spec.visual.quality.shadowsize = spec.visual.quality.offsamples = 0

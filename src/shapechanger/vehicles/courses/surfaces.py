@@ -55,12 +55,7 @@ _SHAPES: Final = tomllib.loads(Path(__file__).with_name("obstacles.toml").read_t
 
 
 class Surfaces:
-    """Surfaces of a course with precomputed light.
-
-    Args:
-        course: Course with its lamps or patches of sun; without any, the light is even.
-        look: Look with its contrast.
-    """
+    """Surfaces of a course with precomputed light."""
 
     def __init__(self, course: Course, look: Look) -> None:
         self._course = course

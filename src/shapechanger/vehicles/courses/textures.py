@@ -121,18 +121,7 @@ _KEPT: Final = 400
 
 @functools.lru_cache(_KEPT)
 def texture(name: str, seed: int) -> NDArray[np.uint8]:
-    """Paint a texture, or take it from the cache.
-
-    Args:
-        name: One of `PAINTERS`.
-        seed: Seed, >= 0.
-
-    Returns:
-        Texture, uint8, (H, W, 3), with the top row first; it is read-only.
-
-    Raises:
-        UnknownName: If the texture is unknown.
-    """
+    """Paint a texture, read-only, (H, W, 3), with the top row first, or take it from the cache."""
     if name not in PAINTERS:
         raise UnknownName("texture", name, PAINTERS)
     rng = np.random.default_rng([seed, crc32(name.encode())])

@@ -26,11 +26,7 @@ _MODULES: Final = {"RangesEnv": "ranges", "VehicleEnv": "vehicle", "WaypointEnv"
 
 
 def __getattr__(name: str) -> Any:
-    """Import an env on first use (PEP 562).
-
-    Raises:
-        AttributeError: If there is no such env.
-    """
+    """Import an env on first use (PEP 562)."""
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -112,11 +112,7 @@ class Demonstrator:
 
 
 def require_rate(control_hz: float) -> None:
-    """Check that a robot takes an action when an expert chooses one.
-
-    Raises:
-        ProfileError: If its control rate is another.
-    """
+    """Check that a robot takes an action when an expert chooses one."""
     if not math.isclose(control_hz * PERIOD_S, 1.0):
         raise ProfileError(
             f"This robot has control_hz = {control_hz:g}, and the experts that demonstrate driving "
@@ -133,9 +129,6 @@ class ExpertDriver:
     """Expert that drives on the present course of a world.
 
     It counts in periods of 1/20 s. `DriveEnv.expert` makes it for robots with this control rate.
-
-    Args:
-        world: The world of the vehicle.
     """
 
     def __init__(self, world: MujocoWorld) -> None:

@@ -151,16 +151,7 @@ class EpisodeSetup(NamedTuple):
 
 
 class CourseSampler:
-    """Samples course, start and appearance of episodes.
-
-    Args:
-        courses: Courses to sample from.
-        randomise: Whether to sample light, textures and the camera's pose too.
-
-    Raises:
-        UnknownName: If there are no courses of this name.
-        WorldError: If there is no course, or a seed is not a whole number from 0.
-    """
+    """Samples course, start and appearance of episodes."""
 
     def __init__(self, courses: Courses, randomise: bool) -> None:
         if isinstance(courses, str):
@@ -194,10 +185,6 @@ class CourseSampler:
                 the others do not depend on the options.
             world: Kind of place.
             options: `course` and `start`, each a seed.
-
-        Raises:
-            UnknownName: If there is no such option.
-            WorldError: If a seed is not a whole number from 0.
         """
         for name in options:
             if name not in _OPTIONS:
@@ -340,14 +327,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def _advance(
         self, values: NDArray[np.float64]
     ) -> tuple[bool | None, dict[str, float], Any, dict[str, Any]]:
-        """Drive for a control period.
-
-        Args:
-            values: Steering and throttle, each from -1 to 1.
-
-        Returns:
-            Whether the vehicle collided, the terms of the reward, the observation and `info`.
-        """
+        """Drive for a period; return the collision, the reward, the observation and `info`."""
         raise NotImplementedError
 
     def expert(self) -> ExpertDriver:

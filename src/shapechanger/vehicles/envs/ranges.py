@@ -80,13 +80,7 @@ class MeanOutputs:
     def outputs(
         self, values: tuple[float, ...], bumped: bool, ticks: int
     ) -> Mapping[str, float | None]:
-        """Return the mean output of each part over a control period.
-
-        Args:
-            values: The command, one value for each action.
-            bumped: Whether the bumper is pressed.
-            ticks: Ticks of the guard in the period.
-        """
+        """Return the mean output of each part over a control period."""
         hold_ms = self._plan.limits.bump_hold_ms
         self._block_ends_ns = bump_ends_ns(bumped, self._now_ns, self._block_ends_ns, hold_ms)
         actions = self._plan.actions

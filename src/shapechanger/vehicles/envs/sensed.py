@@ -41,12 +41,7 @@ _Read = Callable[[int, float], dict[str, float]]
 
 
 class WheelEncoder:
-    """Speed from the times of the last edges of an encoder: one count, or two edges of one channel.
-
-    Args:
-        settings: Settings of the driver `encoder`.
-        world: The world, whose vehicle rolls.
-    """
+    """Speed from the last edges of an encoder: of one count, or two edges of one channel."""
 
     def __init__(self, settings: dict[str, Any], world: MujocoWorld) -> None:
         count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
@@ -237,12 +232,7 @@ class SensedVehicle:
         return self._reflexes.bump.count
 
     def advance(self, ns: int, command: Sequence[float] | None) -> None:
-        """Advance time, with a round of the limits at each tick.
-
-        Args:
-            ns: Duration, ns.
-            command: One value for each action; None to rest.
-        """
+        """Advance time, with a round of the limits at each tick; without a command it rests."""
         actions = self._plan.actions
         aims: tuple[float, ...] | None = None
         clips = ""

@@ -175,11 +175,7 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
 
 
 def _name(env: gym.Env[Any, Any]) -> str:
-    """Return the id of a vehicle's env.
-
-    Raises:
-        MorphologyError: If it is not a vehicle.
-    """
+    """Return the id of a vehicle's env."""
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
     if not (hasattr(env.unwrapped, "world") and hasattr(env.unwrapped, "parts")):
         raise MorphologyError(f"{name} is not a vehicle, so it cannot be compared with one.")

@@ -44,11 +44,7 @@ _SWAY: Final = 0.18
 def _response_of(
     vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, sensed: bool
 ) -> SteeringResponse:
-    """Measure the response of a simulated vehicle, once in a process.
-
-    Raises:
-        ProfileError: If the robot does not measure its speed and its rate of turn.
-    """
+    """Measure the response of a simulated vehicle, once in a process."""
     common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
     env = VehicleEnv(vehicle, image=False, **common) if sensed else RangesEnv(vehicle, **common)
     try:
@@ -165,12 +161,7 @@ class WaypointEnv(WaypointView, DriveEnv):
 
 
 def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
-    """Return an expert that points out the free way; its actions are waypoints, bearing and speed.
-
-    Args:
-        world: The world of the vehicle.
-        seed: Seed of its mistakes.
-    """
+    """Return an expert whose actions are waypoints: the bearing of the free way, and the speed."""
 
     def begin() -> Callable[[], NDArray[np.float32]]:
         return partial(_point, world, course_expert(world))

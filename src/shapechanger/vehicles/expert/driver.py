@@ -66,11 +66,7 @@ _BLOCKED_M: Final = 0.15
 
 
 class Pursuit:
-    """Steering towards a point ahead.
-
-    Args:
-        traits: Driving properties of the vehicle.
-    """
+    """Steering towards a point ahead."""
 
     def __init__(self, traits: Traits) -> None:
         self._traits = traits
@@ -120,12 +116,7 @@ class Pursuit:
 
 
 class Recovery:
-    """Detects that a vehicle is stuck, and takes over until it is free.
-
-    Args:
-        traits: Driving properties of the vehicle.
-        rng: Random generator that varies the manoeuvres, so that none repeats for ever.
-    """
+    """Detects that a vehicle is stuck, and takes over until it is free."""
 
     def __init__(self, traits: Traits, rng: np.random.Generator) -> None:
         self._traits = traits

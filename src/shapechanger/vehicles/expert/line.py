@@ -91,9 +91,6 @@ class CourseProgress:
 
     It keeps counting lap after lap; driving backward counts down. After moving the vehicle by more
     than 2 m call `reset`.
-
-    Args:
-        course: The course.
     """
 
     def __init__(self, course: Course) -> None:

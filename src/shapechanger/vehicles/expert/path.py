@@ -244,9 +244,6 @@ def plan_path(
 
     Returns:
         A path with a clearance of at least `half_width_m + margin_m` at every point.
-
-    Raises:
-        WorldError: If no such path exists.
     """
     least = half_width_m + margin_m
     comfort = half_width_m + (3 * margin_m if comfort_m is None else comfort_m)
@@ -361,13 +358,6 @@ def plan_path_for(course: Course, traits: Traits) -> CoursePath:
 
     Passages are as wide as the vehicles of a world need, and a boat in a flooded corridor would
     need more: 6 of the first 1,300 training courses are too narrow for its clearance.
-
-    Args:
-        course: The course.
-        traits: Driving properties of the vehicle.
-
-    Raises:
-        WorldError: If two thirds of its clearance do not fit either.
     """
     try:
         return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
@@ -381,10 +371,6 @@ def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
 
     It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
     both.
-
-    Args:
-        path: The path.
-        traits: Driving properties of the vehicle.
     """
     least = traits.half_width_m + traits.margin_m
     comfort = traits.half_width_m + traits.comfort_m

@@ -78,11 +78,7 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
 
 
 def traits_of(name: str) -> Traits:
-    """Find driving properties by the name of the vehicle.
-
-    Raises:
-        UnknownName: If the vehicle is unknown.
-    """
+    """Find driving properties by the name of the vehicle."""
     if name not in TRAITS:
         raise UnknownName("vehicle", name, TRAITS)
     return TRAITS[name]

@@ -26,12 +26,7 @@ _LATE_S: Final = 0.5
 
 
 class FullThrottle:
-    """A policy that sees nothing and knows one command.
-
-    Args:
-        actions: Layout of the robot's actions.
-        state: Layout of its state.
-    """
+    """A policy that sees nothing and knows one command."""
 
     def __init__(self, actions: Layout, state: Layout) -> None:
         self.card = CloneCard(

@@ -172,21 +172,12 @@ class PolicyDriver:
         self._ended.set()
 
     def require_well(self) -> None:
-        """Raise the error that ended the thread.
-
-        Raises:
-            Exception: If there is one.
-        """
+        """Raise the error that ended the thread."""
         if self._failure is not None:
             raise self._failure
 
     def run(self) -> None:
-        """Drive whenever a person permits it, until `end` is called.
-
-        Raises:
-            LinkError: If the robot cannot be reached.
-            PolicyError: If the policy gives an action that no robot can take.
-        """
+        """Drive whenever a person permits it, until `end` is called."""
         env = self._env()
         try:
             while not self._ended.is_set():

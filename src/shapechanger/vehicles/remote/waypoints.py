@@ -121,11 +121,7 @@ class _Numbers(gym.ObservationWrapper[Any, Any, Any]):
 
 
 def _state_places(welcome: Welcome, measures: bool) -> tuple[int, int]:
-    """Return the places of the speed and the rate of turn in the state.
-
-    Raises:
-        RobotRefused: If it steers by other actions, or lacks a sensor.
-    """
+    """Return the places of the speed and the rate of turn in the state."""
     actions = Layout.from_json(welcome.action_layout).names
     if actions != ("steering", "throttle"):
         raise RobotRefused(
