@@ -18,13 +18,7 @@ from shapechanger.envs.actions import check_action
 from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
-from shapechanger.finger.gap import (
-    Gap,
-    geared_around,
-    require_balance,
-    resolve_gap,
-    with_gears,
-)
+from shapechanger.finger.gap import Gap, geared_around, require_balance, resolve_gap, with_gears
 from shapechanger.finger.model import FingerFigure
 from shapechanger.finger.parameters import (
     NOMINAL,

@@ -62,9 +62,7 @@ _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
 def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
     """Return the MJCF of a finger with its anatomy, parameters and, as a comment, its limits.
 
-    Args:
-        parameters: Parameters of the finger.
-        drive: Meaning of the commands, the controls; with a path, the controls are tensions.
+    Controls are the commands of the drive; with a path, they are tensions.
     """
     spec = build_finger(parameters, drive, anatomy=True)
     model: Any = spec.compile()

@@ -216,9 +216,6 @@ def geared_around(found: FingerParameters) -> Gap:
 
     Path, arms, joints, stretch and delay are those identified, within their errors; parameters of
     the motors, which a log hardly reveals, keep their ranges in "wide".
-
-    Args:
-        found: The identified parameters.
     """
     late = found.command_delay + _DELAY_FOUND_S
     stiffness = found.tendon_stiffness or GAPS["wide"].tendon_stiffness[1]

@@ -45,12 +45,7 @@ _SENSES: Final = 2
 
 
 class DeviceFinger(DeviceTask):
-    """Fingers with any parameters, whose fingertip has a target.
-
-    Args:
-        env: A CPU env of the task.
-        plant: The simulation of a finger of the batch.
-    """
+    """Fingers with any parameters, whose fingertip has a target."""
 
     precision = torch.float64
 
@@ -354,13 +349,7 @@ _LONGEST_NAME: Final = 60
 
 
 class FingerReader:
-    """Compiles fingers, and reads what a device needs to know about them.
-
-    Args:
-        env: A CPU env of the task.
-
-    Attributes:
-        spec: The spec of the CPU env, with its time limit.
+    """Compiles fingers of a CPU env's task, and reads the numbers that a device needs.
 
     Raises:
         VectorEnvError: If the env has goals, or draws another finger at each reset.
@@ -385,22 +374,11 @@ class FingerReader:
             )
 
     def body(self, value: FingerLike | None) -> FingerParameters:
-        """Return the parameters of a finger; those of the arguments for None.
-
-        Raises:
-            FingerError: If they contradict themselves, or the tendons cannot balance a joint.
-            UnknownName: If there is no such set or parameter.
-        """
+        """Return the parameters of a finger; those of the env for None; see `as_finger`."""
         return self._env.parameters if value is None else as_finger(value)
 
     def read(self, body: FingerParameters) -> tuple[DeviceBody, BatchKind]:
-        """Compile a finger.
-
-        Args:
-            body: Its parameters.
-
-        Returns:
-            The finger, and the kind of a batch that begins with it.
+        """Return a compiled finger, and the kind of a batch that begins with it.
 
         Raises:
             VectorEnvError: If its delay is a whole number of simulation steps.
@@ -459,11 +437,7 @@ def _numbers(plant: FingerPlant) -> dict[str, NDArray[Any]]:
 
 
 def _device_delay(parameters: FingerParameters, timestep: float) -> float:
-    """Return a delay, s, with the same controls at each simulation step, s, as a finger's.
-
-    Raises:
-        VectorEnvError: If it is a whole number of steps.
-    """
+    """Return a delay, s, with the same controls at each simulation step, s, as a finger's."""
     delay = parameters.command_delay
     steps = delay / timestep
     if delay > 0.0 and abs(steps - round(steps)) < _WHOLE * steps:

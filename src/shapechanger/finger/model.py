@@ -170,9 +170,7 @@ def _add_hinge(
     )
 
 
-def _add_path(
-    spec: mujoco.MjSpec, name: str, arms: tuple[float, float, float, float]
-) -> mujoco.MjsTendon:
+def _add_path(spec: mujoco.MjSpec, name: str, arms: tuple[float, ...]) -> mujoco.MjsTendon:
     """Add a tendon as a weighted sum of angles: flexion shortens a flexor by its moment arm."""
     path = spec.add_tendon(name=name)
     for joint, arm in zip(JOINTS, arms, strict=True):
@@ -245,10 +243,6 @@ class FingerFigure:
     """Visual model of a finger with its anatomy, posed from outside and never simulated.
 
     It serves for every finger, because their differences are invisible.
-
-    Attributes:
-        model: The model.
-        data: Its state.
     """
 
     def __init__(self) -> None:
@@ -263,12 +257,9 @@ class FingerFigure:
     def show(
         self, angles: NDArray[np.float64], pulled: NDArray[np.float64], target: NDArray[np.float64]
     ) -> None:
-        """Set the posture.
+        """Set joint angles, rad, (4,), and the target of the fingertip, m, (3,).
 
-        Args:
-            angles: Joint angles, rad, (4,).
-            pulled: Tension of each tendon over its largest, 0 to 1, (7,), shown as its thickness.
-            target: Target of the fingertip, m, (3,).
+        `pulled` are the tensions over the largest, 0 to 1, (7,), shown as thickness.
         """
         widths = THINNEST_M + (THICKEST_M - THINNEST_M) * pulled.clip(0.0, 1.0)
         for courses, width in zip(self._courses, widths, strict=True):

@@ -47,13 +47,7 @@ class JointVelocities:
 
 
 def smoothed(velocities: Any, former: Any, angles: Any) -> Any:
-    """Return smoothed velocities after new angles, rad/s, as arrays or tensors of any shape.
-
-    Args:
-        velocities: Those of the former angles, rad/s.
-        former: Angles of the control period before, rad.
-        angles: The new angles, rad.
-    """
+    """Return smoothed velocities, rad/s, after new angles, rad; arrays or tensors of any shape."""
     speed = (angles - former) / CONTROL_DT
     return velocities + (1.0 - math.exp(-CONTROL_DT / _LAG_S)) * (speed - velocities)
 
@@ -65,14 +59,8 @@ _N_TENDONS: Final = len(TENDONS)
 class FingerPlant:
     """MuJoCo simulation of a finger with its drive and its sensors.
 
-    Args:
-        parameters: Parameters of the finger.
-        drive: Meaning of its commands, each of which lasts `CONTROL_DT`.
-
-    Attributes:
-        model: The compiled model.
-        data: Its state.
-        held: What its commands become on their path; None without one.
+    A command of the drive lasts `CONTROL_DT`. `held` simulates the path of the commands; it is None
+    without one.
     """
 
     def __init__(self, parameters: FingerParameters, drive: TendonDrive) -> None:
@@ -90,8 +78,6 @@ class FingerPlant:
         self._arms = parameters.arms
         self._tip = self.data.site_xpos[self.model.site(FINGERTIP).id]
         self._command = np.zeros(_N_TENDONS)
-        self._angles = np.zeros(_N_JOINTS)
-        self._velocities = np.zeros(_N_JOINTS)
         self._differences = JointVelocities()
 
     @property
@@ -124,18 +110,14 @@ class FingerPlant:
         least = self.parameters.least_tension
         if self.parameters.gives:
             data.qpos[_N_JOINTS:] = self._arms @ angles + self.parameters.taut
-        length = -self._arms @ angles
-        command = self._drive.command(np.full(_N_TENDONS, least), length, np.zeros(_N_TENDONS))
+        taut = np.full(_N_TENDONS, least)
+        command = self._drive.command(taut, -self._arms @ angles, np.zeros(_N_TENDONS))
         self._command = np.clip(command, -1.0, 1.0)
-        controls = self._command
-        if self.held is not None:
-            controls = self.held.start(np.full(_N_TENDONS, least))
+        controls = self._command if self.held is None else self.held.start(taut)
         hold_controls(model, data, controls)
         mujoco.mj_forward(model, data)
-        self._angles = self._measured(rng)
         self._differences.forget()
-        self._velocities = self._differences.of(self._angles)
-        return self._senses(rng)
+        return self._senses(rng, started=True)
 
     def act(self, command: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
         """Apply a command, -1 to 1, (7,), for one control period; `rng` makes the noise."""
@@ -146,37 +128,31 @@ class FingerPlant:
         else:
             self.held.advance(self.model, self.data, self._command)
         mujoco.mj_kinematics(self.model, self.data)  # Move the fingertip to the new angles.
-        self._angles = self._measured(rng)
-        if self.parameters.joint_noise > 0.0:
-            self._velocities = self._differences.of(self._angles)
-        else:
-            self._velocities = self.data.qvel[:_N_JOINTS].copy()
         return self._senses(rng)
 
-    def _measured(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        noise = self.parameters.joint_noise
-        angles = self.angles
-        return angles + noise * rng.standard_normal(_N_JOINTS) if noise > 0.0 else angles
-
-    def _senses(self, rng: np.random.Generator) -> FingerSenses:
+    def _senses(self, rng: np.random.Generator, *, started: bool = False) -> FingerSenses:
+        joint_noise, tension_noise = self.parameters.joint_noise, self.parameters.tension_noise
+        angles, velocities = self.angles, self.data.qvel[:_N_JOINTS].copy()
+        if joint_noise > 0.0:
+            angles = angles + joint_noise * rng.standard_normal(_N_JOINTS)
+        if joint_noise > 0.0 or started:
+            velocities = self._differences.of(angles)
         tensions = np.abs(self.data.actuator_force)
-        noise = self.parameters.tension_noise
-        if noise > 0.0:
-            tensions = np.maximum(tensions + noise * rng.standard_normal(_N_TENDONS), 0.0)
-        return FingerSenses(
-            angles=self._angles,
-            velocities=self._velocities,
-            tensions=tensions,
-            # Winding up by 1 m shortens a tendon that gives by 1 m.
-            lengths=(
-                -self.data.qpos[_N_JOINTS:] if self.parameters.gives else -self._arms @ self.angles
-            ),
-            commands=self._command,
-            fingertip=fingertip(self._angles),
-        )
+        if tension_noise > 0.0:
+            tensions = np.maximum(tensions + tension_noise * rng.standard_normal(_N_TENDONS), 0.0)
+        lengths, _ = motor_lengths(self.parameters.gives, self._arms, self.data)
+        return FingerSenses(angles, velocities, tensions, lengths, self._command, fingertip(angles))
 
 
-_N: Final = len(JOINTS)
+def motor_lengths(
+    gives: bool, arms: NDArray[np.float64], data: mujoco.MjData
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the tendons' lengths at the motors, m, and their rates, m/s, (7,) each."""
+    if gives:  # Winding up by 1 m shortens a tendon by 1 m.
+        return -data.qpos[_N_JOINTS:], -data.qvel[_N_JOINTS:]
+    return -arms @ data.qpos[:_N_JOINTS], -arms @ data.qvel[:_N_JOINTS]
+
+
 # Tolerance of a ratio that must be whole.
 _WHOLE: Final = 1e-6
 
@@ -184,17 +160,8 @@ _WHOLE: Final = 1e-6
 class HeldTensions:
     """Simulates a finger whose commands take a path, in place of a drive in each simulation step.
 
-    Args:
-        path: The path.
-        parameters: Parameters of the finger.
-        drive: Meaning of the commands.
-        control_dt: Duration of a command, s.
-        timestep: Duration of a simulation step, s.
-
-    Attributes:
-        computations: How often tensions are computed per command.
-        ticks: How often they are sent per computation.
-        steps: Simulation steps per tick.
+    A command lasts `control_dt`, s, with `computations` of tensions; each is sent in `ticks` ticks
+    of `steps` simulation steps, each `timestep`, s, long.
 
     Raises:
         FingerError: If a command does not last a whole number of computations, or a tick a whole
@@ -238,10 +205,7 @@ class HeldTensions:
     ) -> None:
         """Simulate one command, -1 to 1, (7,), in a model whose controls are tensions."""
         for _ in range(self.computations):
-            if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
-                length, speed = -data.qpos[_N:], -data.qvel[_N:]
-            else:
-                length, speed = -self._arms @ data.qpos[:_N], -self._arms @ data.qvel[:_N]
+            length, speed = motor_lengths(self._gives, self._arms, data)
             aim = self._share(self._drive.tension(command, length, speed))
             for _ in range(self.ticks):
                 self._now = slewed(self._path, self._now, aim)
@@ -274,11 +238,7 @@ def hold_controls(
 def slewed(
     path: CommandPath, now: NDArray[np.float64], aim: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the tensions of the next tick, as `shapechanger.contract.limits.slewed` does.
-
-    All tensions, also those of `now` and those that are the `aim`, are shares of their ranges, 0 to
-    1, (n,).
-    """
+    """Return the next tick's shares of the ranges, as `contract.limits.slewed` does, (n,)."""
     rise, fall = slews(path)
     return np.clip(aim, now - fall, now + rise)
 

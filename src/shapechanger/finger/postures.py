@@ -10,12 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.finger.anatomy import (
-    DIP_BAND,
-    DIP_BY_PIP,
-    JOINT_RANGE,
-    JOINT_REST,
-)
+from shapechanger.finger.anatomy import DIP_BAND, DIP_BY_PIP, JOINT_RANGE, JOINT_REST
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.task import fingertip, fingertip_jacobian
@@ -44,13 +39,9 @@ def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
 def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, Any, Any, Any]:
     """Return angles of a finger with its tissue from independent ones, rad, arrays or tensors.
 
-    The nominal finger can hold all those within `inner_range`.
-
-    Args:
-        flexion: Of the knuckle, rad.
-        abduction: Of the knuckle when it is straight, rad; it has less when flexed.
-        middle: Angle of the middle joint, rad.
-        off: What the end joint has beyond the angle that follows from the middle one, rad.
+    `abduction` is that of the straight knuckle, which has less when flexed; `off` is the angle of
+    the end joint beyond the one that follows from the middle joint. The nominal finger can hold all
+    angles within `inner_range`.
     """
     share = 1.0 - (1.0 - _SPREAD_LEFT) * flexion.clip(0.0) / float(JOINT_RANGE[0, 1])
     return flexion, abduction * share, middle, DIP_BY_PIP * middle + off
@@ -81,14 +72,8 @@ def joint_torque(
 ) -> NDArray[np.float64]:
     """Return the torques, N·m, (4,), that a motion of a finger with stiff tendons needs.
 
-    They overcome inertia, weight, passive tissue and friction.
-
-    Args:
-        model: Model of the finger.
-        data: Overwritten.
-        angles: rad, (4,).
-        speed: rad/s, (4,).
-        acceleration: rad/s², (4,).
+    They overcome inertia, weight, passive tissue and friction. Angles are in rad, speeds in rad/s
+    and accelerations in rad/s², (4,) each; `data` is overwritten.
     """
     data.qpos[:] = angles
     data.qvel[:] = speed
@@ -138,15 +123,10 @@ def angles_for(
 ) -> tuple[NDArray[np.float64], float]:
     """Return joint angles whose fingertip is closest to a point: inverse kinematics.
 
-    Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, those near
-    the start are preferred whose end joint is within the band of the hood.
-
-    Args:
-        place: The point, m, (3,).
-        near: Angles to start from, rad, (4,); those of a finger at rest by default.
-
-    Returns:
-        The angles, rad, (4,), and the distance of their fingertip from the point, m.
+    Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, m, (3,),
+    those near the start are preferred whose end joint is within the band of the hood. `near` are
+    angles to start from, rad, (4,); those of a finger at rest by default. The distance of the
+    fingertip from the point, m, is returned too.
     """
     best = _search(place, JOINT_REST if near is None else near)
     if best[1] > _FAR_M:

@@ -47,11 +47,7 @@ _SMALL_ARM_M: Final = 2e-3
 
 
 def finger_html(found: IdentifiedFinger, name: str) -> str:
-    """Render the report.
-
-    Args:
-        found: The result of the identification.
-        name: Name of the log.
+    """Render the report of a log with this name.
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
@@ -88,12 +84,7 @@ def label(estimate: ParameterEstimate) -> str:
 
 
 def number(estimate: ParameterEstimate, value: float) -> str:
-    """Format a value of a parameter.
-
-    Args:
-        estimate: The parameter.
-        value: In its SI unit; shown in the unit of its label.
-    """
+    """Format a value of a parameter, in its SI unit, in the unit of its label."""
     if math.isinf(value):
         return "stiff"
     return f"{_SHOWN[estimate.unit][1] * value:.3g}"
@@ -152,12 +143,7 @@ def summary_line(found: IdentifiedFinger) -> str:
 
 
 def joint_chart(found: IdentifiedFinger, joint: int) -> str:
-    """Plot a joint's measured and simulated angles over the held-out part of a log.
-
-    Args:
-        found: The identified finger.
-        joint: Index of the joint. The first one's chart has the legend.
-    """
+    """Plot measured and simulated angles of a joint, by index, in the held-out part of a log."""
     check = found.held_out
 
     def draw(_: Figure, axes: Axes) -> None:
@@ -177,11 +163,7 @@ def joint_chart(found: IdentifiedFinger, joint: int) -> str:
 
 
 def arms_chart(found: IdentifiedFinger) -> str:
-    """Plot the moment arms with their 95 % intervals beside the nominal ones, joint by joint.
-
-    Args:
-        found: The identified finger.
-    """
+    """Plot the moment arms, their 95 % intervals and the nominal arms, joint by joint."""
 
     def draw(figure: Figure, axes: Axes) -> None:
         axes.remove()

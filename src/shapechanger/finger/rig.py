@@ -8,13 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import RobotRefused
-from shapechanger.finger.anatomy import (
-    JOINT_RANGE,
-    JOINTS,
-    LEAST_TENSION_N,
-    MOMENT_ARMS,
-    TENDONS,
-)
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINTS, LEAST_TENSION_N, MOMENT_ARMS, TENDONS
 from shapechanger.finger.plant import CONTROL_DT, JointVelocities
 from shapechanger.finger.postures import moving_torque
 from shapechanger.finger.task import FingerSenses, fingertip
@@ -35,12 +29,6 @@ class RigSenses:
     fit of the seven lengths, corrected for the stretch of the tendons, with the nominal moment arms
     and within the joints' ranges, and velocities follow from the speeds of the tendons.
 
-    Args:
-        robot: Name of the rig.
-        action_layout: Layout of the rig's commands.
-        state_layout: Layout of its state.
-        tendon_stiffness: Stiffness of its tendons, N/m.
-
     Attributes:
         has_encoders: Whether it has encoders at all four joints.
         most: Largest tension of each tendon, N, (7,).
@@ -52,11 +40,7 @@ class RigSenses:
     """
 
     def __init__(
-        self,
-        robot: str,
-        action_layout: Layout,
-        state_layout: Layout,
-        tendon_stiffness: float,
+        self, robot: str, action_layout: Layout, state_layout: Layout, tendon_stiffness: float
     ) -> None:
         actions = {feature.name: feature for feature in action_layout}
         lacks = [name for name in TENDONS if name not in actions]
@@ -120,11 +104,7 @@ class RigSenses:
         )
 
     def length_values(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Return the command of a rig that controls lengths, clipped to their range.
-
-        Args:
-            lengths: Length of each tendon beyond that of the straight finger, m, (7,).
-        """
+        """Return the command of a rig that controls lengths, m, (7,), clipped to their range."""
         # 0 is the pretension, not the longest length.
         shares = np.clip((self._longest - lengths) / self._span, _ABOVE_REST, 1.0)
         return shares[self._order].astype(np.float32)
@@ -138,13 +118,7 @@ class RigSenses:
     def read(
         self, state: NDArray[Any], absent: tuple[str, ...], commands: NDArray[np.float64]
     ) -> FingerSenses:
-        """Convert one state of the rig.
-
-        Args:
-            state: The rig's state, in the order of its layout.
-            absent: Names of the numbers that were not measured now; they keep their last value.
-            commands: The newest command, -1 to 1, (7,).
-        """
+        """Convert one state of the rig; numbers that are `absent` now keep their last value."""
         fresh = np.asarray(state, np.float64)
         missing = {self._starts[name] for name in absent if name in self._starts}
         keep = [i for i in range(len(fresh)) if i not in missing]
@@ -169,11 +143,7 @@ class RigSenses:
 
 
 class LengthApproach:
-    """Controller that brings a finger whose lengths are controlled to a start posture.
-
-    Args:
-        posture: The posture, rad, (4,).
-    """
+    """Controller that brings a finger whose lengths are controlled to a posture, rad, (4,)."""
 
     def __init__(self, posture: NDArray[np.float64]) -> None:
         self._posture = posture
@@ -209,13 +179,7 @@ _MOST_LAG: Final = 0.8
 
 
 class StartApproach:
-    """Controller that brings the finger to a start posture.
-
-    Args:
-        posture: The posture, rad, (4,).
-        least: Smallest tension of each tendon, N, (7,).
-        most: Largest tension of each tendon, N, (7,).
-    """
+    """Controller that brings the finger to a posture, rad, (4,), within tensions, N, (7,)."""
 
     def __init__(
         self, posture: NDArray[np.float64], least: NDArray[np.float64], most: NDArray[np.float64]

@@ -106,10 +106,7 @@ class FingertipReward:
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> FingertipReward:
-        """Create the reward from weights by name.
-
-        Args:
-            weights: Weights that replace the defaults.
+        """Create the reward from weights that replace the defaults.
 
         Raises:
             UnknownName: If there is no such weight.

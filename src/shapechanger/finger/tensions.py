@@ -62,10 +62,7 @@ class TendonDrive:
     rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(TENDONS)))
 
     def tension(
-        self,
-        command: NDArray[np.float64],
-        length: NDArray[np.float64],
-        speed: NDArray[np.float64],
+        self, command: NDArray[np.float64], length: NDArray[np.float64], speed: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Tensions, N, of a command, -1 to 1, at lengths, m, and their rates, m/s, (7,) each.
 
@@ -75,10 +72,7 @@ class TendonDrive:
         return (self.offset + self.gain * command) * self._strength(length, speed) + pulled
 
     def command(
-        self,
-        tension: NDArray[np.float64],
-        length: NDArray[np.float64],
-        speed: NDArray[np.float64],
+        self, tension: NDArray[np.float64], length: NDArray[np.float64], speed: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Command that gives tensions, N, at lengths, m, and their rates, m/s, (7,) each.
 
@@ -137,12 +131,8 @@ _MAKERS: Final = {"impedance": _impedance, "tension": _tension, "length": _lengt
 def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
     """Make the drive of a mode of action.
 
-    A drive is part of the controller, so it uses the nominal moment arms, whatever those of the
-    finger are.
-
-    Args:
-        mode: One of `DRIVES`.
-        parameters: Finger with the range of tensions.
+    A drive is part of the controller: it takes the range of tensions from the finger, but uses the
+    nominal moment arms.
 
     Raises:
         UnknownName: If the mode is unknown.
@@ -162,14 +152,9 @@ _NOTHING: Final = 1e-9
 def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
     """Smallest tensions, each at least 1, without torque about any joint; None if there are none.
 
-    With such tensions and moment arms of full rank, every torque is possible: a negative tension is
-    made positive by adding a multiple of them.
-
-    Args:
-        arms: Torque about each joint per newton of each tendon, m, (tendons, joints).
-
-    Returns:
-        Tensions in multiples of the smallest, (tendons,).
+    Moment arms are in m, (tendons, joints), and tensions in multiples of the smallest. With moment
+    arms of full rank, every torque is then possible: a negative tension is made positive by adding
+    a multiple of them.
     """
     r = np.asarray(arms, np.float64)
     # Scaled to make the solver's tolerance a millionth of a typical arm.
@@ -194,14 +179,9 @@ def tensions_for_torque(
 ) -> tuple[NDArray[np.float64], bool]:
     """Tensions that give a torque, or the nearest possible one, with the least co-contraction.
 
-    Args:
-        arms: Moment arms, m, (tendons, joints).
-        torque: Torque, N·m, (joints,).
-        least: Smallest tensions, N, a number or (tendons,).
-        most: Largest tensions, N, a number or (tendons,).
-
-    Returns:
-        Tensions, N, (tendons,), and whether they give the torque to within 1 µN·m.
+    Moment arms are in m, (tendons, joints), the torque in N·m, (joints,), and the smallest and
+    largest tensions in N, numbers or (tendons,). The second result says whether the tensions, N,
+    give the torque to within 1 µN·m.
     """
     r = np.asarray(arms, np.float64)
     low, high = (np.broadcast_to(np.asarray(b, np.float64), len(r)) for b in (least, most))

@@ -12,11 +12,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.errors import PathError
-from shapechanger.finger.anatomy import (
-    LEAST_TENSION_N,
-    MOMENT_ARMS,
-    MOST_TENSION_N,
-)
+from shapechanger.finger.anatomy import LEAST_TENSION_N, MOMENT_ARMS, MOST_TENSION_N
 from shapechanger.finger.env import FingerEnv
 from shapechanger.finger.paths import (
     FingertipPath,

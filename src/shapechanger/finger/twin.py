@@ -35,13 +35,7 @@ def finger_place(parameters: FingerParameters) -> Place:
 def open_finger(
     parts: Collection[str], camera: CameraPlan | None, seed: int, *, parameters: str
 ) -> FingerWorld:
-    """Open the world of a finger.
-
-    Args:
-        parts: Not used: the servos of a rig pull tendons.
-        camera: Not used: nothing is seen of a finger.
-        seed: Seed of the first start.
-        parameters: Parameters of the finger, as JSON.
+    """Open the world of a finger with these parameters, JSON; it has no sensors and no camera.
 
     Raises:
         FingerError: If the parameters are invalid.
@@ -58,13 +52,6 @@ class FingerWorld(World):
     The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
     delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
     The noise of the joints is that of their encoders.
-
-    Args:
-        parameters: Parameters of the finger.
-        seed: Seed of the first start.
-
-    Attributes:
-        resting_v: Voltage of the battery of every world, V; a finger has none.
     """
 
     def __init__(self, parameters: FingerParameters, seed: int) -> None:

@@ -271,11 +271,9 @@ _EMPTY: Final = (205, 210, 218)
 
 
 def tendon_legend(frame: NDArray[np.uint8], pulled: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return a frame with the name, colour and tension of each tendon along its top.
+    """Return a frame with each tendon's name, colour and tension along its top.
 
-    Args:
-        frame: The frame, (height, width, 3).
-        pulled: Tension of each tendon over its largest, 0 to 1, (7,), shown as a bar.
+    Bars show `pulled`, the tensions over the largest, 0 to 1, (7,).
     """
     height, width = frame.shape[:2]
     if width < _NARROWEST:
@@ -300,13 +298,7 @@ def tendon_legend(frame: NDArray[np.uint8], pulled: NDArray[np.float64]) -> NDAr
 def polyline(
     points: NDArray[np.float64], radius: float, rgba: tuple[float, float, float, float]
 ) -> list[dict[str, Any]]:
-    """Return markers of Gymnasium's viewers that connect points.
-
-    Args:
-        points: The points, m, (n, 3).
-        radius: Radius of the line, m.
-        rgba: Red, green, blue and opacity, 0 to 1.
-    """
+    """Return markers of Gymnasium's viewers that connect points, m, (n, 3)."""
     markers: list[dict[str, Any]] = []
     for start, end in pairwise(points):
         along = end - start

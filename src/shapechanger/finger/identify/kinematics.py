@@ -124,18 +124,10 @@ def fit_kinematics(log: FingerLog) -> Kinematics:
 def robust_covariance(
     jacobian: NDArray[np.float64], residual: NDArray[np.float64], control_dt: float
 ) -> NDArray[np.float64]:
-    """Sandwich estimate of a least-squares fit's covariance under correlated residuals.
+    """Sandwich estimate of a least-squares fit's covariance, (p, p), with correlated residuals.
 
-    Residuals may be correlated with those of the same time and of times within half a second; the
-    weights are those of Newey & West 1987 (Econometrica 55:703).
-
-    Args:
-        jacobian: Jacobian of the residuals, (times, residuals per time, p).
-        residual: Residuals at the optimum, (times, residuals per time).
-        control_dt: Time between rows, s.
-
-    Returns:
-        Covariance of the parameters, (p, p).
+    Residuals at the optimum, (times, k), with their Jacobian, (times, k, p), may be correlated with
+    others within half a second; the weights are those of Newey & West 1987 (Econometrica 55:703).
     """
     squares = np.einsum("tip,tiq->pq", jacobian, jacobian)
     bread = np.asarray(np.linalg.pinv(squares, hermitian=True), np.float64)
@@ -154,10 +146,6 @@ def interval_quantile(times: int, control_dt: float) -> float:
     It is above 1.96, because the covariance is itself estimated from few stretches of half a
     second: the cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1, Bartlett's
     weights).
-
-    Args:
-        times: Number of rows.
-        control_dt: Time between rows, s.
     """
     b = min(1.0, _lags(control_dt) / times)
     return float(np.polyval([-0.5324, 0.4160, 2.9694, 1.9600], b))

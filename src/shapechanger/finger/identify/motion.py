@@ -90,15 +90,9 @@ def cut_windows(
     length_s: float = _WINDOW_S,
     first_s: float = _SETTLES_S,
 ) -> list[Window]:
-    """Cut a log into windows that follow one another.
+    """Cut a log into windows that follow one another, each `length_s` long, from `first_s` on.
 
-    Args:
-        log: The log.
-        kinematics: Fit of its lengths, for the angles.
-        motors: Fit of its tensions, for the state of the motors.
-        last: Row before which the last window ends; None for the end of the log.
-        length_s: Length of a window, s.
-        first_s: Start of the first window, s after the start of the log.
+    The last window ends before the row `last`; None for the end of the log.
     """
     dt = log.control_dt
     velocities = savgol_filter(kinematics.angles, _ROWS, 3, deriv=1, delta=dt, axis=0)
@@ -157,14 +151,7 @@ class Dynamics:
 def fit_dynamics(
     log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None = None
 ) -> Dynamics:
-    """Fit joint and friction parameters to a log.
-
-    Args:
-        log: The log.
-        kinematics: Fit of its lengths.
-        motors: Fit of its tensions.
-        last: Row before which the fit ends, to leave the rest for validation; None for the end of
-            the log.
+    """Fit joint and friction parameters to a log, up to the row `last`, or to its end for None.
 
     Raises:
         MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
@@ -199,11 +186,7 @@ def _load_sysid() -> Any:
 
 
 class _MotionFit:
-    """Residuals of the simulated motion.
-
-    The parameters are the logarithms of the factors over `FACTORS`, (9,). See `fit_dynamics` for
-    the arguments.
-    """
+    """Residuals of the simulated motion; parameters are logarithms of factors over `FACTORS`."""
 
     def __init__(
         self, sysid: Any, log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None

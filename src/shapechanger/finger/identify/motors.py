@@ -34,11 +34,7 @@ _SATURATED: Final = 0.01
 
 
 class CommandSignal:
-    """The commands of a log as functions of time.
-
-    Args:
-        log: The log; its first command is assumed to have acted before its first row.
-    """
+    """The commands of a log as functions of time; the first is taken to have acted before it."""
 
     def __init__(self, log: FingerLog) -> None:
         self._t = np.concatenate([[log.t[0] - 1.0], log.t])
@@ -49,17 +45,7 @@ class CommandSignal:
         )
 
     def delayed(self, start: float, dt: float, steps: int, delay: float) -> NDArray[np.float64]:
-        """Mean command over each time step, which is a smooth function of the delay.
-
-        Args:
-            start: Start of the first step, s.
-            dt: Length of a step, s.
-            steps: Number of steps.
-            delay: Delay of the commands, s.
-
-        Returns:
-            Commands, -1 to 1, (steps, 7).
-        """
+        """Mean command over each time step, (steps, 7), a smooth function of the delay, s."""
         edges = start + dt * np.arange(steps + 1) - delay
         sums = np.empty((steps + 1, self._sums.shape[1]))
         for i, column in enumerate(self._sums.T):
@@ -69,17 +55,9 @@ class CommandSignal:
     def activations(
         self, start: float, dt: float, steps: int, delay: float, lag: float
     ) -> NDArray[np.float64]:
-        """Activations of the motors, which follow the commands with a first-order lag.
+        """Activations of the motors at the end of each time step, -1 to 1, (steps, 7).
 
-        Args:
-            start: Start of the first step, s; the motors are at their command then.
-            dt: Length of a step, s.
-            steps: Number of steps.
-            delay: Delay of the commands, s.
-            lag: Time constant of the motors, s.
-
-        Returns:
-            Activations at the end of each step, -1 to 1, (steps, 7).
+        They follow the commands with a first-order lag, s, and are at their command at the start.
         """
         given = self.delayed(start, dt, steps, delay)
         keeps = np.exp(-dt / lag)

@@ -219,15 +219,9 @@ def identify(
 
 
 def replay(log: FingerLog, parameters: FingerParameters, window: Window) -> NDArray[np.float64]:
-    """Simulate a finger under the commands of a log.
+    """Simulate a finger under the commands of a log, from the state that a window begins in.
 
-    Args:
-        log: Log with the commands.
-        parameters: The finger.
-        window: Initial state and duration.
-
-    Returns:
-        Angles, rad, (m + 1, 4); the first row is that of the window.
+    Returns angles, rad, (m + 1, 4), of which the first row is the window's.
     """
     drive, delay = drive_of(log.actions, NOMINAL), parameters.command_delay
     if parameters.path is None:  # The commands below are delayed already.

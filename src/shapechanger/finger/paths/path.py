@@ -162,12 +162,7 @@ class Harmonics:
     sines: tuple[Vector, ...]
 
     def __call__(self, t: Times, order: int = 0) -> Points:
-        """Return the positions, or their derivative of an order.
-
-        Args:
-            t: Times, s, shape (n,).
-            order: 0 for positions, 1 for velocities.
-        """
+        """Return the positions, or their derivative of an order, at times, s, shape (n,)."""
         multiples = np.arange(1.0, len(self.cosines) + 1.0)
         rates = math.tau * self.hz * multiples  # rad/s, shape (k,).
         # Each derivative of a sine or cosine is a quarter turn ahead, times the rate.
@@ -322,16 +317,7 @@ def _closed(
     cosines: list[NDArray[np.float64]],
     sines: list[NDArray[np.float64]],
 ) -> FingertipPath:
-    """Return a closed path of oscillations around a centre.
-
-    Args:
-        what: Name of the shape, for messages.
-        hz: Periods per second.
-        phase: Phase at 0 s, rad.
-        centre: Mean position, m.
-        cosines: Coefficients of the cosines, m.
-        sines: Coefficients of the sines, m; as many.
-    """
+    """Return a closed path as `Harmonics`; `what` names the shape in messages."""
     hz = positive(f"The hz of a {what}", hz)
     motion = Harmonics(
         hz=hz,
