@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import os
 import resource
@@ -29,23 +28,10 @@ QUICK = ["transfer", "InvertedPendulum", "BigInvertedPendulum", "--quick"]
 
 
 def run(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    """Run a command, in its own process if it needs options of one."""
-    if options:
-        return subprocess.run(  # type: ignore[call-overload]
-            [*COMMAND, *arguments], capture_output=True, text=True, check=False, **options
-        )
-    output, errors, code = io.StringIO(), io.StringIO(), 0
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        contextlib.redirect_stdout(output),
-        contextlib.redirect_stderr(errors),
-    ):
-        patch.setattr(sys, "argv", ["shapechanger", *arguments])
-        try:
-            main(arguments)
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-    return subprocess.CompletedProcess(arguments, code, output.getvalue(), errors.getvalue())
+    """Run a command in its own process."""
+    return subprocess.run(  # type: ignore[call-overload]
+        [*COMMAND, *arguments], capture_output=True, text=True, check=False, **options
+    )
 
 
 def curves(out: Path) -> dict[str, list[tuple[int, float]]]:
