@@ -54,7 +54,6 @@ def test_no_file_is_longer_than_600_lines() -> None:
     ],
 )
 def test_import_loads_no_heavy_packages(package: str, forbidden: frozenset[str]) -> None:
-    """Importing a package loads no simulator and no other heavy package."""
     script = f"import sys, {package}; print(*sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", script], check=True, capture_output=True, text=True, cwd=_SRC
@@ -63,7 +62,6 @@ def test_import_loads_no_heavy_packages(package: str, forbidden: frozenset[str])
 
 
 def test_exported_names_exist_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only packages have `__all__`, and its names exist and are unique."""
     monkeypatch.chdir(tmp_path)  # lgpio creates a named pipe in the working directory.
     wrong: list[str] = []
     for module in _MODULES:

@@ -74,7 +74,6 @@ def test_all_errors_share_a_base() -> None:
     ],
 )
 def test_unknown_names_suggest_the_nearest(name: str, known: list[str], message: str) -> None:
-    """The message lists the known names and suggests the nearest."""
     error = UnknownName("body", name, iter(known))
     assert str(error) == message
     assert (error.kind, error.name, error.known) == ("body", name, tuple(known))
@@ -90,7 +89,6 @@ def test_long_lists_of_names_are_cut() -> None:
 
 
 def test_missing_extras_name_the_command() -> None:
-    """The message has the command that installs the extra."""
     error = MissingExtra("mujoco", "sim")
     assert "run `pip install 'shapechanger[sim]'`" in str(error)
     assert (error.package, error.extra) == ("mujoco", "sim")

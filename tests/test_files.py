@@ -101,7 +101,6 @@ def test_text_in_another_encoding_is_named(tmp_path: Path, data: bytes, sentence
 
 
 def test_json_round_trip(tmp_path: Path) -> None:
-    """JSON round trips."""
     write_json(tmp_path / "a.json", {"x": [1, 2]})
     assert read_json(tmp_path / "a.json", dict[str, list[int]], "try") == {"x": [1, 2]}
 

@@ -128,7 +128,6 @@ def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> Non
 
 
 def test_registering_again_changes_nothing() -> None:
-    """`register_all` is idempotent."""
     before = {env_id: gym.registry[env_id] for env_id in CATALOGUE}
     register_all()
     assert {env_id: gym.registry[env_id] for env_id in CATALOGUE} == before

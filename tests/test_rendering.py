@@ -86,7 +86,6 @@ def test_egl_is_chosen() -> None:
 
 
 def test_osmesa_is_chosen_where_egl_is_missing() -> None:
-    """OSMesa is used without EGL."""
     assert _output(_installed(OSMesa="libOSMesa.so.8") + _CHOOSE) == "osmesa"
 
 
@@ -101,7 +100,6 @@ def test_osmesa_is_chosen_where_egl_is_missing() -> None:
     ids=["no extensions", "no device", "no driver", "a driver for the second device"],
 )
 def test_egl_is_chosen_where_a_device_opens(egl: str, chosen: str) -> None:
-    """EGL is used only if one of its devices opens."""
     installed = _installed(EGL="libEGL.so.1", OSMesa="libOSMesa.so.8")
     assert _output(installed + egl + _CHOOSE) == chosen
 
@@ -121,7 +119,6 @@ def test_missing_libraries_are_reported(broken: str) -> None:
 
 @pytest.mark.parametrize("choice", ["egl", "osmesa", "glfw"])
 def test_mujoco_gl_takes_precedence(choice: str) -> None:
-    """A valid `MUJOCO_GL` is kept."""
     assert _output(_installed() + _CHOOSE, MUJOCO_GL=choice) == choice
 
 

@@ -33,7 +33,6 @@ def _requirements() -> Iterator[tuple[str, Requirement]]:
 
 
 def test_every_requirement_is_pinned_inside_its_range() -> None:
-    """Every requirement has a pin, and the pin lies inside the range of pyproject.toml."""
     pins = _pins()
     outside = [
         f"{group}: {requirement}, pinned {pins.get(canonicalize_name(requirement.name))}"

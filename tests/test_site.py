@@ -72,7 +72,6 @@ def pins_of(profile: Profile) -> set[int]:
 
 
 def test_diagrams_show_every_pin_of_a_profile(profile: Profile) -> None:
-    """A diagram, and the table below it, have each pin of the profile, and no other."""
     picture = draw_wiring(profile, "it")
     shown = {int(pin) for pin in re.findall(r"GPIO(\d+) ", picture)}
     assert shown == pins_of(profile)

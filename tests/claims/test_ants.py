@@ -197,7 +197,6 @@ def test_an_ant_without_torque_stays_healthy(env_id: str, arguments: dict[str, A
 
 
 def test_a_flipped_ant_is_unhealthy_at_once(ant: Any) -> None:
-    """A flipped ant is unhealthy although its height is in range."""
     low, high = ant.healthy_z_range
     for height in (0.27, ant.standing_height):
         assert low <= height <= high

@@ -40,7 +40,6 @@ def profile(tmp_path_factory: pytest.TempPathFactory) -> Profile:
 
 @pytest.fixture(scope="module", params=["twin", pytest.param("real", marks=pytest.mark.slow)])
 def clock(request: pytest.FixtureRequest) -> Clock:
-    """The kind of clock."""
     return request.param
 
 

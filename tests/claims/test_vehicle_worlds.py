@@ -135,7 +135,6 @@ def test_a_bumped_wall_costs_ten_and_ends_the_episode() -> None:
 
 
 def test_training_and_held_out_courses_are_disjoint() -> None:
-    """After `hold_out`, an env draws held-out courses only."""
     assert not set(TRAINING) & set(HELD_OUT)
     with closing(VehicleEnv("car", image=False, courses=(1, 2, 3))) as env:
         assert env.reset(seed=0)[1]["course"] in (1, 2, 3)

@@ -52,7 +52,6 @@ def served() -> Iterator[FakeHub]:
 
 @pytest.fixture
 def hub(served: FakeHub) -> FakeHub:
-    """The Hub, empty."""
     served.repositories.clear()
     served.requests.clear()
     served.cut.clear()

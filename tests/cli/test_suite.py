@@ -47,7 +47,6 @@ class _Counting(Serial):
         self._stops_after = stops_after
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run the jobs one by one."""
         for job in jobs:
             if len(self.done) == self._stops_after:
                 raise KeyboardInterrupt

@@ -44,7 +44,6 @@ def test_the_reward_does_not_depend_on_the_control_rate(speed: float, dt: float)
 def test_unmeasured_quantities_have_no_term(
     quantities: tuple[float | None, bool | None, bool | None], names: set[str]
 ) -> None:
-    """Quantities that are not measured have no term."""
     assert set(DriveReward().terms(*quantities, 0.1)) == names
 
 
@@ -64,12 +63,10 @@ def test_terms_are_weighted() -> None:
 def test_a_collision_ends_the_episode_if_configured(
     ends: bool, collided: bool | None, over: bool
 ) -> None:
-    """Collisions end the episode if the weight says so."""
     assert DriveReward(collision_ends_episode=ends).ends(collided) is over
 
 
 def test_weights_are_set_by_name() -> None:
-    """Weights are set by name; others keep their defaults."""
     given_ = DriveReward.from_weights({"velocity": 3, "collision_ends_episode": 0.0})
     assert given_ == DriveReward(velocity=3.0, collision_ends_episode=False)
     assert DriveReward.from_weights({}) == DriveReward()

@@ -280,7 +280,6 @@ _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
 @pytest.mark.filterwarnings("ignore:.*value is -?infinity:UserWarning")
 @pytest.mark.parametrize("make", [Walk, Single])
 def test_an_env_that_keeps_its_promises_passes(make: MakeEnv) -> None:
-    """Envs that keep all promises pass, also in single precision."""
     sentences = list(examine(make))
     assert len(sentences) == len(PROMISES)
     assert all(sentence.endswith(".") for sentence in sentences)
@@ -290,18 +289,15 @@ def test_an_env_that_keeps_its_promises_passes(make: MakeEnv) -> None:
 def test_a_broken_promise_is_found(
     make: MakeEnv, promise: Callable[[MakeEnv], None], sentence: str
 ) -> None:
-    """A broken promise raises BrokenPromise."""
     with pytest.raises(BrokenPromise, match=sentence):
         promise(make)
 
 
 def test_every_promise_is_broken_by_some_env() -> None:
-    """Every promise is covered by an env that breaks it."""
     assert {promise for _, promise, _ in _BROKEN} == set(PROMISES)
 
 
 def test_the_exam_ends_at_the_first_broken_promise() -> None:
-    """`examine` yields the kept promises before the first broken one."""
     kept: list[str] = []
     with pytest.raises(BrokenPromise, match="Every start is the same"):
         kept.extend(examine(Still))
@@ -309,13 +305,11 @@ def test_the_exam_ends_at_the_first_broken_promise() -> None:
 
 
 def test_broken_promise_is_an_assertion_error() -> None:
-    """BrokenPromise is an AssertionError and a ShapechangerError."""
     assert issubclass(BrokenPromise, AssertionError)
     assert issubclass(BrokenPromise, ShapechangerError)
 
 
 def test_a_spec_that_makes_another_env_is_found() -> None:
-    """A spec that makes another env raises BrokenPromise."""
     gym.register("testing_test/Walk-v0", f"{__name__}:Walk")
     try:
 

@@ -58,7 +58,6 @@ def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
 
 
 def test_policy_steps_are_not_loaded_by_default(tmp_path: Path) -> None:
-    """They are loaded with `drivers`."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
         record_steps(env, PolicyPilot(lambda seen: AWAY), 4, seed=0)
     assert len(load_dataset(tmp_path, drivers=("policy",))) == 4

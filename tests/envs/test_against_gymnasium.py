@@ -193,7 +193,6 @@ def test_the_others_start_like_gymnasiums(name: str) -> None:
 
 
 def test_reward_weights_have_gymnasiums_meaning() -> None:
-    """Weights scale the terms of the reward as in Gymnasium."""
     arguments = {"ctrl_cost_weight": 0.25, "healthy_reward": 3.0, "contact_cost_weight": 0.0}
     with gym.make("shapechanger/BigAnt-v1", **arguments) as env:
         env.reset(seed=0)

@@ -88,7 +88,6 @@ def _episode(env: Any, seed: int) -> list[np.ndarray]:
 
 @pytest.fixture
 def ant() -> Iterator[Any]:
-    """An ant after a reset."""
     with gym.make("shapechanger/Ant-v1") as env:
         env.reset(seed=5)
         yield env
@@ -119,7 +118,6 @@ def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
 
 
 def test_an_empty_list_is_the_unedited_body() -> None:
-    """An empty list of edits is a valid body."""
     body = _compiled(_model("shapechanger/BigAnt-v1", body="[]"))
     assert body == _compiled(_model("shapechanger/Ant-v1"))
 
@@ -162,7 +160,6 @@ def test_an_invalid_body_is_refused(
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_the_spec_and_a_pickle_make_the_same_model(env_id: str) -> None:
-    """Copies by spec, pickle and deepcopy have bitwise the same model."""
     with gym.make(env_id) as env:
         same = _compiled(env.unwrapped.model)
         rebuilt = [
@@ -306,7 +303,6 @@ def test_the_body_stays_until_it_is_changed(ant: Any) -> None:
 
 
 def test_a_pickle_after_a_reset_has_the_new_body(ant: Any) -> None:
-    """Pickle and spec have the body of the last reset."""
     ant.reset(options={"body": "AmputatedAnt"})
     model = _compiled(ant.unwrapped.model)
     spec = ant.unwrapped.spec
@@ -322,7 +318,6 @@ def test_a_pickle_after_a_reset_has_the_new_body(ant: Any) -> None:
 
 
 def _pendulum_with_a_motor_on_its_hinge(folder: Path) -> str:
-    """Write a pendulum whose motor has the name of the hinge that it drives."""
     assets = Path(gymnasium.envs.mujoco.__file__).parent / "assets"
     text = (assets / "inverted_pendulum.xml").read_text()
     changed = text.replace('joint="slider"', 'joint="hinge"').replace(
@@ -416,7 +411,6 @@ def test_a_custom_model_can_be_edited(tmp_path: Path) -> None:
 
 
 def test_interpolated_bodies_are_a_path_between_two_envs() -> None:
-    """The ends of the path are the bodies of both envs."""
     with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
         ends = [
             interpolate(one.unwrapped.body, other.unwrapped.body, alpha) for alpha in (0.0, 1.0)

@@ -155,7 +155,6 @@ def test_the_trunk_changes_its_own_position(ant: Any) -> None:
 
 
 def test_a_rotation_changes_the_quaternion(ant: Any) -> None:
-    """A rotation of the trunk changes the quaternion only, with w first."""
     pose, velocity = _state(ant)
     pose[3:7] = [1.0, 0.0, 0.0, 0.0]
     before = _sensed(ant, pose, velocity)
@@ -173,7 +172,6 @@ def test_a_rotation_changes_the_quaternion(ant: Any) -> None:
 
 
 def test_a_velocity_changes_its_own_number(env: Any) -> None:
-    """Each degree of freedom changes one number."""
     pose, velocity = _state(env)
     before = _sensed(env, pose, velocity)
     for j in range(env.model.njnt):

@@ -133,7 +133,6 @@ def test_blocks_are_optional(shown: tuple[bool, ...]) -> None:
 
 
 def test_the_units_of_the_humanoid(humanoid: Any) -> None:
-    """Blocks of the humanoid have SI units."""
     units = {str(f).partition("/")[2] for f in humanoid.observation_layout if "torso/" in f.name}
     assert units >= {
         *("inertia/xx [kg·m²]", "inertia/yz [kg·m²]", "inertia/mx [kg·m]", "inertia/mass [kg]"),

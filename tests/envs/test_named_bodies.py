@@ -18,7 +18,6 @@ _BODIES = [(family, name) for family in (ANT, PENDULUM) for name in family.bodie
 
 @pytest.mark.parametrize("family", [ANT, PENDULUM], ids=lambda family: family.name)
 def test_a_family_has_the_name_of_its_first_body(family: Family) -> None:
-    """The family's name is that of its unedited body."""
     assert next(iter(family.bodies)) == family.name
     assert family.body(family.name) == ()
 

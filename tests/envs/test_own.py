@@ -218,7 +218,6 @@ def test_a_study_makes_it_by_id(dog: Path) -> None:
 
 
 def test_bodies_change_at_a_reset(dog: Path) -> None:
-    """If no space changes."""
     env = shapechanger.from_mjcf(dog)
     env.reset(seed=0, options={"body": Mass("trunk", scale=2.0)})
     assert _inner(env).model.body("trunk").mass == 6.0
@@ -384,7 +383,6 @@ def test_wrong_arguments_are_refused(
 
 
 def test_tasks_that_return_nonsense_are_refused(dog: Path) -> None:
-    """At the step that returns it."""
     env = shapechanger.from_mjcf(dog, Nonsense())
     env.reset(seed=0)
     with pytest.raises(TaskError, match="The reward term 'nonsense' of the task 'Nonsense' is nan"):

@@ -82,11 +82,9 @@ class _Robot(NamedTuple):
 
     @property
     def file(self) -> Path:
-        """The file."""
         return FILES / self.path
 
     def make(self, body: Body = (), **arguments: Any) -> gym.Env[Any, Any]:
-        """Make its env."""
         return shapechanger.from_mjcf(self.file, Move, rig=self.rig, body=body, **arguments)
 
 

@@ -111,7 +111,6 @@ def test_envs_render_in_turn(ant: Any) -> None:
 
 
 def test_an_unclosed_env_does_not_affect_others(ant: Any) -> None:
-    """Garbage collection of an unclosed env does not affect the frames of others."""
     frame = ant.render()
     dropped = gym.make("shapechanger/BigAnt-v1", render_mode="rgb_array", **_SIZE)
     dropped.reset(seed=0)

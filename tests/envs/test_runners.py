@@ -112,7 +112,6 @@ def test_root_joints_cannot_be_locked(name: str, joint: str) -> None:
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_pole_rewards_are_relative_to_the_length(factor: float) -> None:
-    """Reward and termination depend on the height relative to the length."""
     with gym.make(_POLES, body=Stretch("pole*", factor)) as made:
         env: Any = made.unwrapped
         made.reset(seed=0)

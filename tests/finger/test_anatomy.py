@@ -24,7 +24,6 @@ _FDS, _DI = 1, 5
 
 
 def test_moment_arms_follow_from_measured_forces() -> None:
-    """Moment arms follow from the measured fingertip forces."""
     aside, along, across, torque = map(np.array, (_ASIDE, _ALONG, _ACROSS, _TORQUE))
     # Two tendons have no arm at the last joint, which gives its position relative to the tip.
     y = torque[_DI] / across[_DI]
@@ -41,5 +40,4 @@ def test_moment_arms_follow_from_measured_forces() -> None:
 
 
 def test_tension_limits_are_below_the_muscles_force() -> None:
-    """Tension limits are at most 30 % of the muscles' force."""
     assert (MOST_TENSION_N <= 0.3 * FORCE_POTENTIAL_N + 1e-12).all()

@@ -25,7 +25,6 @@ _MICRO = 1e-6
 
 
 def test_the_nominal_finger_spans_all_torques() -> None:
-    """Non-negative tensions of the finger span all torques."""
     assert spans_all_torques(MOMENT_ARMS)
     for j in range(len(JOINTS)):
         for sign in (1.0, -1.0):
@@ -34,7 +33,6 @@ def test_the_nominal_finger_spans_all_torques() -> None:
 
 
 def test_co_contraction_has_no_torque() -> None:
-    """The smallest tension of a co-contraction is 1."""
     tensions = co_contraction(MOMENT_ARMS)
     assert tensions is not None
     assert tensions.min() == pytest.approx(1.0)
@@ -129,7 +127,6 @@ def test_tensions_are_minimal(seed: int) -> None:
 
 
 def test_the_torque_of_the_least_tensions_gives_them() -> None:
-    """The least tensions are returned for their own torque."""
     least = np.full(7, LEAST_TENSION_N)
     tensions, is_enough = tensions_for_torque(
         MOMENT_ARMS, MOMENT_ARMS.T @ least, LEAST_TENSION_N, MOST_TENSION_N

@@ -24,7 +24,6 @@ _REST = -MOMENT_ARMS @ JOINT_REST
 
 @pytest.mark.parametrize("mode", DRIVES)
 def test_command_inverts_tension(mode: str) -> None:
-    """Tension grows with the command."""
     rng = np.random.default_rng(0)
     drive = drive_of(mode, NOMINAL)
     command, length, speed = rng.uniform(-1, 1, (3, 7)) * [[1.0], [0.01], [0.2]]

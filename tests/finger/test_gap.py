@@ -69,7 +69,6 @@ def test_parameters_are_drawn_from_their_ranges(name: str) -> None:
 
 
 def test_draws_span_all_torques() -> None:
-    """Draws whose arms do not span all torques are repeated."""
     gap = _but(arm_error=0.6)
     rng = np.random.default_rng(0)
     assert all(spans_all_torques(gap.draw(rng).arms) for _ in range(40))
@@ -105,7 +104,6 @@ def test_a_finger_seed_fixes_the_finger() -> None:
 
 
 def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
-    """The finger follows from the seed of the episode alone."""
     env, other = FingerReachEnv(gap="wide"), FingerReachEnv(gap="wide")
     drawn = []
     for seed in (1, 2, None):

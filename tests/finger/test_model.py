@@ -45,7 +45,6 @@ _ANATOMY = {
 @pytest.mark.parametrize("tendon", TENDONS)
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
 def test_each_tendon_moves_its_joints(parameters: FingerParameters, tendon: str) -> None:
-    """A tendon moves its joints in the anatomical direction."""
     model = made(parameters)
     model.opt.gravity[:] = 0.0
     ends = {}
@@ -133,7 +132,6 @@ def test_tendons_are_slack_within_the_backlash() -> None:
 
 
 def test_lengths_are_relative_to_the_straight_finger() -> None:
-    """Lengths are 0 for the straight finger, and follow from the moment arms."""
     model = made()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -155,7 +153,6 @@ def test_size_and_weight_of_the_finger() -> None:
 
 
 def test_a_command_acts_after_its_delay() -> None:
-    """A delayed command acts later, and otherwise equally."""
     late = NOMINAL.replace(command_delay=0.030)
     tensions = []
     for parameters in (NOMINAL, late):

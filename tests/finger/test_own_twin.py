@@ -30,7 +30,6 @@ def test_without_a_rig_a_twin_is_proposed() -> None:
 
 @pytest.mark.parametrize("twin", ["", "nominal"])
 def test_finger_seed_needs_a_gap(twin: str) -> None:
-    """`finger_seed` without a gap is refused, as for `Finger-v1`."""
     with pytest.raises(FingerError, match="selects a finger of a gap"):
         gym.make(RIG, twin=twin, finger_seed=3)
 

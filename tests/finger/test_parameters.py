@@ -16,7 +16,6 @@ from tests.finger.commands import STRETCHED
 
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["nominal", "stretched"])
 def test_parameters_round_trip_through_json(parameters: FingerParameters) -> None:
-    """JSON round trips are exact, as text and bytes."""
     text = parameters.to_json()
     assert FingerParameters.from_json(text) == parameters
     assert FingerParameters.from_json(text.encode()) == parameters
@@ -76,6 +75,5 @@ def test_invalid_numbers_are_refused(changes: dict[str, Any], sentence: str) -> 
     ],
 )
 def test_invalid_json_is_refused(text: str | bytes, sentence: str) -> None:
-    """Invalid JSON raises FingerError."""
     with pytest.raises(FingerError, match=sentence):
         FingerParameters.from_json(text)

@@ -85,7 +85,6 @@ def test_each_tendon_is_visible(finger: Any) -> None:
 
 
 def test_tension_makes_a_tendon_thick(finger: Any) -> None:
-    """Tendons are drawn thicker under tension."""
     env = finger.unwrapped
     frames = []
     for tension in (0.0, 1.0):
@@ -112,7 +111,6 @@ def test_rendering_does_not_change_the_episode() -> None:
 
 
 def test_a_picture_shows_the_whole_finger(finger: Any) -> None:
-    """Pictures show hand and fingertip, without the target."""
     env = finger.unwrapped
     rest = JOINT_REST.tolist()
     pictures = []
@@ -140,7 +138,6 @@ def test_the_renderer_is_kept_across_fingers() -> None:
 
 
 def test_depth_frames_show_the_finger() -> None:
-    """Depth is smaller at the finger than at the background."""
     with gym.make("shapechanger/FingerTrack-v1", render_mode="depth_array", **_SIZE) as env:
         env.reset(seed=0)
         depth = env.render()

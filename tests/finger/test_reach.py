@@ -33,7 +33,6 @@ def _state(env: FingerReachEnv) -> np.ndarray:
 
 
 def test_targets_can_be_held_away_from_limits() -> None:
-    """Targets are fingertips of balanced postures away from the limits."""
     env = FingerReachEnv()
     low, high = JOINT_RANGE.T
     margin = 0.1 * (high - low)
@@ -165,7 +164,6 @@ def test_invalid_actions_are_refused(action: Any, sentence: str) -> None:
 
 
 def test_a_step_needs_a_reset() -> None:
-    """A step before the first reset raises ResetNeeded."""
     with pytest.raises(gym.error.ResetNeeded, match=r"Call reset\(\)"):
         FingerReachEnv().step(_NOTHING)
 

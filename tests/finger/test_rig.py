@@ -62,7 +62,6 @@ def test_angles_follow_from_lengths_and_stretch() -> None:
 
 
 def test_missing_readings_keep_their_value() -> None:
-    """A missing reading of one servo keeps its last value."""
     senses = _senses()
     first = senses.read(_state(JOINT_REST, np.full(7, 2.0)), (), np.zeros(7))
     later = _state(JOINT_REST, np.full(7, 2.0))

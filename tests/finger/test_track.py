@@ -107,7 +107,6 @@ def test_a_path_that_is_too_fast_is_refused() -> None:
 
 
 def test_the_start_angles_are_on_the_path() -> None:
-    """The fingertip of the start angles is the first point of the path."""
     path = circle(phase=1.0)
     angles = require_reachable(path)
     place = fingertip(angles)

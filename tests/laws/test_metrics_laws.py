@@ -238,7 +238,6 @@ def test_a_higher_threshold_is_never_sooner(pair: Pair) -> None:
 
 @given(pair=pairs(), source=st.integers(0, 2000))
 def test_source_steps_delay_crossings_in_total_steps(pair: Pair, source: int) -> None:
-    """Each crossing is later by the source steps, or beyond the budget."""
     curves, _ = pair
     floor = float(curves.returns.min()) - 1.0
     height = float(curves.returns.mean())

@@ -90,12 +90,10 @@ class Wrapper:
         return getattr(self.env, "unwrapped", self.env)
 
     def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
-        """Reset the env."""
         observation, info = self.env.reset(seed=seed)
         return self.sensed(observation), info
 
     def step(self, action: Any, /) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Step the env."""
         observation, *rest = self.env.step(action)
         return (self.sensed(observation), *rest)
 

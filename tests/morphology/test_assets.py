@@ -162,7 +162,6 @@ def _anchor(model: mujoco.MjModel, body: int) -> Array:
     ],
 )
 def test_values_scale(model: str, edit: Edit, field: str, factor: Any) -> None:
-    """All values of the kind scale, and no others."""
     before, after = _before(model), built(_named(model), edit)
     np.testing.assert_array_equal(getattr(after, field), getattr(before, field) * factor)
     assert {*differing(before, after)} <= {field, "actuator_acc0", "actuator_moment0"}

@@ -121,7 +121,6 @@ def test_edits_of_one_body_only_fade() -> None:
 
 
 def test_scale_and_to_are_different_edits() -> None:
-    """An edit with `scale` and one with `to` fade separately."""
     path = interpolate((Mass("*", scale=2.0),), (Mass("*", to=2.0),), 0.5)
     assert path == (Mass("*", scale=2.0, amount=0.5), Mass("*", to=2.0, amount=0.5))
 

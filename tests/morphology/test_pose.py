@@ -66,7 +66,6 @@ def test_the_floor_is_the_highest_static_plane(floor: str, gap: float) -> None:
     ],
 )
 def test_geoms_without_contact_are_no_floor(floor: str, ball: str) -> None:
-    """Without a floor there is no standing height."""
     model = _ball(floor, ball)
     assert StartRules(model).floor_gap(posed(model)) == 1000.0
     assert standing_height(model) is None
@@ -111,7 +110,6 @@ def test_standing_heights_of_the_ants(body: str, height: float) -> None:
 
 
 def test_the_standing_height_does_not_depend_on_the_start() -> None:
-    """Changing the start height keeps the standing height."""
     heights = [standing_height(built(ant(), StartHeight("torso", z))) for z in (-3.0, 0.75, 40.0)]
     assert heights == pytest.approx([heights[0]] * 3)
 
@@ -167,7 +165,6 @@ def test_a_pose_is_moved_inside_the_limits() -> None:
 
 
 def test_a_body_without_joints_has_an_empty_pose() -> None:
-    """The pose has shape (0,)."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     assert (
         start_pose(model).shape == StartRules(model).keep_within_limits(np.zeros(0)).shape == (0,)

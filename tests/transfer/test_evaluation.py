@@ -146,7 +146,6 @@ class Runner(Countdown):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
-        """One step further."""
         observation, _, fallen, truncated, _ = super().step(action)
         info = {"x_velocity": np.float64(2.0), "reward_ctrl": np.float32(-0.5)}
         return observation, -0.5, fallen, truncated, info

@@ -57,7 +57,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def test_every_arm_and_seed_is_evaluated(finished: tuple[Study, Path]) -> None:
-    """Two seeds of each arm, evaluated at step 0 and after each update."""
     study, _ = finished
     assert [run.run.name for run in study.runs] == [
         f"{kind}-{i}"

@@ -45,13 +45,11 @@ def test_the_interval_agrees_with_tables(count: int, low: float, high: float) ->
 
 
 def test_the_interval_grows_with_the_confidence() -> None:
-    """The interval grows with the confidence."""
     narrow, usual, wide = (poisson_interval(7, c) for c in (0.5, 0.95, 0.99))
     assert wide[0] < usual[0] < narrow[0] < 7 < narrow[1] < usual[1] < wide[1]
 
 
 def test_scores_are_ratios_of_sums() -> None:
-    """Scores are ratios of sums."""
     score = DriveScore.of(
         [DriveResult(1, 30.0, 20.0, 0, True, 0.1), DriveResult(2, 10.0, 60.0, 2, False, 0.5)]
     )
@@ -66,7 +64,6 @@ def test_scores_are_ratios_of_sums() -> None:
 
 
 def test_a_score_without_progress_has_no_bound() -> None:
-    """Without progress, the upper bound is infinite."""
     score = DriveScore.of([DriveResult(1, -0.5, 60.0, 3, False)])
     assert score.per_100_m == score.low == score.high == float("inf")
     still = DriveScore.of([DriveResult(1, 0.0, 60.0, 0, False)])
@@ -74,7 +71,6 @@ def test_a_score_without_progress_has_no_bound() -> None:
 
 
 def test_a_score_needs_a_drive() -> None:
-    """A score needs at least one drive."""
     with pytest.raises(WorldError, match="at least one"):
         DriveScore.of([])
 
@@ -104,7 +100,6 @@ def test_a_drive_continues_after_a_collision(car: VehicleEnv) -> None:
 
 
 def test_a_drive_ends_at_the_time_limit(car: VehicleEnv) -> None:
-    """A drive ends at the time limit."""
     done = drive(car, lambda _: _STILL, course=HELD_OUT[0], limit_s=2.0)
     assert done.seconds == pytest.approx(2.0)
     assert not done.reached

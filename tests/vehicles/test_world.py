@@ -98,7 +98,6 @@ def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
 
 @_EACH
 def test_a_vehicle_starts_in_its_default_world_at_rest(vehicle: str) -> None:
-    """A vehicle starts in its default world, at rest and free."""
     world = _world(vehicle)
     seen = world.inputs()
     assert world.course.world == HOME[vehicle]
@@ -158,7 +157,6 @@ def test_place_restarts_at_a_seeded_pose() -> None:
 
 
 def test_place_keeps_the_odometer() -> None:
-    """`place` keeps the travelled distance."""
     world = _world()
     _drive(world, _AHEAD["car"], 1.0)
     before = world.inputs().travelled_m
@@ -169,7 +167,6 @@ def test_place_keeps_the_odometer() -> None:
 
 
 def test_lay_out_changes_the_course() -> None:
-    """`lay_out` is reproducible."""
     world = _world()
     walls = world.course.walls
     world.lay_out(4)
@@ -241,7 +238,6 @@ def test_acceleration_in_the_body_frame() -> None:
 
 
 def test_a_boat_drifts_with_the_current() -> None:
-    """A boat without thrust drifts with the current."""
     world = _world("boat")
     start, flow = world.pose, world.course.current_mps
     assert math.hypot(*flow) > 0.0
@@ -293,7 +289,6 @@ def test_a_failed_layout_changes_nothing() -> None:
 
 
 def test_a_layout_error_keeps_the_course(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An error of the layout propagates and keeps the old course."""
     world = _world()
 
     def too_tight(kind: str, seed: int) -> Course:
@@ -336,7 +331,6 @@ def test_a_moved_camera_changes_the_image() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_lenses_change_images_only() -> None:
-    """Lenses change pictures only."""
     clear = MujocoWorld("car", seed=3, size=(64, 48))
     night = MujocoWorld("car", seed=3, size=(64, 48), lenses=("night", "dirt"))
     assert night.pose == clear.pose

@@ -101,7 +101,6 @@ def test_show_as_a_page(data: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_a_damaged_frame_is_shown_as_damaged(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Damage that keeps the size is detected when the frame is shown."""
     _, second = episodes(data)
     frame = second / "frames" / "000003.jpg"
     frame.write_bytes(bytes(len(frame.read_bytes())))

@@ -104,7 +104,6 @@ def test_unknown_worlds_and_lenses_are_refused() -> None:
 
 
 def test_a_board_starts_in_its_place(tmp_path: Path) -> None:
-    """The place of a command is passed to the board."""
     profile = write_profile(tmp_path, CAR)
     board = start_board(
         profile.guard_plan(),

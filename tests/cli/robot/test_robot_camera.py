@@ -89,7 +89,6 @@ def test_unsuitable_options_are_refused(
 def test_shipped_profiles_and_invalid_images_are_refused(
     profile: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Shipped profiles are not written."""
     (tmp_path / "text.jpg").write_bytes(b"no picture")
     (tmp_path / "noise.jpg").write_bytes(b"\xff\xd8\xff" + bytes(100))
     (tmp_path / "bomb.jpg").write_bytes(huge())

@@ -46,7 +46,6 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def robot(there: Path) -> Iterator[RobotClient]:
-    """A connection to the robot."""
     from shapechanger.robot.client.known_robots import recall
 
     with RobotClient.connect(recall("car"), frames=False) as client:

@@ -220,7 +220,6 @@ def test_a_port_in_use(run: Run, home: Path) -> None:
 
 
 def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
-    """A running twin keeps its clock."""
     path = write_ready_profile(home)
     folder = home / "work" / "twin"
     folder.mkdir()

@@ -64,7 +64,6 @@ class Person:
         return _ESCAPES.sub("", self._text)
 
     def press(self, keys: str | bytes) -> None:
-        """Press keys."""
         os.write(self._main, keys.encode() if isinstance(keys, str) else keys)
 
     def read_until(self, words: str, after: int = 0, seconds: float = 40.0) -> int:
@@ -73,7 +72,6 @@ class Person:
         return self.text.index(words, after) + len(words)
 
     def wait_for(self, done: Callable[[], bool], seconds: float = 40.0, what: str = "it") -> None:
-        """Wait for a condition."""
         until_s = time.monotonic() + seconds
         while not done():
             late = time.monotonic() > until_s or not self._reader.is_alive()

@@ -41,14 +41,12 @@ def test_a_neutral_augmentation_changes_nothing() -> None:
 
 
 def test_a_mirrored_image_negates_the_steering() -> None:
-    """Steering is negated, and throttle kept."""
     seen, wanted, before, actions = _augmented(mirror=1.0)
     torch.testing.assert_close(seen, before.flip(3))
     torch.testing.assert_close(wanted, actions * torch.tensor([-1.0, 1.0]))
 
 
 def test_each_image_is_mirrored_with_its_action() -> None:
-    """With a probability of 0.5, image and action are always mirrored together."""
     seen, wanted, before, actions = _augmented(mirror=0.5)
     turned = (seen == before.flip(3)).all(dim=(1, 2, 3))
     kept = (seen == before).all(dim=(1, 2, 3))
@@ -104,7 +102,6 @@ def test_values_stay_in_range() -> None:
 
 
 def test_the_same_seed_gives_the_same_images() -> None:
-    """Another seed gives other images."""
     changes = {"mirror": 0.5, "shift": 2, "gain": 1.5, "noise": 0.1, "noisy": 0.5, "blurred": 0.5}
     assert torch.equal(_augmented(3, **changes)[0], _augmented(3, **changes)[0])
     assert not torch.equal(_augmented(3, **changes)[0], _augmented(4, **changes)[0])

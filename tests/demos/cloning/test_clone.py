@@ -158,7 +158,6 @@ def test_read_only_arrays_are_accepted() -> None:
 
 
 def test_the_end_of_each_episode_is_held_out() -> None:
-    """Episodes that are too short have no held-out steps."""
     mask = held_out(35, [20, 5, 10], 0.1)
     assert np.flatnonzero(mask).tolist() == [18, 19, 34]
     assert np.flatnonzero(held_out(20, [], 0.1)).tolist() == [18, 19]

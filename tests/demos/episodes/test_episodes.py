@@ -109,7 +109,6 @@ def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
 
 
 def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
-    """At 20 Hz one second is 20 steps; another undo drops the steps before."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         for number in range(60):
             writer.add(step(number))

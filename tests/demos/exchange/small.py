@@ -57,7 +57,6 @@ def header(**changes: Any) -> EpisodeHeader:
 def record(
     data: Path, what: EpisodeHeader, steps: Sequence[tuple[Step, bytes | None]], outcome: str = ""
 ) -> Path:
-    """Record an episode."""
     with EpisodeWriter.create(data, what) as writer:
         for step, jpeg in steps:
             writer.add(step, jpeg)

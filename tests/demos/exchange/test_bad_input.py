@@ -130,7 +130,6 @@ def test_a_table_of_others_that_cannot_be_read(
 
 
 def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
-    """Spreadsheets write a byte order mark."""
     folder = keys_folder(tmp_path / "keys")
     _edit("steps.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
     assert import_recording(folder, tmp_path / "data").steps == 3

@@ -147,7 +147,6 @@ def test_an_old_tub(tmp_path: Path) -> None:
 
 
 def test_minari_recovers_the_env(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The env is recovered with its arguments, and not for mixed envs."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     arguments = {"image": False, "world": "yard"}
     drive(tmp_path / "one", env="shapechanger/Car-v1", env_kwargs=arguments)

@@ -174,7 +174,6 @@ def test_missing_values_and_odd_rates(tmp_path: Path) -> None:
 
 
 def first_without_picture(data: Path) -> None:
-    """Record a first step without a picture."""
     step = Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0))
     record(data, header(), [(step, None), (step, picture(0))])
 

@@ -92,7 +92,6 @@ def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_a_format_of_a_name_that_is_taken(installed: Path) -> None:
-    """One name means one format."""
     path = installed / "speeds_format.py"
     path.write_text(path.read_text().replace('name="speeds"', 'name="csv"'))
     with pytest.raises(DemosError, match="must name a Format of another name than tub, minari"):

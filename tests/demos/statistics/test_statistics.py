@@ -111,7 +111,6 @@ def test_jitter_is_measured_and_bounded() -> None:
 
 
 def test_gaps_skip_dropped_steps(tmp_path: Path) -> None:
-    """Dropped steps leave no long gap."""
     path = recorded(tmp_path, 6)
     drop(path, 2, 3, "bad")
     assert gaps_s(read_episode(path)) == pytest.approx([0.05, 0.05])

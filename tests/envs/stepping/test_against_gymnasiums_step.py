@@ -92,7 +92,6 @@ def test_types_of_actions(kind: type) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_few_random_ants(seed: int) -> None:
-    """Random ants step alike."""
     ours, theirs = _ants(random_ant(seed))
     step_together(ours, theirs, 120, seed=seed)
     assert _steps_fast(ours)
@@ -111,7 +110,6 @@ def test_many_random_ants(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_few_random_pendulums(seed: int) -> None:
-    """Random pendulums step alike."""
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 200, seed=seed)
@@ -158,7 +156,6 @@ def test_the_fast_model_is_shared() -> None:
 
 
 def test_a_new_body_has_its_own_fast_model() -> None:
-    """After a change of the body, its own fast model steps it."""
     ours, theirs = _ants("Ant")
     for body in ("Ant", "BigAnt", "AmputatedAnt", "Ant"):
         for env in (ours, theirs):

@@ -119,7 +119,6 @@ def test_pairs_have_mixed_parameters(parts: dict[str, str]) -> None:
     ids=["touches itself", "two geoms on a body", "a stone on the floor", "priorities"],
 )
 def test_ambiguous_pair_orders_keep_the_search(parts: dict[str, str]) -> None:
-    """Models whose order of contacts is not determined keep the contact search."""
     model, fast = _fast_model_of(_scene(**parts))
     assert fast is not None
     assert not fast.npair
@@ -143,7 +142,6 @@ _FREE = '<body name="ball" pos="1 0 0.5"><freejoint/><geom name="ball" size="0.1
     ids=["two trees", "tendon", "equality", "mocap", "energy"],
 )
 def test_unsupported_models_have_no_fast_model(parts: dict[str, str]) -> None:
-    """Models with unsupported elements have no fast model."""
     assert _fast_model_of(_scene(**parts))[1] is None
 
 
@@ -283,7 +281,6 @@ def test_the_search_waits_for_enough_steps(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_envs_of_a_body_count_steps_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps of all envs of a body count towards `patience`."""
     monkeypatch.setattr(AntEnv, "patience", 6)
     envs = [AntEnv(), AntEnv(), AntEnv()]
     for env in envs:
@@ -333,7 +330,6 @@ def test_a_spec_of_another_model_gives_no_pairs() -> None:
 
 
 def test_forgetting_resets_the_counted_steps() -> None:
-    """`forget_fast_models` resets the step count of watched models."""
     watch = ModelWatch(mujoco.MjModel.from_xml_string("<mujoco/>"))
     watch.snapshot.steps = 3
     twin.forget_fast_models()

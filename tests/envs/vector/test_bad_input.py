@@ -95,7 +95,6 @@ def test_unknown_ids_and_modes_are_refused() -> None:
 def test_arguments_of_the_other_backend_are_refused(
     arguments: dict[str, Any], sentence: str
 ) -> None:
-    """Before the packages of the other backend are imported."""
     with pytest.raises(VectorEnvError, match=sentence):
         shapechanger.make_vec("Ant", 2, **arguments)
 

@@ -226,7 +226,6 @@ def test_the_envs_keep_their_specs() -> None:
 
 
 def test_importing_make_vec_loads_no_simulator() -> None:
-    """`from shapechanger import make_vec` does not import MuJoCo."""
     script = "import sys\nfrom shapechanger import make_vec\nprint('mujoco' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert run.stdout == "False\n"

@@ -78,7 +78,6 @@ def _wait_until(condition: Callable[[], bool]) -> None:
 @pytest.mark.parametrize("threads", [1, 2, 4])
 @pytest.mark.parametrize("number", [0, 1, 3])
 def test_an_error_names_its_env_and_the_others_finish(number: int, threads: int) -> None:
-    """The error has a note with the env, the others finish, and a reset is needed."""
     envs, members = _plain({number: RuntimeError("it broke")}, threads)
     with pytest.raises(RuntimeError, match="it broke") as caught:
         envs.step(np.zeros((4, 1)))
@@ -155,7 +154,6 @@ def test_the_number_of_threads_is_as_requested(asked: int, started: int) -> None
 
 
 def test_an_unclosed_vector_env_leaves_no_threads() -> None:
-    """Threads end when the vector env is garbage-collected."""
     envs = shapechanger.make_vec("InvertedPendulum", 3, threads=2)
     envs.reset(seed=0)
     assert len(_ours()) == 1
@@ -254,7 +252,6 @@ def test_a_program_exits_without_close(end: str) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_a_forked_process_steps_with_threads_of_its_own() -> None:
-    """A forked process starts its own threads."""
     run = _run(
         """
         envs.step(actions)

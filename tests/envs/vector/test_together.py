@@ -224,7 +224,6 @@ def test_an_error_of_one_ant_is_attributed(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_ant_that_another_thread_still_steps_is_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """An ant that another thread helps with is read only after its step has finished."""
     ours, theirs = _pair([{}] * 4, threads=2)
     require_same(ours.reset(seed=0), theirs.reset(seed=0))
     actions = np.full((4, 8), 0.5, np.float32)

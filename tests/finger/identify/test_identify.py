@@ -206,7 +206,6 @@ def test_fitted_values_become_parameters() -> None:
 
 
 def test_undetermined_parameters_are_listed() -> None:
-    """Undetermined parameters are listed with their assumed values."""
     still = dataclasses.replace(MOTORS, saturates=False)
     always = ["joint_friction", "tendon_damping", "motor_kg", "backlash"]
     assert [name for name, _ in result._undetermined(still, None)] == [*always, "most_tension"]

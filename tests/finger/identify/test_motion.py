@@ -63,7 +63,6 @@ def motors(**changes: float) -> Motors:
 
 
 def test_joints_and_friction_are_found() -> None:
-    """Joint parameters are found to 5 %, friction to 15 %."""
     log, truth = short()
     found = fit_dynamics(log, exact(), motors())
     for name in ("joint_stiffness", "joint_damping"):

@@ -123,7 +123,6 @@ def test_a_path_that_is_too_fast_is_refused(hz: float) -> None:
 
 
 def test_a_period_must_return_to_the_start() -> None:
-    """The end of the period must be within 0.1 mm of the start."""
     with pytest.raises(PathError) as caught:
         from_callable(lambda t: (0.001 * t, 0.0, 0.0), period_s=3.0)
     assert str(caught.value) == (

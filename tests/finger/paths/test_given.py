@@ -45,7 +45,6 @@ def test_every_argument_is_a_setting(kind: str) -> None:
 
 
 def test_a_path_is_returned_unchanged() -> None:
-    """`as_path` returns the same object."""
     path = circle()
     assert as_path(path) is path
 

@@ -147,7 +147,6 @@ def test_a_shape_round_trips_through_csv(
 
 @pytest.mark.parametrize("path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1)])
 def test_paths_can_be_pickled(path: FingertipPath) -> None:
-    """A pickled path is the same path."""
     copy = pickle.loads(pickle.dumps(path))
     times = np.linspace(-1.0, 3.0, 50)
     np.testing.assert_array_equal(copy.at(times), path.at(times))
@@ -171,7 +170,6 @@ def test_times_must_be_finite(t: float | list[float]) -> None:
 
 
 def test_shapes_compare_by_value() -> None:
-    """Shapes are hashable and compare by value, recordings by identity."""
     assert circle(hz=1.0) == circle(hz=1.0) != circle(hz=1.1)
     assert len({line(), line(), figure_eight()}) == 2
     assert (same := recording(False, 3)) == same != recording(False, 3)

@@ -45,7 +45,6 @@ def test_the_duration_can_be_given() -> None:
 
 @pytest.mark.parametrize("hz", [0.0, -1.0, math.nan, math.inf])
 def test_rates_must_be_positive(hz: float) -> None:
-    """Rates and durations must be positive and finite."""
     with pytest.raises(PathError, match=r"^hz must be a finite number above 0, got "):
         sample(circle(), hz)
     with pytest.raises(PathError, match=r"^duration_s must be a finite number above 0, got "):

@@ -56,7 +56,6 @@ def test_a_figure_eight_crosses_itself_once() -> None:
 @pytest.mark.parametrize("make", [circle, figure_eight, curve_3d])
 @pytest.mark.parametrize("phase", [-1.0, 0.3, 2.0])
 def test_a_phase_is_a_shift_in_time(make: Callable[..., FingertipPath], phase: float) -> None:
-    """A phase shifts the path in time only."""
     t = np.linspace(0.0, 4.0, 50)
     ahead = phase / (2 * math.pi * 0.25)  # s
     np.testing.assert_allclose(

@@ -28,7 +28,6 @@ def test_reward_grows_as_the_distance_shrinks() -> None:
 
 
 def test_effort_is_weighted() -> None:
-    """Effort costs its weight; a weight of 0 disables it."""
     assert FingertipReward().terms(0.01, 0.5, 0.0, 0.02)["reward_effort"] == pytest.approx(-0.01)
     free = FingertipReward.from_weights({"effort": 0})
     assert free.terms(0.01, 0.5, 0.0, 0.02)["reward_effort"] == 0.0

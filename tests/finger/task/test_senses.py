@@ -9,7 +9,6 @@ from shapechanger.finger.task import FingerSenses, features_of_senses
 
 
 def test_numbers_match_their_features() -> None:
-    """Numbers and features have the same order."""
     senses = FingerSenses(
         angles=np.arange(0.0, 4.0),
         velocities=np.arange(10.0, 14.0),

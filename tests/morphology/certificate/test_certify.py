@@ -46,7 +46,6 @@ def test_an_env_without_a_model_is_refused() -> None:
 
 
 def test_an_empty_shift_can_be_allowed() -> None:
-    """With `allow_empty` the certificate states that it is empty."""
     certificate = certify(Swing(), Swing(), steps=5, allow_empty=True)
     assert certificate.is_empty
     assert certificate.changes == ()
@@ -100,7 +99,6 @@ def test_invalid_json_is_refused(text: str) -> None:
 
 
 def test_environments_without_a_standing_height_are_certified() -> None:
-    """The attribute `standing_height` is optional."""
     source = Swing()
     del source.standing_height
     certificate = certify(Wrapper(source), Swing(gear=2.0, standing_height=1.0))

@@ -62,7 +62,6 @@ def test_equal_changes_are_grouped() -> None:
 
 
 def test_a_capsule_has_radius_and_length() -> None:
-    """A change of the radius of a capsule is not listed as a change of size or length."""
     changes = compare(
         asset("ant"), _ant(lambda s: setattr(s.geom("left_ankle_geom"), "size", [0.1, 0, 0]))
     )
@@ -81,7 +80,6 @@ def test_other_shapes_have_a_size() -> None:
 
 
 def test_lengths_of_visual_geoms_explain_their_bodies() -> None:
-    """A visual geom has a length if its body changed too."""
     spec = asset_spec("inverted_pendulum")
     spec.geom("cpole").fromto = [0, 0, 0, 0.001, 0, 1.2]
     changes = compare(asset("inverted_pendulum"), spec.compile())
@@ -157,7 +155,6 @@ def test_masked_friction_is_no_change() -> None:
 
 
 def test_gear_and_gravity_are_listed() -> None:
-    """Gears and gravity are listed with their ratio."""
     target = asset("ant")
     target.actuator_gear[0, 0] = 75.0
     target.opt.gravity[2] = -4.905
@@ -190,7 +187,6 @@ def test_added_and_removed_elements_are_listed() -> None:
 
 
 def test_another_order_of_motors_is_a_change() -> None:
-    """Another order of the same motors changes the meaning of actions."""
     source, target = asset("ant"), asset("ant")
     target.actuator_trnid[[0, 1]] = target.actuator_trnid[[1, 0]]
     for array in ("actuator_acc0", "actuator_length0"):
@@ -259,7 +255,6 @@ def test_digits_distinguish_the_numbers() -> None:
 
 
 def test_infinite_numbers_become_words() -> None:
-    """Infinite numbers are shown as words."""
     item = change("force range", "motor", (-math.inf, math.inf), (-1.0, 1.0))
     assert item.before == ("-inf", "inf")
     assert item.sentence == "motor: force range (-inf, inf) -> (-1, 1)"

@@ -13,7 +13,6 @@ from tests.morphology.scenes import EVERYTHING, asset, everything
 
 @pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "pusher_v5"])
 def test_compiled_models_are_consistent(name: str) -> None:
-    """Models from the compiler have no inconsistencies."""
     assert inconsistencies(asset(name)) == ()
     assert inconsistencies(everything()) == ()
 

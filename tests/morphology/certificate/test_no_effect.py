@@ -101,7 +101,6 @@ def _still(robot: object) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for robots."""
     return tmp_path_factory.mktemp("robots")
 
 

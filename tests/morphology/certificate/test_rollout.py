@@ -37,7 +37,6 @@ def test_one_environment_can_be_source_and_target() -> None:
 
 
 def test_the_first_difference_is_reported() -> None:
-    """The report has step and feature of the first difference."""
     rollout = compare_rollouts(Swing(), Swing(gear=2.0), steps=30)
     assert not rollout.identical
     assert rollout.first_step == 1
@@ -68,7 +67,6 @@ def test_the_largest_difference_is_correct() -> None:
 
 
 def test_motors_of_the_same_name_get_the_same_commands() -> None:
-    """Motors that only one side has get zero."""
     source, target = Swing(), Swing(wrist=True)
     compare_rollouts(source, target, steps=10)
     one, two = np.asarray(source.commands), np.asarray(target.commands)
@@ -80,7 +78,6 @@ def test_motors_of_the_same_name_get_the_same_commands() -> None:
 
 
 def test_another_seed_gives_other_commands() -> None:
-    """The seed determines the commands."""
     env = Swing()
     compare_rollouts(env, env, steps=5, seed=0)
     one = np.asarray(env.commands)
@@ -98,7 +95,6 @@ def test_features_of_one_side_are_listed() -> None:
 
 
 def test_the_shorter_episode_ends_the_comparison() -> None:
-    """Steps after the end of either episode are not compared."""
     rollout = compare_rollouts(Swing(), Swing(limit=7), steps=20)
     assert rollout.steps == 7
     assert (rollout.source_ended, rollout.target_ended) == (False, True)
@@ -132,7 +128,6 @@ def test_dict_observations_are_compared() -> None:
 
 
 def test_observations_without_a_layout_are_compared_by_index() -> None:
-    """If the layout does not fit, numbers are compared by index."""
     rollout = compare_rollouts(Longer(Swing()), Longer(Swing(gear=2.0)), steps=5)
     assert rollout.compared == 3
     assert rollout.largest_feature == "observation[1]"
@@ -141,7 +136,6 @@ def test_observations_without_a_layout_are_compared_by_index() -> None:
 
 
 def test_without_common_features_rollouts_differ() -> None:
-    """Environments without a common feature are not identical."""
     target = Swing()
     target.observation_layout = Layout((Feature("x", "m"), Feature("y", "m")))
     rollout = compare_rollouts(Swing(), target, steps=5)
@@ -158,14 +152,12 @@ def test_nan_equals_only_nan() -> None:
 
 
 def test_no_steps_compare_the_resets() -> None:
-    """With zero steps only the resets are compared."""
     rollout = compare_rollouts(Swing(), Swing(), steps=0)
     assert rollout.identical
     assert rollout.steps == 0
 
 
 def test_attributes_are_found_inside_wrappers() -> None:
-    """`attribute` searches through wrappers."""
     env = Swing()
     assert attribute(Wrapper(Wrapper(env)), "model") is env.model
     assert attribute(env, "model") is env.model
@@ -212,6 +204,5 @@ def test_a_motor_that_cannot_rest_gets_the_nearest_to_zero() -> None:
 
 
 def test_blocks_have_a_name_per_number() -> None:
-    """Numbers of a block are indexed."""
     layout = Layout((Feature("x", "m"), Feature("block", "1", shape=(2, 2))))
     assert number_names(layout) == ["x", "block[0]", "block[1]", "block[2]", "block[3]"]

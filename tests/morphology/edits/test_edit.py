@@ -51,7 +51,6 @@ def test_the_base_class_is_abstract() -> None:
 
 
 def test_interpolation_ends_exactly() -> None:
-    """The ends are exact, without rounding."""
     assert part_of_the_way(0.1, 0.7, 1.0) == 0.7
     assert part_of_the_way(0.1, 0.7, 0.0) == 0.1
     assert part_of_the_way(2.0, 4.0, 0.25) == 2.5
@@ -59,13 +58,11 @@ def test_interpolation_ends_exactly() -> None:
 
 @pytest.mark.parametrize("factor", [0.01, 1.0, 100.0])
 def test_factors_are_limited_inclusively(factor: float) -> None:
-    """Factors of 0.01 and 100 are accepted."""
     require_factor("The factor", factor)
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, math.inf, -math.inf, 1e-3, 1e3])
 def test_absurd_factors_are_refused(factor: float) -> None:
-    """Factors outside 0.01 to 100 are refused."""
     with pytest.raises(MorphologyError, match=r"The factor must be a ratio between 0\.01 and 100"):
         require_factor("The factor", factor)
 

@@ -203,7 +203,6 @@ def test_rounded_ends_grow_with_the_amount() -> None:
 
 
 def test_a_split_divides_an_explicit_mass() -> None:
-    """An explicit mass is divided like one from a density."""
     for content in ('mass="3"', 'density="3"'):
         geom = f'<geom name="g" type="capsule" size=".1" fromto="0 0 0 0 0 1" {content}/>'
         first = built(limb(geom), Split("link", "far", at=0.3).partly(1e-9))
@@ -212,7 +211,6 @@ def test_a_split_divides_an_explicit_mass() -> None:
 
 
 def test_parts_can_be_split_again() -> None:
-    """Both parts can be split again."""
     model = built(leg(), Split("thigh", "a"), Split("a", "b"), Split("thigh", "c"))
     assert _bodies(model) == ["trunk", "thigh", "c", "a", "b", "shin"]
     np.testing.assert_allclose(tip(model, "toe"), tip(built(leg()), "toe"), atol=1e-12)
@@ -259,7 +257,6 @@ def _ends(model: mujoco.MjModel, geom: str) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("at", [0.0, 1.0, -0.5, 1.5, math.nan, math.inf])
 def test_a_segment_is_split_between_its_ends(at: float) -> None:
-    """The position of the split must be between 0 and 1."""
     with pytest.raises(MorphologyError, match="A segment is split between 0 and 1, got"):
         Split("thigh", "toe", at=at)
 

@@ -53,7 +53,6 @@ def test_a_pole_keeps_its_lean_along_an_axis() -> None:
 @pytest.mark.parametrize("kind", [Stretch, Radius])
 @pytest.mark.parametrize("factor", [0.0, -2.0, math.nan, math.inf, 1e-3, 1e3])
 def test_absurd_factors_are_refused(kind: type[Stretch | Radius], factor: float) -> None:
-    """Factors outside 0.01 to 100 are refused."""
     with pytest.raises(MorphologyError, match=r"must be a ratio between 0\.01 and 100, got"):
         kind("thigh", factor)
 
@@ -68,7 +67,6 @@ def test_an_unknown_body_is_refused(kind: type[Stretch | Radius]) -> None:
 
 
 def test_partial_factors_are_linear() -> None:
-    """Half of a factor of 3 is a factor of 2."""
     half, twice = Stretch("thigh", 3.0).partly(0.5), Stretch("thigh", 2.0)
     np.testing.assert_array_equal(built(leg(), half).body_pos, built(leg(), twice).body_pos)
     half, twice = Radius("thigh", 3.0).partly(0.5), Radius("thigh", 2.0)

@@ -263,7 +263,6 @@ def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
 
 @pytest.mark.parametrize("flag", ["contact='disable'", "constraint='disable'"])
 def test_disabled_contacts_are_left_out(flag: str) -> None:
-    """With contacts disabled, there are no contact parameters."""
     assert _contacts(_scene(flag=flag, contact="<pair geom1='floor' geom2='ball'/>")) == {}
 
 

@@ -225,7 +225,6 @@ _OPTIONS = {
 
 @pytest.mark.parametrize("option", _OPTIONS)
 def test_every_physical_option_is_in_the_fingerprint(option: str) -> None:
-    """A change of any physical option changes the fingerprint."""
     model = everything()
     nominal = fingerprint(model)
     setattr(model.opt, option, _OPTIONS[option])

@@ -35,7 +35,6 @@ def test_values_are_found_by_name() -> None:
 
 
 def test_equal_models_are_equal_values() -> None:
-    """Effective models of equal models are equal and have equal hashes."""
     one, two = effective_model(everything()), effective_model(everything())
     assert one == two
     assert len({one: 1, two: 2}) == 1
@@ -172,7 +171,6 @@ def test_sleep_counts_only_if_enabled() -> None:
 
 
 def test_disabled_actuators_are_marked() -> None:
-    """Actuators of a disabled group are marked."""
     model = everything()
     model.actuator("motor").group[:] = 3
     model.opt.disableactuator = 1 << 3

@@ -13,7 +13,6 @@ from tests.morphology.scenes import asset, asset_spec, everything
 
 @pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "walker2d_v5"])
 def test_names_equal_those_of_name_elements(name: str) -> None:
-    """Generated names equal those that editing gives."""
     spec = asset_spec(name)
     name_elements(spec)
     named = spec.compile()
@@ -22,7 +21,6 @@ def test_names_equal_those_of_name_elements(name: str) -> None:
 
 
 def test_the_ants_shanks_are_named_after_their_joints() -> None:
-    """The ant's file has no names for shanks and motors."""
     names = names_of(asset("ant"))
     assert names.bodies[4] == "ankle_1"
     assert names.actuators[:2] == ("hip_4", "ankle_4")

@@ -61,7 +61,6 @@ def test_the_world_cannot_be_selected() -> None:
 
 
 def test_trunks_are_no_limbs() -> None:
-    """The error lists the limbs of the trunk."""
     spec = leg()
     require_limb(spec.body("thigh"), "cut")
     with pytest.raises(MorphologyError, match=r"'trunk' is the trunk .* its limbs can: thigh\."):

@@ -98,7 +98,6 @@ def test_copied_limbs_have_poses_relative_to_their_body() -> None:
 
 @pytest.mark.parametrize("scaling", ['scale="2"', 'scale="2" massscale="1"'])
 def test_frames_that_scale_are_refused(scaling: str) -> None:
-    """Frames with a scale cannot be edited."""
     text = f"""<mujoco><worldbody><frame name="big" {scaling}><body name="b"><joint/>
     <geom size=".1"/></body></frame></worldbody></mujoco>"""
     with pytest.raises(MorphologyError, match="The frame 'big' scales its elements: write the"):

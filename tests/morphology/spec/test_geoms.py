@@ -138,7 +138,6 @@ def test_an_oblique_geom_cannot_be_stretched_along_an_axis(shape: str) -> None:
 
 
 def test_oblique_ends_are_stretched_along_an_axis() -> None:
-    """Geoms with ends can be stretched along any axis."""
     model = built(
         limb('<geom type="capsule" size=".1" fromto="0 0 0 .3 0 .4"/>'), Stretch("link", 2.0, "z")
     )

@@ -162,7 +162,6 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
 
 
 def test_frames_queued_by_a_program_are_skipped(tmp_path: Path) -> None:
-    """Frames that a program sent before the first read are skipped."""
     (tmp_path / "stream").write_bytes(_jpeg(10) * 90 + _jpeg(90))
     (tmp_path / "send.py").write_text(
         "import pathlib, sys, time\n"
@@ -204,7 +203,6 @@ def test_a_program_as_a_camera(tmp_path: Path) -> None:
 
 
 def test_flip_rotates_frames(tmp_path: Path) -> None:
-    """With `flip`, frames are rotated by 180 degrees."""
     image = np.zeros((24, 32, 3), np.uint8)
     image[:12] = 255
     (tmp_path / "a.jpg").write_bytes(simplejpeg.encode_jpeg(image, 95))

@@ -24,7 +24,6 @@ class HeldPins(RealHardware):
         self.factory: Any = MockFactory(pin_class=MockPWMPin)
 
     def pin_factory(self) -> Any:
-        """Return the factory of the pins."""
         return self.factory
 
     def close(self) -> None:

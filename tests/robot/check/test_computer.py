@@ -223,7 +223,6 @@ class _Stuck:
             raise RobotError(f"Not here: {method}.")
 
     def open(self, plan: CameraPlan) -> Self:
-        """Open the camera."""
         del plan
         self._maybe("open")
         return self
@@ -234,7 +233,6 @@ class _Stuck:
         return Frame(b"\xff\xd8", 1)
 
     def pin_factory(self) -> Any:
-        """Return no factory."""
         self._maybe("pin_factory")
 
     def i2c(self, bus: int) -> Any:

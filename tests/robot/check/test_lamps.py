@@ -15,7 +15,6 @@ from tests.robot.check.held_pins import HeldPins, shipped
 
 @pytest.fixture
 def pins() -> Iterator[HeldPins]:
-    """Fake pins."""
     made = HeldPins()
     yield made
     made.factory.close()

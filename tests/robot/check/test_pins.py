@@ -39,7 +39,6 @@ class _Pins(RealHardware):
 
 @pytest.fixture
 def pins() -> Iterator[_Pins]:
-    """Fake pins."""
     made = _Pins()
     yield made
     made.factory.close()

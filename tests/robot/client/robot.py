@@ -108,23 +108,19 @@ class Robot:
 
     @property
     def address(self) -> str:
-        """Address of the robot."""
         return f"127.0.0.1:{self.port}"
 
     @property
     def fingerprint(self) -> str:
-        """Fingerprint of its certificate."""
         assert self._credentials is not None
         return fingerprint_hex(self._credentials.fingerprint)
 
     @property
     def known(self) -> KnownRobot:
-        """The robot as a known robot."""
         return KnownRobot("tin", self.address, self.key, self.fingerprint)
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Arguments of the env."""
         return {"robot": self.address, "key": self.key, "fingerprint": self.fingerprint}
 
     def received(self, kind: type[Any]) -> list[Any]:

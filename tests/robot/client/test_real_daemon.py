@@ -66,7 +66,6 @@ class Served:
 
     @property
     def known(self) -> KnownRobot:
-        """The robot as a known robot."""
         return KnownRobot("test", f"127.0.0.1:{self.running.port}", self.key, self.known_at)
 
     def sense(self, **quantities: float) -> None:

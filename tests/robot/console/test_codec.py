@@ -106,7 +106,6 @@ def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> 
 
 
 def test_the_page_has_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
-    """Page and robot use the same protocol version."""
     console = visit(car, key="")
     version = "async () => (await import('/console/link.js')).VERSION"
     assert console.page.evaluate(version) == m.VERSION

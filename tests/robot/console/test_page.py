@@ -136,7 +136,6 @@ def test_controls_are_large_and_do_not_overlap(
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str) -> None:
-    """The contrast of each text is at least 4.5 (WCAG 2.2, 1.4.3)."""
     console = visit(car, color_scheme=scheme, reduced_motion="reduce")
     console.await_state(picture="live")
     poor = console.page.evaluate(
@@ -166,7 +165,6 @@ def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str
 
 
 def test_reduced_motion_stops_all_animations(car: RunningRobot, visit: Visit) -> None:
-    """No animation runs with prefers-reduced-motion."""
     console = visit(car, reduced_motion="reduce")
     console.await_state(link="open", view="drive")
     console.page.evaluate("document.body.dataset.recording = 'true'")

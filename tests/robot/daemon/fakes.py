@@ -32,7 +32,6 @@ class FakeGuard:
         asyncio.get_running_loop().add_reader(self._socket, self.tick)
 
     def close(self) -> None:
-        """Close the socket."""
         if self._socket.fileno() >= 0:
             asyncio.get_running_loop().remove_reader(self._socket)
             self._socket.close()
@@ -55,7 +54,6 @@ class FakeGuard:
         self.send()
 
     def send(self, **changes: Any) -> None:
-        """Send the state."""
         self.state = dataclasses.replace(self.state, at_ns=self._now_ns(), **changes)
         self._socket.send(encode(self.state))
         self.state = dataclasses.replace(self.state, refused="", refused_seq=None)

@@ -54,7 +54,6 @@ def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
 
 
 def guard_state(**changes: Any) -> GuardState:
-    """Return the state of a guard at rest."""
     fields: dict[str, Any] = {
         "at_ns": 0,
         "armed": False,

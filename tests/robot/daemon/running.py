@@ -64,7 +64,6 @@ class Client:
         self.received: list[RobotMessage] = []
 
     async def send(self, message: ClientMessage) -> None:
-        """Send a message."""
         await self.socket.send_bytes(encode(message))
 
     async def receive(self) -> RobotMessage | None:
@@ -111,7 +110,6 @@ class Client:
             pass
 
     async def observe(self) -> Observation:
-        """Ask for an observation."""
         await self.send(Acknowledge())
         return await self.expect(Observation)
 
@@ -149,7 +147,6 @@ class Running:
 
     @property
     def url(self) -> str:
-        """URL of the console."""
         return f"{'https' if self.plan.certificate else 'http'}://127.0.0.1:{self.port}"
 
     @contextlib.asynccontextmanager

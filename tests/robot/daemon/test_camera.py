@@ -46,7 +46,6 @@ class Watched:
 
 @pytest.fixture
 def camera() -> FakeCamera:
-    """A fake camera."""
     return FakeCamera()
 
 

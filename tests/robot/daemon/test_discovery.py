@@ -22,11 +22,9 @@ class FakeZeroconf:
         self.closed = False
 
     async def async_register_service(self, info: Any, allow_name_change: bool) -> None:
-        """Record a service."""
         self.announced.append(info)
 
     async def async_unregister_all_services(self) -> None:
-        """Remove all services."""
         self.announced.clear()
 
     async def async_close(self) -> None:

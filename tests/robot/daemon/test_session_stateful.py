@@ -75,7 +75,6 @@ class Robot(RuleBasedStateMachine):
 
     @rule(place=_places, role=st.sampled_from(("person", "program")))
     def connect(self, place: int, role: Any) -> None:
-        """A client connects."""
         if place in self.sessions:
             return
         self.numbers += 1
@@ -141,7 +140,6 @@ class Robot(RuleBasedStateMachine):
     @precondition(connected)
     @rule(place=_places)
     def observe(self, place: int) -> None:
-        """An observation is sent."""
         if place in self.sessions:
             observation = self.sessions[place].observe()
             assert observation.mine == (self.holder == place)
@@ -259,7 +257,6 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def the_lease_has_the_expected_holder(self) -> None:
-        """The holder is that of the model."""
         held = self.hub.lease.holder
         place = next((p for p, s in self.sessions.items() if s.client == held), None)
         assert place == self.holder
@@ -277,7 +274,6 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def no_command_is_in_force_without_a_holder(self) -> None:
-        """No command is in force after the deadline either."""
         if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
             assert self.hub.commanded() == ()
         elif self.hub.commanded():

@@ -99,11 +99,9 @@ class FakeBus:
         return self.chips[address]
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte."""
         self.write_i2c_block_data(i2c_addr, value, [])
 
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """Read one register."""
         return self._chip(i2c_addr).get(register, 0)
 
     def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
@@ -123,7 +121,6 @@ class FakeBus:
             self._fault.during(functools.partial(chip.__setitem__, register + i, byte))
 
     def close(self) -> None:
-        """Close it."""
         self.closed += 1
 
 
@@ -165,7 +162,6 @@ class FakeHardware:
         return self.bus
 
     def servo_pins(self) -> FakeServoPins:
-        """Return the fake servo pins."""
         return self.pulses
 
     def servo_port(self, settings: BusSettings) -> ServoPort:
@@ -173,13 +169,10 @@ class FakeHardware:
         raise RobotError(f"The bus at {settings.device} cannot be opened.")
 
     def close(self) -> None:
-        """Close it."""
         self.factory.close()
 
     def output(self, driver: str, **settings: Any) -> OutputDriver:
-        """Open an output."""
         return open_output(OutputPlan("it", driver, settings=settings), self)
 
     def sensor(self, driver: str, **settings: Any) -> SensorDriver:
-        """Open a sensor."""
         return open_sensor(SensorPlan("it", driver, "", settings=settings), self)

@@ -47,7 +47,6 @@ def test_each_joint_is_read_on_its_channel() -> None:
 
 @given(zero=st.integers(0, 4095), turned=st.integers(-2047, 2047), back=st.booleans())
 def test_angles_are_within_half_a_turn_of_the_zero(zero: int, turned: int, back: bool) -> None:
-    """Angles are within half a turn of the zero, for any zero and direction."""
     direction = -1 if back else 1
     encoder = JointEncoder("knee", 0, zero, direction)
     angle = encoder.angle((zero + direction * turned) % 4096)
@@ -55,7 +54,6 @@ def test_angles_are_within_half_a_turn_of_the_zero(zero: int, turned: int, back:
 
 
 def test_unused_bits_of_the_high_byte_are_ignored() -> None:
-    """The angle has 12 bits."""
     hardware, bus = _rig()
     sensor = hardware.sensor("as5600", **_TWO)
     bus.chips[_ENCODER][0x0C] |= 0xF0

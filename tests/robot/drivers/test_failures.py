@@ -68,7 +68,6 @@ class _Bench:
         monkeypatch.setattr("shapechanger.robot.drivers.pulse.SysfsPwm", Pwm)
 
     def open(self) -> OutputDriver:
-        """Open the driver."""
         return self.hardware.output(self.driver, **self.settings)
 
     def state(self) -> dict[str, Any]:

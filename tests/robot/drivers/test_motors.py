@@ -77,7 +77,6 @@ def test_enable_is_on_only_while_the_motor_is_held() -> None:
 
 @pytest.mark.parametrize(("driver", "settings"), [("hbridge", _HBRIDGE), ("phase_enable", _PHASE)])
 def test_close_leaves_everything_low(driver: str, settings: dict[str, float]) -> None:
-    """All pins are low after `close`, which is idempotent."""
     hardware = FakeHardware()
     motor = hardware.output(driver, **settings)
     motor.write(1.0, 0)

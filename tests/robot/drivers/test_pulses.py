@@ -51,7 +51,6 @@ def test_width_and_value_are_inverse(value: float, ends: tuple[float, float]) ->
 
 
 def test_middle_outside_of_the_ends_is_refused() -> None:
-    """A centre outside of the end points is refused."""
     with pytest.raises(RobotError, match="must lie between"):
         PulseRange(1000.0, 900.0, 2000.0)
 
@@ -196,7 +195,6 @@ def test_channels_share_their_chip() -> None:
 
 
 def test_output_enable_is_low_only_while_something_is_sent() -> None:
-    """The active-low output enable is low only while at least one channel is in use."""
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
     one, two = (hardware.output("servo", **_SERVO | on_chip, channel=c) for c in (0, 1))

@@ -25,7 +25,6 @@ GIVEN = {"rows", "settings"}  # No keys of a table.
 
 
 def test_vehicle_of_the_guide_is_a_profile() -> None:
-    """The example of the guide is a valid profile."""
     (text,) = re.findall(r"```toml\n(\[robot\].*?)```", GUIDE, re.DOTALL)
     assert read(text).body == "hovercraft"
 
@@ -46,7 +45,6 @@ def test_every_key_is_in_the_guide(kind: type) -> None:
 
 
 def test_every_table_driver_and_profile_is_in_the_guide() -> None:
-    """The guide lists each table, each driver and each shipped profile."""
     for table in TABLES:
         assert re.search(rf"^### `\[+{table}[\].]", GUIDE, re.MULTILINE), table
     for chips in (OUTPUTS, PULSES, SENSORS):

@@ -361,7 +361,6 @@ def test_mistake_is_named(mistake: tuple[str, ...]) -> None:
     ),
 )
 def test_any_edit_gives_a_profile_or_one_sentence(cut: int, length: int, put: str) -> None:
-    """Any small edit of a profile reads, or raises one sentence."""
     message = ""
     try:
         read(EVERYTHING[:cut] + put + EVERYTHING[cut + length :])

@@ -81,7 +81,6 @@ def test_chip_settings_apply_to_all_its_outputs() -> None:
 
 
 def test_guard_plan_round_trips() -> None:
-    """The guard plan is unchanged by JSON."""
     plan = read().guard_plan()
     assert GuardPlan.from_json(plan.to_json()) == plan
     assert (plan.enable_pin, plan.enable_hold_ms, plan.stop_pin) == (19, 50, 21)

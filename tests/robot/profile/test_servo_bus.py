@@ -17,7 +17,6 @@ _BUS = _TEXT[_TEXT.index("[servo_bus]") : _TEXT.index("[action.FDP]")]
 
 
 def test_outputs_include_the_bus_and_the_sensor_its_tendons() -> None:
-    """Settings of the bus are merged into the outputs, and tendon names into the sensor."""
     plan = load_profile(shipped_profiles()["finger"]).guard_plan()
     assert {str(output.settings["device"]) for output in plan.outputs} == {"/dev/ttyUSB0"}
     assert [output.settings["id"] for output in plan.outputs] == [1, 2, 3, 4, 5, 6, 7]

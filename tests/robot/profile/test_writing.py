@@ -88,7 +88,6 @@ def test_changes_keep_comments(rover: Path) -> None:
 
 
 def test_a_comment_after_a_value_is_kept(tmp_path: Path) -> None:
-    """The new value is written before the comment."""
     path = write_profile("car", tmp_path / "car.toml", "car")
     rewrite(path, {"action.throttle.slew_per_s": 2.0, "output.drive.mix": {"throttle": 0.5}})
     text = path.read_text()
@@ -97,7 +96,6 @@ def test_a_comment_after_a_value_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_change_through_a_link_changes_its_target(rover: Path, tmp_path: Path) -> None:
-    """The link remains a link."""
     link = tmp_path / "link.toml"
     link.symlink_to(rover)
     assert rewrite(link, {"robot.name": "new"}).name == "new"

@@ -52,7 +52,6 @@ class FakePi:
         return (self.root / "boot/firmware/config.txt").read_text()
 
     def write(self, name: str, text: str) -> None:
-        """Write one of its files."""
         path = self.root / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)

@@ -27,7 +27,6 @@ def hbridge(
 def servo(
     name: str, part: str, mix: dict[str, float], **over: bool | int | float | str
 ) -> OutputPlan:
-    """A servo from 1000 to 2000 us."""
     settings = {"hz": 50, "left_us": 1000.0, "centre_us": 1500.0, "right_us": 2000.0}
     more = {"travel_deg_per_s": math.inf}
     return OutputPlan(name, "servo", part, mix, 0.0, {**settings, **more, **over})

@@ -57,7 +57,6 @@ def test_frames_carry_their_capture_time(tmp_path: Path) -> None:
 
 
 def test_frames_without_a_reader_are_dropped(tmp_path: Path) -> None:
-    """Without a reader, frames are dropped, and a later reader gets only new ones."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -138,7 +137,6 @@ def test_frames_are_small(tmp_path: Path) -> None:
 
 
 def test_a_twin_without_a_camera_refuses_camera_faults(tmp_path: Path) -> None:
-    """A twin without a camera refuses requests about it."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with pytest.raises(RobotError, match="no camera"):
             operator.break_camera("off")

@@ -38,7 +38,6 @@ while True:
 
 
 def test_a_participant_is_granted_each_tick(tmp_path: Path) -> None:
-    """A participant is granted 100 ticks a second, each finished before the next."""
     with (
         start_board(CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,
@@ -64,7 +63,6 @@ def test_a_participant_is_granted_its_exact_deadline(tmp_path: Path) -> None:
 
 
 def test_time_does_not_wait_for_a_dead_participant(tmp_path: Path) -> None:
-    """A participant that dies does not stop time."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_GUARD, board.socket_path):
             operator.advance(0.1)

@@ -65,7 +65,6 @@ def test_swapped_pins_drive_backward(tmp_path: Path) -> None:
 
 
 def test_a_bump_between_observations_is_reported() -> None:
-    """A bump that starts and ends between two observations is reported."""
     world = _room()
     robot = _robot(world)
     robot.start(lambda: world.place(2))

@@ -23,7 +23,6 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 
 
 def test_driving_within_a_deadline_is_allowed() -> None:
-    """Driving within the deadline of a command is not a violation."""
     ledger = [_pin(10, 22, 0.5), _pin(200, 22, 0.0)]
     assert unauthorised(ledger, _NO_ONE_SHOT, [ExpectedCommand(9 * _MS, 1000)], 250) == []
 
@@ -48,7 +47,6 @@ def test_steering_is_allowed_without_a_command() -> None:
 
 @pytest.mark.parametrize(("deadline_ms", "ttl_ms"), [(250, 1000), (1000, 250)])
 def test_a_command_ends_at_deadline_or_time_to_live(deadline_ms: float, ttl_ms: float) -> None:
-    """A command ends at the earlier of deadline and TTL, to the nanosecond."""
     ledger = [_pin(10, 22, 0.5), _pin(300, 22, 0.0)]
     found = unauthorised(ledger, _NO_ONE_SHOT, [(10 * _MS, ttl_ms)], deadline_ms)
     assert [(one.start_ns, one.end_ns) for one in found] == [(260 * _MS, 300 * _MS)]
@@ -71,7 +69,6 @@ def test_a_motor_that_never_stops_is_found() -> None:
 
 
 def test_time_to_rest_ends_at_the_last_stop() -> None:
-    """A motor that stops and restarts is not at rest until its last stop."""
     ledger = [_pin(0, 22, 0.5), _pin(120, 22, 0.0), _pin(150, 22, 0.1), _pin(180, 22, 0.0)]
     assert time_to_rest(ledger, _NO_ONE_SHOT, 100 * _MS) == pytest.approx(0.08)
     assert time_to_rest(ledger, _NO_ONE_SHOT, 500 * _MS) == 0.0

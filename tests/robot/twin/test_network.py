@@ -127,7 +127,6 @@ def test_silence_holds_data_and_keeps_the_connection(line: Line) -> None:
 
 
 def test_reset_closes_both_ends(line: Line) -> None:
-    """After a reset, both ends see an error or an end of file."""
     assert line.carries(b"before") == b"before"
     line.network.reset()
 

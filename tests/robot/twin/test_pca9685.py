@@ -90,7 +90,6 @@ def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
 
 
 def test_without_auto_increment_a_block_lands_in_one_register() -> None:
-    """Without auto-increment, a block write goes to a single register and gives no pulses."""
     chip = SimulatedPca9685()
     chip.write(0x00, [0x01])
     chip.write(0x06, [0, 0, 51, 1])
@@ -101,7 +100,6 @@ def test_without_auto_increment_a_block_lands_in_one_register() -> None:
 def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written(
     tmp_path: Path,
 ) -> None:
-    """After a failed transfer the chip stays off until each driver has written its channel."""
     at = _ON_CHIP | {"channel": 0}
     plan = GuardPlan(
         "car",

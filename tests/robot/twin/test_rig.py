@@ -78,7 +78,6 @@ def test_commands_map_to_tensions(bench: _Bench) -> None:
 
 
 def test_sensed_lengths_match_the_joint_angles(bench: _Bench) -> None:
-    """Tendon lengths match the joint angles, up to the stretch of the cables."""
     bench.drive(_FLEX, 50)
     angles = np.array([bench.world.truth()[f"{n}/angle"] for n in JOINTS])
     assert angles[0] > JOINT_REST[0] + 0.2
@@ -89,7 +88,6 @@ def test_sensed_lengths_match_the_joint_angles(bench: _Bench) -> None:
 
 
 def test_the_same_commands_give_the_same_motion() -> None:
-    """The motion depends only on the seed and the commands."""
     ends: list[tuple[float, ...]] = []
     for _ in range(2):
         bench = _Bench()
@@ -166,7 +164,6 @@ def test_a_recovered_servo_needs_rearming(bench: _Bench) -> None:
 
 
 def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
-    """Arming with a missing servo raises an error that names it."""
     bench.drive(_FLEX, 10)
     bench.rig.break_servo("LUM", "mute")
     bench.drive(_FLEX, 40)
@@ -175,7 +172,6 @@ def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
 
 
 def test_servos_release_without_packets(bench: _Bench) -> None:
-    """Each servo stops by itself after 100 ms without a packet."""
     bench.drive(_FLEX, 25)
     bench.rig.bus.advance(90_000_000)
     assert bench.rig.tensions()["FDP"] > 5.0

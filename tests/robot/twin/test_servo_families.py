@@ -73,7 +73,6 @@ class _Bench:
 
 @pytest.fixture(params=["Dynamixel", "Feetech"])
 def family(request: pytest.FixtureRequest) -> str:
-    """Each family."""
     return request.param
 
 

@@ -82,7 +82,6 @@ def test_left_is_counter_clockwise_seen_from_above(kind: str) -> None:
 
 @_EACH_VEHICLE
 def test_negated_outputs_reverse_the_vehicle(kind: str) -> None:
-    """Negating all outputs drives the vehicle backward."""
     ahead, _ = _VEHICLES[kind]
     world = DrivingWorld(ahead, _SIZE, seed=1)
     _run(world, {part: -value for part, value in ahead.items()}, 0.3)
@@ -135,7 +134,6 @@ def test_a_start_has_room_ahead(seed: int) -> None:
 
 
 def test_a_servo_without_pulses_keeps_its_angle() -> None:
-    """A servo without pulses does not return to the centre."""
     world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=1)
     _run(world, {"wheels": 0.0, "steering": -1.0}, 0.5)
     before = world.inputs().pose.heading

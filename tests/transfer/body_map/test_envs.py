@@ -34,7 +34,6 @@ class Recorder(gym.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Reset the counter."""
         super().reset(seed=seed)
         self.moved = []
         return self.sensed(), {"options": options}

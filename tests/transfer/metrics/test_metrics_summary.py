@@ -93,7 +93,6 @@ def test_summary_states_its_settings() -> None:
 
 
 def test_without_source_steps_both_counts_agree() -> None:
-    """Without source steps both ways of counting are equal, intervals included."""
     result = summary(source_steps=0)
     assert result.in_total_steps == result.in_target_steps
 

@@ -36,7 +36,6 @@ FLAT = rising(997.0, 1005.0, 3000.0, noise=2.0)
     ],
 )
 def test_direction_follows_the_interval(estimate: Estimate, expected: Direction) -> None:
-    """The direction is clear only if the interval excludes 0."""
     assert direction(estimate) == expected
 
 

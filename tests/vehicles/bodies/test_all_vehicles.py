@@ -30,7 +30,6 @@ def test_a_vehicle_at_rest_stays(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_top_speed_is_as_declared(name: str) -> None:
-    """The top speed is as declared, and the odometer agrees."""
     here = ground(name)
     here.drive(6.0, AHEAD[name])
     assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
@@ -41,7 +40,6 @@ def test_top_speed_is_as_declared(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_speed_falls_with_the_voltage(name: str) -> None:
-    """At 80 % of the voltage, the speed is 60 to 90 % of the top speed."""
     here = ground(name)
     here.drive(5.0, AHEAD[name], battery_v=0.8 * BATTERY_V)
     assert 0.6 < here.vehicle.motion().speed / here.kind.top_speed_mps < 0.9
@@ -49,7 +47,6 @@ def test_speed_falls_with_the_voltage(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_reverse_is_negative(name: str) -> None:
-    """Speed and distance are negative in reverse."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], -0.5))
     assert here.vehicle.motion().speed < -0.05
@@ -185,7 +182,6 @@ def test_place_resets_the_state(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_speed_is_along_the_heading(name: str) -> None:
-    """Speed is measured along the heading."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 2.5)
     here.drive(2.0, AHEAD[name])
@@ -197,7 +193,6 @@ def test_speed_is_along_the_heading(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_names_and_collision_bits(name: str) -> None:
-    """Collision bits and names follow the conventions."""
     model = ground(name).model
     for i in range(model.ngeom):
         geom = model.geom(i)

@@ -20,7 +20,6 @@ def test_a_boat_has_no_brakes() -> None:
 
 
 def test_reverse_thrust_is_weak() -> None:
-    """Reverse thrust is weak."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
     here.drive(0.5, {"propeller": -1.0, "rudder": 0.0})
@@ -30,7 +29,6 @@ def test_reverse_thrust_is_weak() -> None:
 
 
 def test_a_boat_drifts_outwards_in_a_turn() -> None:
-    """In a left turn the boat drifts to the right."""
     here = ground("boat")
     here.drive(8.0, TO_THE_LEFT["boat"])
     assert here.vehicle.motion().lateral_speed < -0.1 * here.vehicle.motion().speed
@@ -60,7 +58,6 @@ def test_a_current_carries_the_boat() -> None:
 
 
 def test_the_log_measures_distance_through_water() -> None:
-    """The log measures distance through the water."""
     here = ground("boat")
     here.vehicle.set_current(-0.3, 0.0)
     here.drive(10.0, AHEAD["boat"])
@@ -82,7 +79,6 @@ def test_motion_is_relative_to_the_current() -> None:
 
 
 def test_the_rudder_needs_flow() -> None:
-    """The rudder needs flow, from motion or from the propeller."""
     here = ground("boat")
     here.drive(2.0, {"propeller": 0.0, "rudder": -1.0})
     assert abs(here.vehicle.motion().yaw_rate) < 1e-3

@@ -37,7 +37,6 @@ class _Bench:
 
 
 def test_ground_contact_is_no_collision() -> None:
-    """Contacts with the ground are ignored."""
     bench = _Bench()
     bench.stand(0.0)
     assert bench.data.ncon > 0
@@ -46,7 +45,6 @@ def test_ground_contact_is_no_collision() -> None:
 
 
 def test_wall_contact_is_a_collision() -> None:
-    """A lasting contact is one collision."""
     bench = _Bench()
     bench.stand(0.91, seconds=3.0)
     assert bench.touch.touches
@@ -68,7 +66,6 @@ def test_bouncing_counts_once() -> None:
 
 
 def test_a_contact_after_release_counts() -> None:
-    """A contact after `release` is a new collision."""
     bench = _Bench()
     bench.stand(0.91)
     bench.touch.release()
@@ -78,7 +75,6 @@ def test_a_contact_after_release_counts() -> None:
 
 
 def test_a_reset_clears_collisions() -> None:
-    """`reset` clears the counter and the bumper."""
     bench = _Bench()
     bench.stand(0.91)
     bench.touch.reset()

@@ -13,7 +13,6 @@ from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR, HOBBY_SERVO
 
 
 def test_names_are_consistent() -> None:
-    """Names are consistent, and only the boat floats."""
     assert {name: model.name for name, model in VEHICLES.items()} == {n: n for n in VEHICLES}
     assert set(VEHICLES) == {"car", "tank", "truck", "boat"}
     assert [name for name, model in VEHICLES.items() if model.floats] == ["boat"]

@@ -14,7 +14,6 @@ from tests.vehicles.bodies.grounds import AHEAD, Ground, ground
 @pytest.mark.parametrize("throttle", [0.25, 0.6])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_turning_radius_follows_from_geometry(name: str, throttle: float, side: float) -> None:
-    """The turning radius follows from the geometry."""
     here = ground(name)
     here.drive(8.0, {"wheels": throttle, "steering": side})
     radius = here.pace() / abs(here.vehicle.motion().yaw_rate)
@@ -22,7 +21,6 @@ def test_the_turning_radius_follows_from_geometry(name: str, throttle: float, si
 
 
 def test_wheel_angles_satisfy_ackermann() -> None:
-    """Wheel angles satisfy Ackermann's condition."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
     left, right = (
@@ -34,7 +32,6 @@ def test_wheel_angles_satisfy_ackermann() -> None:
 
 
 def test_the_servo_has_a_limited_speed() -> None:
-    """The servo's speed is limited to 60 degrees in 0.19 s."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
     joint = here.data.joint("vehicle/left steering")
@@ -47,7 +44,6 @@ def test_the_servo_has_a_limited_speed() -> None:
 
 
 def test_a_servo_without_pulses_keeps_its_angle() -> None:
-    """Without pulses, the steering angle stays."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
     before = float(here.data.joint("vehicle/left steering").qpos[0])
@@ -79,7 +75,6 @@ def test_the_car_slips_on_ice() -> None:
 
 @pytest.mark.parametrize("name", ["car", "truck"])
 def test_wheels_stay_inside_the_body(name: str) -> None:
-    """At full lock, wheels stay inside the body's width."""
     here = ground(name)
     here.drive(1.0, {"steering": -1.0})
     for side in ("left", "right"):
@@ -115,7 +110,6 @@ def test_the_tank_turns_on_the_spot() -> None:
 
 
 def test_swapped_tracks_turn_the_other_way() -> None:
-    """Swapped tracks reverse the turn."""
     here = ground("tank")
     rates: list[float] = []
     for left, right in ((0.8, 0.3), (0.3, 0.8)):
@@ -139,7 +133,6 @@ def test_the_tank_steers_while_it_drives() -> None:
 
 
 def test_wheels_of_a_track_turn_together() -> None:
-    """The wheels of a track turn together."""
     here = ground("tank")
     here.drive(2.0, {"left track": -1.0, "right track": 1.0})
     rates = [

@@ -62,7 +62,6 @@ def test_lenses_are_deterministic(change: Corruption) -> None:
 
 @pytest.mark.parametrize("change", [night, glare, dirt])
 def test_another_seed_gives_another_picture(change: Corruption) -> None:
-    """Another seed changes the result."""
     assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
 
 
@@ -86,7 +85,6 @@ def test_glare_only_adds_light() -> None:
 
 
 def test_blur_keeps_the_sum() -> None:
-    """Blur keeps the sum, with a standard deviation of 1.25 % of the width."""
     point = np.zeros((121, 161, 3), np.uint8)
     point[56:65, 76:85] = 255
     soft = blur(point, 0).astype(float)[..., 0]

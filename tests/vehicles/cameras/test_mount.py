@@ -42,7 +42,6 @@ def test_a_zero_error_keeps_the_pose() -> None:
 
 
 def test_offsets_are_up_and_left() -> None:
-    """Offsets are upwards and to the left."""
     place = _moved(CameraJitter(up_m=0.01, left_m=0.02)).camera("eye").pos
     assert place == pytest.approx([0.05, 0.02, 0.13])
 
@@ -59,7 +58,6 @@ def test_directions_of_the_angles() -> None:
 
 
 def test_random_errors_are_within_their_ranges() -> None:
-    """Random errors are within their ranges, of both signs and reproducible."""
     drawn = [CameraJitter.random(np.random.default_rng(seed)) for seed in range(200)]
     for name, most in {
         "up_m": 0.015,
@@ -103,6 +101,5 @@ def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
 
 @pytest.mark.parametrize("jitter", [CameraJitter(left_m=math.nan), CameraJitter(roll_rad=math.inf)])
 def test_non_finite_errors_are_refused(jitter: CameraJitter) -> None:
-    """Errors must be finite."""
     with pytest.raises(WorldError, match="must be finite, got"):
         _moved(jitter)

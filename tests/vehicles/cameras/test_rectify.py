@@ -77,7 +77,6 @@ def test_rectified_pictures_of_vehicles_agree() -> None:
 
 
 def test_a_camera_that_misses_the_view_is_refused() -> None:
-    """Cameras that do not cover the virtual view are refused."""
     with pytest.raises(WorldError, match=r"looks 30 degrees down .* misses 60 %"):
         Rectifier(CameraGeometry(30.0, 48.8), _SIZE)
     with pytest.raises(WorldError, match="vertical field of view of 20 degrees misses"):
@@ -85,7 +84,6 @@ def test_a_camera_that_misses_the_view_is_refused() -> None:
 
 
 def test_pictures_of_another_size_are_refused() -> None:
-    """Pictures of another size are refused."""
     rectify = Rectifier(CameraGeometry(0.0, 48.8), _SIZE)
     with pytest.raises(WorldError, match=r"have the shape \(120, 160, 3\), got \(60, 80, 3\)"):
         rectify(np.zeros((60, 80, 3), np.uint8))
@@ -125,7 +123,6 @@ def board_picture(
 def test_a_board_gives_pitch_and_field_of_view(
     pitch_deg: float, fovy_deg: float, turned_deg: float, roll_deg: float
 ) -> None:
-    """The pitch is measured to 0.1 degrees and the field of view to 0.5."""
     found = measure_camera(board_picture(pitch_deg, fovy_deg, turned_deg, roll_deg), (7, 5))
     assert found.geometry.pitch_deg == pytest.approx(pitch_deg, abs=0.15)
     assert found.geometry.fovy_deg == pytest.approx(fovy_deg, abs=0.5)
@@ -136,7 +133,6 @@ def test_a_board_gives_pitch_and_field_of_view(
 
 
 def test_a_board_that_faces_the_camera_needs_the_field_of_view() -> None:
-    """A board seen straight on needs a given field of view."""
     picture = board_picture(3.0, 48.8, 0.0)
     with pytest.raises(WorldError, match="field of view"):
         measure_camera(picture, (7, 5))
@@ -155,7 +151,6 @@ def test_pictures_without_the_board_are_refused() -> None:
 
 @pytest.mark.parametrize(("pitch_deg", "fovy_deg"), [(0.0, 48.8), (5.0, 48.8), (-3.0, 62.0)])
 def test_a_horizon_gives_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
-    """The row of the horizon gives the pitch."""
     high = _SIZE[1]
     row = float((_horizon(pitch_deg, fovy_deg)[:, 0, 0] == 255).sum())
     assert pitch_of_horizon(row, high, fovy_deg) == pytest.approx(pitch_deg, abs=0.3)
@@ -164,7 +159,6 @@ def test_a_horizon_gives_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
 
 
 def test_the_drawing_shows_the_horizon() -> None:
-    """`draw_view` marks the horizon."""
     geometry = CameraGeometry(3.0, 48.8)
     picture = _horizon(3.0, 48.8)
     drawn = draw_view(picture, geometry)

@@ -50,7 +50,6 @@ def test_every_name_has_the_prefix_of_the_world(world: str) -> None:
 
 @pytest.mark.parametrize("world", _WORLDS)
 def test_collision_and_visual_geoms_are_separate(world: str) -> None:
-    """Collision geoms are hidden, and visual meshes do not collide."""
     model = _compiled(world)
     touchable = (model.geom_contype | model.geom_conaffinity) > 0
     assert (model.geom_group[touchable] == 3).all()
@@ -71,21 +70,18 @@ def test_walls_and_obstacles_are_numbered() -> None:
 
 @pytest.mark.parametrize(("bits", "ground"), [(_HULL, False), (_WHEEL, True)])
 def test_only_wheels_collide_with_the_ground(bits: dict[str, int], ground: bool) -> None:
-    """Wheels collide with the ground, hulls do not."""
     touched = _touched(_compiled("corridor", **bits), 0.0, 3.0, 0.05)
     assert touched == ({"world/ground"} if ground else set())
 
 
 @pytest.mark.parametrize("bits", [_HULL, _WHEEL])
 def test_hulls_and_wheels_touch_walls_and_obstacles(bits: dict[str, int]) -> None:
-    """Hulls and wheels collide with walls and obstacles."""
     model = _compiled("corridor", **bits)
     assert _touched(model, 3.5, -0.95, 0.3) == {"world/wall/0"}
     assert _touched(model, 6.6, 2.8, 0.3) == {"world/thing/1"}
 
 
 def test_the_visible_side_of_a_wall_is_its_collision_surface() -> None:
-    """Contact begins at the visible side."""
     model = _compiled("corridor", **_HULL)
     assert _touched(model, 3.5, -0.89, 0.3) == set()
     assert _touched(model, 3.5, -0.91, 0.3) == {"world/wall/0"}

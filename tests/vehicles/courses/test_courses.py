@@ -75,7 +75,6 @@ def test_a_flooded_corridor_has_the_courses_of_the_corridor(seed: int) -> None:
 
 @each_world
 def test_the_route_is_closed_and_evenly_spaced(world: str) -> None:
-    """Points are evenly spaced around the closed route, and its length is in range."""
     for course in _courses(world):
         steps = np.diff(course.route, axis=0, append=course.route[:1])
         chords = np.hypot(steps[:, 0], steps[:, 1])
@@ -141,7 +140,6 @@ def test_walls_face_the_route(world: str) -> None:
 
 @each_world
 def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
-    """`half_width` is the distance from the route to the nearest wall."""
     low, high = _WIDTHS[world]
     for course in _courses(world):
         nearest = distances_to_segments(course.route, wall_segments(course.walls)).min(axis=1)
@@ -201,7 +199,6 @@ def test_the_whole_lane_has_the_promised_gap(world: str) -> None:
 
 @each_world
 def test_lamps_are_over_the_lane(world: str) -> None:
-    """Lamps are in the lane, and only corridors have a ceiling."""
     for course in _courses(world):
         assert course.lamps
         assert course.ceiling_m == (2.5 if world == "corridor" else 0.0)

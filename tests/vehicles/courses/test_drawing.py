@@ -65,7 +65,6 @@ def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.usefixtures("quarters")
 @pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
 def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
-    """Textures are upright and not mirrored on walls of any direction."""
     ahead = np.array([np.cos(angle), np.sin(angle)])
     right = np.array([ahead[1], -ahead[0]])
     # A wall 1.8 m wide, 1 m ahead; its visible side is on the left of its direction.
@@ -142,7 +141,6 @@ def test_rendering_is_deterministic() -> None:
 
 
 def test_another_seed_has_other_textures() -> None:
-    """Another texture seed gives another picture."""
     usual = Look.of("yard")
     one, other = (
         _draw(square("yard"), replace(usual, texture_seed=seed), (0.5, 0.0), 0.0) for seed in (0, 1)

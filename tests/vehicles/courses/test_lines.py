@@ -46,7 +46,6 @@ def test_tangent_radii_of_bends_and_necks() -> None:
 
 
 def test_smoothing_keeps_the_middle_and_removes_wiggles() -> None:
-    """Smoothing keeps the mean and removes the highest frequency."""
     rng = np.random.default_rng(0)
     values = rng.normal(size=(100, 2))
     assert smooth(values, 4.0).mean(axis=0) == pytest.approx(values.mean(axis=0))

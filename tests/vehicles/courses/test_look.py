@@ -13,7 +13,6 @@ from shapechanger.vehicles.courses.course import LOOKS, VARIANTS, Look
 
 @pytest.mark.parametrize("world", LOOKS)
 def test_a_random_look_stays_in_its_ranges(world: str) -> None:
-    """Random looks stay within the documented ranges."""
     usual = Look.of(world)
     for seed in range(200):
         look = Look.random(world, np.random.default_rng(seed))

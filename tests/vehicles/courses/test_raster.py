@@ -28,7 +28,6 @@ def _ring(*obstacles: Obstacle) -> Course:
 
 
 def test_the_lane_is_free_and_the_rest_blocked() -> None:
-    """The free cells cover the lane."""
     blocked, (x0, y0) = occupancy(_ring(), 0.1)
     rows, columns = np.nonzero(~blocked)
     assert len(rows) * 0.01 == pytest.approx(36.0 - 4.0, rel=0.04)
@@ -48,7 +47,6 @@ def test_the_lane_is_free_and_the_rest_blocked() -> None:
     ],
 )
 def test_obstacles_are_blocked(obstacle: Obstacle, area: float) -> None:
-    """The blocked cells cover the obstacle."""
     empty, (x0, y0) = occupancy(_ring(), 0.02)
     full, _ = occupancy(_ring(obstacle), 0.02)
     rows, columns = np.nonzero(full & ~empty)

@@ -39,7 +39,6 @@ def test_long_walls_are_split(length: float, columns: int) -> None:
 
 
 def test_texture_coordinates_are_continuous() -> None:
-    """Texture coordinates are continuous across the quads of a wall."""
     wall = Wall((0.0, 0.0), (6.0, 0.0), 0.9, "brick")
     corners, uvs, _ = pieces(with_walls(square("corridor"), wall), "brick")
     u = (6.0 - corners[..., 0]) / 1.2
@@ -63,7 +62,6 @@ def test_light_varies_along_a_long_wall() -> None:
 
 
 def test_a_door_is_one_texture_with_plaster_above() -> None:
-    """A door's texture covers 2.1 m, with plaster above it."""
     door = Wall((0.0, 0.0), (1.02, 0.0), 2.5, "door")
     course = with_walls(square("corridor"), door)
     corners, uvs, _ = pieces(course, "door")

@@ -64,7 +64,6 @@ def test_an_unknown_texture_is_refused() -> None:
 
 
 def test_clouds_have_mean_0_and_deviation_1() -> None:
-    """The mean is 0 and the standard deviation 1."""
     field = clouds(np.random.default_rng(0), 64, 96, 4, 6)
     assert field.shape == (64, 96)
     assert field.mean() == pytest.approx(0.0, abs=1e-5)

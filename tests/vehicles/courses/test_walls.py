@@ -52,7 +52,6 @@ def test_long_walls_of_a_corridor_are_split_by_panels(seed: int) -> None:
 
 
 def test_banks_are_split_into_pieces_of_their_kind() -> None:
-    """Banks are closed runs of pieces with the length of their kind."""
     angle = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
     route = 10.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     kinds = (

@@ -26,7 +26,6 @@ def test_training_and_held_out_courses_are_disjoint(name: Any, seeds: range) -> 
 
 
 def test_hold_out_draws_held_out_courses_only() -> None:
-    """After `hold_out`, only held-out courses are drawn, also with given courses."""
     for courses in ("training", "held-out", (3, 4)):
         draw = CourseSampler(courses, randomise=False)
         draw.hold_out()
@@ -35,7 +34,6 @@ def test_hold_out_draws_held_out_courses_only() -> None:
 
 
 def test_given_courses_are_drawn() -> None:
-    """All given courses are drawn, and no others."""
     draw = CourseSampler((7, np.int64(9), 8), randomise=False)
     assert set(_courses(draw)) == {7, 8, 9}
     assert draw.first == 7

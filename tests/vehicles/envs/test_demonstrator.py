@@ -35,7 +35,6 @@ def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
 
 
 def test_mistakes_follow_from_the_seed() -> None:
-    """Mistakes are a function of seed and episode."""
     shown: list[list[list[float]]] = []
     with closing(VehicleEnv("car", image=False)) as env:
         for seed in (1, 1, 2):

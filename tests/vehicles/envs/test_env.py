@@ -113,7 +113,6 @@ def _into_the_wall(env: VehicleEnv) -> tuple[float, dict[str, Any], bool]:
 
 
 def test_a_collision_ends_the_episode() -> None:
-    """A collision ends the episode with the weight of the profile or the argument."""
     for weight, arguments in ((-10.0, {}), (-3.0, {"reward": {"collision": -3.0}})):
         with closing(_car(**arguments)) as env:
             reward, info, terminated = _into_the_wall(env)
@@ -124,7 +123,6 @@ def test_a_collision_ends_the_episode() -> None:
 
 
 def test_put_back_continues_the_episode() -> None:
-    """With `put_back` the episode continues, and further collisions count."""
     with closing(_car(put_back=True)) as env:
         env.reset(seed=1)
         found = 0
@@ -149,7 +147,6 @@ def test_layouts_match_the_spaces() -> None:
 
 
 def test_bang_steering_has_three_angles() -> None:
-    """Steering "bang" has three angles."""
     for steering, applied in (("bang", 1.0), ("proportional", 0.5)):
         with closing(_car(steering=steering)) as env:
             env.reset(seed=1)
@@ -194,7 +191,6 @@ def test_invalid_steps_are_refused() -> None:
 
 
 def test_a_blocked_start_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A start in contact with an obstacle is refused."""
     with closing(_car()) as env:
         wall = env.world.course.walls[0]
         middle = (np.array(wall.start) + np.array(wall.end)) / 2.0
@@ -240,7 +236,6 @@ def test_invalid_arguments_are_refused(
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_observations_can_have_image_and_state() -> None:
-    """`image`, `state` and `size` select the observation."""
     with closing(VehicleEnv("car", size=(48, 32))) as env:
         seen, _ = env.reset(seed=1)
         assert seen.shape == (32, 48, 3)
@@ -271,7 +266,6 @@ def test_render_shows_the_cameras_picture() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_random_looks_follow_from_the_seed() -> None:
-    """Random looks are a function of the seed."""
     with closing(VehicleEnv("car", size=(48, 32), randomise=True)) as env:
         asked = {"course": 2, "start": 2}
         one, two, again = (env.reset(seed=seed, options=asked)[0] for seed in (1, 2, 1))

@@ -67,7 +67,6 @@ def test_distances_are_those_to_the_walls() -> None:
 
 
 def test_a_collision_costs_and_ends_the_episode() -> None:
-    """Collisions cost and end the episode, unless `put_back`."""
     ahead = np.array([0.0, 1.0], np.float32)
     with closing(RangesEnv("car")) as env:
         env.reset(options=_COURSE)
@@ -114,7 +113,6 @@ def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
 
 
 def test_standing_still_costs() -> None:
-    """Standing still has a negative reward."""
     with closing(RangesEnv("tank")) as env:
         env.reset(options=_COURSE)
         total = sum(env.step(np.zeros(2, np.float32))[1] for _ in range(20))

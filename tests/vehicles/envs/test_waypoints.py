@@ -178,7 +178,6 @@ def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_profiles_have_the_simulated_cameras(vehicle: str) -> None:
-    """The camera of each profile agrees with that of its body."""
     camera = load_profile(find_profile(f"lab-{vehicle}")).camera
     mount = vehicle_model(vehicle).camera
     assert camera is not None
@@ -213,7 +212,6 @@ def test_sensed_waypoints_without_the_sensors_are_refused(
 
 
 def test_the_measured_response_matches_the_geometry() -> None:
-    """The measured response of the car is close to its geometry."""
     with closing(RangesEnv("car", put_back=True)) as env:
         places = env.observation_layout.slices
         found = measure_response(env, places["speed"].start, places["yaw_rate"].start)
@@ -226,7 +224,6 @@ def test_the_measured_response_matches_the_geometry() -> None:
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize(("env_id", "vehicle"), [(i, v) for i, (v, _) in WAYPOINT_ENVS.items()])
 def test_following_true_waypoints_has_no_collisions(env_id: str, vehicle: str) -> None:
-    """Following the expert's waypoints causes no collisions."""
     with closing(WaypointEnv(vehicle, put_back=True)) as env:
         seen, _ = env.reset(options=_COURSE)
         assert env.observation_space.contains(seen)

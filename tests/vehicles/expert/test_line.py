@@ -62,7 +62,6 @@ def test_progress_counts_laps_and_counts_down() -> None:
 
 
 def test_standing_still_makes_no_progress() -> None:
-    """A vehicle at rest makes no progress."""
     course = ring(1)
     progress = CourseProgress(course)
     x, y = course.route[7]

@@ -63,7 +63,6 @@ def test_a_path_can_be_driven(vehicle: str) -> None:
 
 
 def test_planning_twice_gives_the_same_path() -> None:
-    """Planning is deterministic."""
     first, second = (plan_path(ring(3), 0.1, 0.12) for _ in range(2))
     np.testing.assert_array_equal(first.points, second.points)
 
@@ -124,7 +123,6 @@ def test_other_courses_keep_the_whole_clearance() -> None:
 
 
 def test_stations_wrap_around() -> None:
-    """Stations beyond the length wrap around."""
     path = plan_path(ring(5), 0.1, 0.12)
     assert path.at(3.0 + path.length) == pytest.approx(path.at(3.0))
     spot = path.nearest(*path.at(4.0), hint=3.0)

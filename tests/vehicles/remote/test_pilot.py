@@ -130,7 +130,6 @@ def test_serving_refuses_other_policies(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Before anything is served."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     path = (student.parent if name.endswith(".onnx") else tmp_path) / name
     (tmp_path / "student.safetensors").touch()

@@ -24,7 +24,6 @@ PURPOSE = b"shapechanger link 1"
 
 
 def key_bytes(text: str) -> bytes:
-    """Return the 16 bytes of a key."""
     return base64.b32decode(text.strip().replace("-", "") + "======")
 
 
@@ -196,7 +195,6 @@ class Stranger:
         return {}
 
     def send(self, kind: str, **fields: Any) -> None:
-        """Send a message."""
         self.write(frame(msgspec.msgpack.encode({"kind": kind, **fields})))
 
     def expect(self, kind: str) -> dict[str, Any]:

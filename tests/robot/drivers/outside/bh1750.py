@@ -49,7 +49,6 @@ class Bh1750:
         return {f"{self._name}/light": (high << 8 | low) / _COUNTS_PER_LUX}
 
     def close(self) -> None:
-        """Close the bus."""
         self._bus.close()
 
 

@@ -145,7 +145,6 @@ def test_a_non_finite_tension_changes_no_goal(wrong: float) -> None:
 
 
 def test_missing_and_unknown_tendons_are_refused() -> None:
-    """A missing and an unknown tendon raise errors."""
     rig = Rig().start()
     with pytest.raises(RobotError, match="no tension for EIP, EDC"):
         rig.bus.send(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0))

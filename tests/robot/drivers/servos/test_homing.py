@@ -56,7 +56,6 @@ def test_homing_times_out() -> None:
 
 
 def test_a_fault_ends_homing() -> None:
-    """Homing fails with the message of the fault."""
     rig = Rig()
     rig.bus.set_up()
     rig.bus.hold()

@@ -84,7 +84,6 @@ def test_the_temperature_rises_with_the_square_of_the_current() -> None:
 
 
 def test_a_lower_supply_voltage_lowers_the_top_speed() -> None:
-    """A drop of the supply voltage lowers the no-load speed."""
     speeds: list[float] = []
     for volts in (5.0, 2.5):
         motor = SimulatedMotor(MODELS["XL330-M077"], Tendon(snapped=True))

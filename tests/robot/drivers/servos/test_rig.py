@@ -50,7 +50,6 @@ def test_an_unknown_id_gets_no_reply() -> None:
 
 
 def test_a_mute_servo_silences_those_after_it_in_a_sync_read() -> None:
-    """In a sync read, each servo waits for the reply of the one before it."""
     line = _line(3)
     line.servos[2].mute = True
     assert instruct(line, 0xFE, 0x82, b"\x40\x00\x01\x00\x01\x02\x03") == {1: ServoReply(0, b"\0")}
@@ -85,7 +84,6 @@ def test_eeprom_is_locked_while_torque_is_on() -> None:
 
 
 def test_a_goal_beyond_the_current_limit_is_refused() -> None:
-    """Goals beyond the current limit are refused in both directions; the limit is accepted."""
     line = _line()
     assert _write(line, 11, 0) == 0
     assert _write(line, 38, 100, 2) == 0

@@ -49,7 +49,6 @@ def test_what_a_bus_cannot_do_is_refused(changes: dict[str, Any], key: str, word
 
 
 def test_the_watchdog_is_on_by_default() -> None:
-    """The default watchdog is 100 ms."""
     assert BusSettings(device="x", servos=(servo("FDP"),)).watchdog_ms == 100
 
 
@@ -66,7 +65,6 @@ def test_the_watchdog_is_on_by_default() -> None:
     ],
 )
 def test_what_a_feetech_servo_cannot_do_is_refused(changes: dict[str, Any], words: str) -> None:
-    """What a Feetech servo cannot do is refused in one sentence that says why."""
     with pytest.raises(KeyMistake, match=words) as caught:
         feetech("FDP", **changes)
     assert caught.value.key in changes

@@ -49,7 +49,6 @@ def test_goals_stay_between_zero_and_the_cap(one: ServoSettings, tension: float)
 
 @given(one=_servos(), share=st.floats(0.0, 1.0))
 def test_a_tension_is_rounded_down_by_less_than_a_count(one: ServoSettings, share: float) -> None:
-    """Tensions are rounded toward slack, by less than one count."""
     wanted = share * one.most_counts * one.newton_per_goal
     got = abs(one.goal_count(wanted)) * one.newton_per_goal
     assert got <= wanted + 1e-6

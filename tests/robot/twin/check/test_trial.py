@@ -79,7 +79,6 @@ def test_a_probe_is_asked_first(bench: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_nobody_sees_the_stop(bench: Any) -> None:
-    """It is no stop in time."""
     result = Trial(bench).run(_fault(bench.events))
     assert math.isnan(result.stopped_ms)
     assert not result.kept
