@@ -12,7 +12,7 @@ PACKAGE: Final = Path(shapechanger.__file__).parent
 # The validity of a certificate and the day of a recording or a report are calendar dates.
 MAY: Final = {
     PACKAGE / "robot" / part
-    for part in ("check/report.py", "daemon/credentials.py", "daemon/recorder.py")
+    for part in ("check/check.py", "daemon/credentials.py", "daemon/recorder.py")
 }
 WALL: Final = {
     "time.time",
@@ -27,7 +27,9 @@ WALL: Final = {
     "date.today",
 }
 FILES: Final = [
-    path for part in ("robot", "link", "twin", "remote") for path in (PACKAGE / part).rglob("*.py")
+    path
+    for place in ("robot/**/*.py", "*/remote.py", "*/remote/*.py", "*/twin.py")
+    for path in PACKAGE.glob(place)
 ]
 
 
