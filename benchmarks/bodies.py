@@ -11,7 +11,7 @@ from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from benchmarks.row import Row
 from shapechanger.envs.ant import ANT
 from shapechanger.morphology import compile_body
-from shapechanger.morphology.effective import fingerprint
+from shapechanger.morphology.certificate import fingerprint
 
 ROUNDS = 30
 

@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any, Final
 from shapechanger.envs.catalogue import register_all
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.registry import LEARNERS, METHODS, POLICIES, ROBOTS
+from shapechanger.registry import LEARNERS, METHODS, MODELS, POLICIES, ROBOTS
 
 if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
@@ -183,6 +183,7 @@ LEARNERS.ship(
         "cloning": "vehicles.cloning:CloningSettings",
     }
 )
+MODELS.ship({"mujoco": "morphology.certificate.changes:ModelNumbers"})
 POLICIES.ship(
     {
         "trained": "transfer.learners.policy_file:TrainedPolicy.load",

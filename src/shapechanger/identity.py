@@ -11,7 +11,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import msgspec
 
@@ -23,6 +23,7 @@ from shapechanger.own_modules import (
     own_modules,
     texts_in,
 )
+from shapechanger.registry import MODELS
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -37,7 +38,7 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     """Version of an env, a method or a learner.
 
     Attributes:
-        model: Fingerprint of its compiled model, see `shapechanger.morphology.effective`; empty
+        model: Fingerprint of its compiled model, see `shapechanger.morphology.certificate`; empty
             without one.
         sensed: The same of what decides no motion and may be observed: sensors, keyframes, sites
             and, where frames are observed, all that is drawn.
@@ -112,16 +113,9 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
     if type(model).__module__.partition(".")[0] != "mujoco" or type(model).__name__ != "MjModel":
         files = own_modules(names) | dict(_files(arguments, ()))
         return IdentifiedEnv(Identity(files=files), b"")
-    from shapechanger.morphology.effective.model import digest_of, effective_model
-    from shapechanger.morphology.effective.sensed import sensed_model
-
-    moved = effective_model(cast("Any", model)).sections
-    sensed = sensed_model(cast("Any", model), drawn=_sees(env.observation_space)).sections
+    moved, sensed, numbers = MODELS.load("mujoco").read(model, drawn=_sees(env.observation_space))
     files = own_modules(names) | dict(_files(arguments, _MODEL_FILES))
-    return IdentifiedEnv(
-        Identity(digest_of(moved), digest_of(sensed), files),
-        msgspec.msgpack.encode({"moved": moved, "sensed": sensed}),
-    )
+    return IdentifiedEnv(Identity(moved, sensed, files), numbers)
 
 
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:
@@ -144,23 +138,7 @@ def model_changes(old: bytes, new: bytes) -> tuple[str, ...]:
     Raises:
         msgspec.MsgspecError: If they are not such numbers.
     """
-    from shapechanger.morphology.certificate.changes import compare_effective, grouped
-    from shapechanger.morphology.effective.model import EffectiveModel
-
-    kind: Any = dict[str, tuple[tuple[str, Any], ...]]
-    both = [
-        {name: EffectiveModel(_tuples(sections)) for name, sections in decoded.items()}
-        for decoded in (msgspec.msgpack.decode(each, type=kind) for each in (old, new))
-    ]
-    moved = compare_effective(both[0]["moved"], both[1]["moved"])
-    # A geom that moves differently also lies differently.
-    found = moved or compare_effective(both[0]["sensed"], both[1]["sensed"], derived=False)
-    return tuple(change.sentence for change in grouped(found))
-
-
-def _tuples(value: Any) -> Any:
-    """Return decoded sections with tuples in place of lists, as an effective model has them."""
-    return tuple(map(_tuples, cast("list[Any]", value))) if isinstance(value, list) else value
+    return MODELS.load("mujoco").changes(old, new)
 
 
 def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[tuple[str, str]]:

@@ -108,3 +108,5 @@ POLICIES: Final[Registry[Any]] = Registry("kind of policy", "shapechanger.polici
 
 ROBOTS: Final[Registry[Any]] = Registry("reader of robots", "shapechanger.robots")
 """Functions that read what a simulation needs of a robot: numbers only, so that none imports it."""
+MODELS: Final[Registry[Any]] = Registry("kind of model", "shapechanger.models")
+"""Readers of what decides how a model moves, by the library that it is of."""

@@ -40,7 +40,7 @@ from shapechanger.morphology import (
     interpolate,
     to_json,
 )
-from shapechanger.morphology.effective import fingerprint
+from shapechanger.morphology.certificate import fingerprint
 from shapechanger.morphology.families import BodyLike
 
 _BIG = (Stretch("shank_*", 2.0),)

@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.envs import CATALOGUE, find
 from shapechanger.errors import UnknownName
-from shapechanger.morphology.effective import fingerprint
+from shapechanger.morphology.certificate import fingerprint
 
 
 def _model(env_id: str, **arguments: Any) -> Any:

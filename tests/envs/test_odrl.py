@@ -20,7 +20,7 @@ from shapechanger.envs.ant import ANT
 from shapechanger.envs.catalogue import ODRL_ENVS
 from shapechanger.envs.runners import HALF_CHEETAH, HOPPER, WALKER2D
 from shapechanger.morphology import compile_body
-from shapechanger.morphology.effective import fingerprint
+from shapechanger.morphology.certificate import fingerprint
 from shapechanger.morphology.families import Family
 from tests.morphology.models import capsule_inertia, capsule_mass
 

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.stepping.watch import ModelWatch, forget_steps
-from shapechanger.morphology.effective.contacts import (
+from shapechanger.morphology.certificate.contacts import (
     colliding_pairs,
     geoms_of_pairs,
     mixed_parameters,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shapechanger.morphology.certificate.certify import Certificate, certify
-from shapechanger.morphology.certificate.changes import Change, compare
+from shapechanger.morphology.certificate.changes import Change, compare, fingerprint
 from shapechanger.morphology.certificate.consistency import inconsistencies
 from shapechanger.morphology.certificate.rollout import Certifiable, Rollout, Wrapped
 
@@ -15,5 +15,6 @@ __all__ = [
     "Wrapped",
     "certify",
     "compare",
+    "fingerprint",
     "inconsistencies",
 ]

@@ -17,6 +17,7 @@ from shapechanger.morphology.certificate.changes import (
     Change,
     compare,
     differ_in_names,
+    fingerprint,
     grouped,
 )
 from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
@@ -27,7 +28,6 @@ from shapechanger.morphology.certificate.rollout import (
     attribute,
     compare_rollouts,
 )
-from shapechanger.morphology.effective import fingerprint
 from shapechanger.own_modules import modules_of_env, own_modules
 
 

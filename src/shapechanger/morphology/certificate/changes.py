@@ -1,53 +1,47 @@
-"""The differences between two models, each in numbers and in a sentence."""
+"""The differences between two models, each in numbers and in a sentence, and their fingerprints."""
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final
 
 import msgspec
 import mujoco
 
-from shapechanger.morphology.effective.elements import (
-    ROUNDING,
-    margin,
-    names_of,
-    scales,
-    words,
+from shapechanger.morphology.certificate.fields import (
+    MOVED,
+    SENSED,
+    Field,
+    Numbers,
+    Values,
 )
-from shapechanger.morphology.effective.model import EffectiveModel, effective_model
-
-if TYPE_CHECKING:
-    from shapechanger.morphology.effective.elements import Value
+from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
 
 Amount = float | str | tuple[float | str, ...] | None
 """A number, a word, some of them, or None for what is not there."""
 
-# A change of one of these is of the element as a whole, which only one model has.
-_ONE_OF: Final = {
-    "bodies": "body",
-    "joints": "joint",
-    "geoms": "geom",
-    "sites": "site",
-    "contacts": "contact",
-    "actuators": "actuator",
-    "tendons": "tendon",
-    "equalities": "equality constraint",
-    "flexes": "flex",
-    "plugins": "plugin",
-    # Of what decides no motion.
-    "places": "geom",
-    "marks": "site",
-    "sensors": "sensor",
-    "keyframes": "keyframe",
-    "custom": "custom number",
-    "cameras": "camera",
-    "drawing": "drawing",
+ROUNDING: Final = 1e-9
+"""Part of a field's largest number up to which two numbers are equal. Writing out a total mass,
+another order of a sum and another processor change the last bits, and constants that MuJoCo derives
+lose more."""
+_NOISE: Final = 1e-14
+"""The same, as a part of the largest number of this field in the whole model: a zero that was
+computed, as by turning a frame, is not zero."""
+_ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `ROUNDING` at most.
+# 64 bits: the chance that two of a million different models collide is 1 in 37 million.
+_HEX_DIGITS: Final = 16
+
+_KINDS: Final = MOVED | SENSED
+_FIELDS: Final = {
+    (section, field.quantity): field for section, kind in _KINDS.items() for field in kind.fields
 }
+_TITLES: Final = frozenset(kind.title for kind in _KINDS.values())
 # Quantities whose ratios mean nothing.
 _WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
 _DIGITS: Final = (4, 8, 17)
+_ROUND: Final = ("capsule", "cylinder")
 
 
 class Change(msgspec.Struct, frozen=True):
@@ -121,12 +115,10 @@ def _plain(values: Sequence[float | str] | None) -> Amount:
 def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
     """Format the part of a sentence after the name of the element."""
     suffix = f" {unit}" if unit not in ("", "1") else ""
-    if quantity in _ONE_OF.values():
+    if quantity in _TITLES:
         there = before if after is None else after
-        return (
-            f"{quantity} {'removed' if after is None else 'added'} "
-            f"({_shown(there, _DIGITS[0])}{suffix})"
-        )
+        done = "removed" if after is None else "added"
+        return f"{quantity} {done} ({_shown(there, _DIGITS[0])}{suffix})"
     old, new = "", ""
     for digits in _DIGITS:  # As many digits as it takes to tell the two apart.
         old, new = _shown(before, digits), _shown(after, digits)
@@ -140,14 +132,16 @@ def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
 
 def _shown(amount: Amount, digits: int) -> str:
     """Format an amount with so many significant digits; equal numbers of a list are shown once."""
-    if amount is None:
-        return "none"
     if not isinstance(amount, tuple):
-        return amount if isinstance(amount, str) else f"{amount:.{digits}g}"
-    texts = [_shown(value, digits) for value in amount]
+        return "none" if amount is None else _one(amount, digits)
+    texts = [_one(value, digits) for value in amount]
     if not texts:
         return "none"
     return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
+
+
+def _one(value: float | str, digits: int) -> str:
+    return value if isinstance(value, str) else f"{value:.{digits}g}"
 
 
 def _ratio(before: Amount, after: Amount) -> float | None:
@@ -167,53 +161,13 @@ def _ratio(before: Amount, after: Amount) -> float | None:
     return ratios[0] if ratios and same else None
 
 
-_Fields = dict[str, tuple["Value", ...]]
-
-# The field that describes an element that only one model has; its type otherwise.
-_DESCRIBED_BY: Final = {"bodies": "mass", "contacts": "contact dimension", "actuators": "target"}
-_UNITS: Final = {
-    "mass": "kg",
-    "inertia": "kg·m²",
-    "position": "m",
-    "centre of mass": "m",
-    "anchor": "m",
-    "size": "m",
-    "gravity": "m/s²",
-    "timestep": "s",
-    "density": "kg/m³",
-    "viscosity": "Pa·s",
-    "wind": "m/s",
-    "contact friction": "1",
-    "contact margin": "m",
-    "contact gap": "m",
-    "contact adhesion": "N",
-    "gear": "1",
-    "crank length": "m",
-    "delay": "s",
-    "dimensions": "1",
-}
-# Units of a joint that slides and of one that turns.
-_JOINT_UNITS: Final = {
-    "joint range": ("m", "deg"),
-    "limit margin": ("m", "rad"),
-    "rest position": ("m", "rad"),
-    "spring reference": ("m", "rad"),
-    "stiffness": ("N/m", "N·m/rad"),
-    "damping": ("N·s/m", "N·m·s/rad"),
-    "armature": ("kg", "kg·m²"),
-    "friction loss": ("N", "N·m"),
-    "actuator force range": ("N", "N·m"),
-}
-_ROUND: Final = frozenset(("capsule", "cylinder"))
-
-
 def compare(
     source: mujoco.MjModel,
     target: mujoco.MjModel,
     *,
     standing_height: tuple[float | None, float | None] = (None, None),
 ) -> tuple[Change, ...]:
-    """Return the differences between the effective models of two models.
+    """Return the differences between two models that decide their motion.
 
     Args:
         source: The model that a policy is trained on.
@@ -224,78 +178,117 @@ def compare(
         The changes, empty for models that move equally, whatever their elements are called:
         standing height, dimensions and total mass first, then element by element.
     """
-    one, two = effective_model(source), effective_model(target)
     changes: list[Change] = []
     before, after = standing_height
-    if before is not None and after is not None and not _equal((before,), (after,), 0.0):
+    if before is not None and after is not None and not _equal((before,), (after,)):
         changes.append(change("standing height", "robot", (before,), (after,), "m"))
-    if _alike(one, two):
+    one, two = moved_numbers(source), moved_numbers(target)
+    found = differences(one, two)
+    if found and names_of(source) != names_of(target):
+        unnamed = [moved_numbers(model, anonymous=True) for model in (source, target)]
+        found = found if differences(*unnamed) else ()
+    if not found:
         return tuple(changes)
-    if names_of(source) != names_of(target):
-        unnamed = (effective_model(model, anonymous=True) for model in (source, target))
-        if _alike(*unnamed):
-            return tuple(changes)
     changes += _totals(source, target)
     changes += _lengths(source, target, one, two)
-    return (*changes, *compare_effective(one, two, derived=not changes, sizes=False))
+    if found[0].quantity == "derived constant" and changes:
+        return tuple(changes)
+    # `_lengths` says what the sizes of round geoms would.
+    return (*changes, *(item for item in found if not _is_round(item, one, two)))
 
 
-def compare_effective(
-    one: EffectiveModel, two: EffectiveModel, *, derived: bool = True, sizes: bool = True
-) -> tuple[Change, ...]:
-    """Return the differences between two effective models, element by element.
+def _is_round(item: Change, one: Numbers, two: Numbers) -> bool:
+    """Return whether a change is of the sizes of a capsule or cylinder."""
+    geoms = [numbers["geoms"].get(item.element, {}) for numbers in (one, two)]
+    types = {geom.get("type", ("",))[0] for geom in geoms}
+    return item.quantity == "size" and len(types) == 1 and types <= set(_ROUND)
 
-    Args:
-        one: The source's.
-        two: The target's.
-        derived: Whether derived constants count if nothing else differs.
-        sizes: Whether the sizes of capsules and cylinders count, which `compare` reports as lengths
-            and radii.
+
+def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
+    """Return the differences of the numbers of two models, element by element.
+
+    Constants that MuJoCo derives count if nothing else differs.
     """
     found: list[Change] = []
-    for section, _ in one.sections:
+    for section in one:
         if section != "derived":
-            found += _section(section, one, two, sizes)
-    if derived and not found:
-        old, new = one["derived"], two["derived"]
+            found += _section(section, one[section], two[section])
+    if not found and "derived" in one:
+        pairs = {
+            name: (old["values"], two["derived"][name]["values"])
+            for name, old in one["derived"].items()
+        }
         found = [
-            change("derived constant", name, old[name]["values"], new[name]["values"])
-            for name in old
-            if not _equal(old[name]["values"], new[name]["values"], 0.0)
+            change("derived constant", name, *pair)
+            for name, pair in pairs.items()
+            if not _equal(*pair)
         ]
     return tuple(found)
 
 
 def differ_in_names(source: mujoco.MjModel, target: mujoco.MjModel) -> bool:
     """Return whether two models that move equally call something that decides it differently."""
-    return not _alike(effective_model(source), effective_model(target))
+    return bool(differences(moved_numbers(source), moved_numbers(target)))
 
 
-def _alike(one: EffectiveModel, two: EffectiveModel) -> bool:
-    """Return whether two effective models agree up to rounding."""
-    return not compare_effective(one, two)
+def _section(
+    section: str, before: dict[str, dict[str, Values]], after: dict[str, dict[str, Values]]
+) -> list[Change]:
+    """Return the differences within one section."""
+    found: list[Change] = []
+    kind, scales = _KINDS[section], _scales(before, after)
+    for element in dict.fromkeys((*before, *after)):
+        old, new = before.get(element), after.get(element)
+        if old is None or new is None:
+            field = _FIELDS.get((section, kind.described_by))
+            there, then = (
+                None if fields is None else fields.get(kind.described_by, ("there",))
+                for fields in (old, new)
+            )
+            unit = field.unit if field and isinstance(field.unit, str) else ""
+            found.append(change(kind.title, element, there, then, unit))
+            continue
+        found += [
+            _difference(section, element, quantity, old, new)
+            for quantity in dict.fromkeys((*old, *new))
+            if not _equal(old.get(quantity), new.get(quantity), scales[quantity])
+        ]
+    shared = [
+        [name for name in names if name in other]
+        for names, other in ((before, after), (after, before))
+    ]
+    if shared[0] != shared[1]:
+        found.append(change("order", section, *shared))
+    return found
 
 
-def _equal(before: tuple[Value, ...] | None, after: tuple[Value, ...] | None, scale: float) -> bool:
-    """Return whether the values of a field agree up to rounding.
-
-    Args:
-        before: Values before.
-        after: Values after.
-        scale: Largest number of this field in both models; 0 if it has no other elements.
-    """
-    if before is None or after is None or len(before) != len(after):
-        return before == after
-    limit = margin((*before, *after), scale)
-    return all(
-        old == new
-        or (
-            not isinstance(old, str)
-            and not isinstance(new, str)
-            and (abs(old - new) <= limit or (math.isnan(old) and math.isnan(new)))
+def _difference(
+    section: str, element: str, quantity: str, before: dict[str, Values], after: dict[str, Values]
+) -> Change:
+    """Describe one field that differs, in its usual unit."""
+    field = _FIELDS.get((section, quantity), Field(quantity, ""))
+    old, new, unit = before.get(quantity), after.get(quantity), field.unit
+    if field.padded and old is not None and new is not None:
+        count = max(len(_stripped(old)), len(_stripped(new)), 1)
+        old, new = old[:count], new[:count]
+    if isinstance(unit, tuple):
+        sliding, turning = unit
+        kinds = {"slide": sliding, "hinge": turning, "ball": turning}
+        unit = kinds.get(str(before["type"][0]), "")
+    if unit == "deg":
+        old, new = (
+            None if values is None else tuple(math.degrees(float(value)) for value in values)
+            for values in (old, new)
         )
-        for old, new in zip(before, after, strict=True)
-    )
+    return change(quantity, element, old, new, unit)
+
+
+def _stripped(values: Values) -> Values:
+    """Return values without the zeros at their end."""
+    count = len(values)
+    while count and values[count - 1] == 0.0:
+        count -= 1
+    return values[:count]
 
 
 def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
@@ -313,111 +306,146 @@ def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
     return found
 
 
-def _section(section: str, one: EffectiveModel, two: EffectiveModel, sizes: bool) -> list[Change]:
-    """Return the differences within one section."""
-    found: list[Change] = []
-    before, after = one[section], two[section]
-    scale = scales((*dict(one.sections)[section], *dict(two.sections)[section]))
-    for element in dict.fromkeys((*before, *after)):
-        old, new = before.get(element), after.get(element)
-        if old is None or new is None:
-            field = _DESCRIBED_BY.get(section, "type")
-            there, then = (
-                None if fields is None else fields.get(field, ("there",)) for fields in (old, new)
-            )
-            unit = _UNITS[field] if section == "bodies" else ""
-            found.append(change(_ONE_OF[section], element, there, then, unit))
-            continue
-        kinds = {*old.get("type", ()), *new.get("type", ())}
-        has_length = not sizes and section == "geoms" and len(kinds) == 1 and kinds <= _ROUND
-        found += [
-            _difference(section, element, field, old, new)
-            for field in dict.fromkeys((*old, *new))
-            if not _equal(old.get(field), new.get(field), scale[field])
-            and not (has_length and field == "size")  # `_lengths` reports it.
-        ]
-    shared_before = [name for name in before if name in after]
-    shared_after = [name for name in after if name in before]
-    if shared_before != shared_after:
-        found.append(change("order", section, shared_before, shared_after))
-    return found
-
-
-def _difference(section: str, element: str, field: str, before: _Fields, after: _Fields) -> Change:
-    """Describe one field that differs, in its usual unit."""
-    old, new = before.get(field), after.get(field)
-    unit = _UNITS.get(field, "")
-    if section == "joints" and field in _JOINT_UNITS:
-        (kind,) = before["type"]
-        sliding, turning = _JOINT_UNITS[field]
-        unit = {"slide": sliding, "hinge": turning, "ball": turning}.get(str(kind), "")
-        if unit == "deg":
-            old, new = _in_degrees(old), _in_degrees(new)
-    elif section == "tendons":
-        unit = ""  # A fixed tendon adds lengths and angles as the model pleases.
-    return change(field, element, old, new, unit)
-
-
-def _in_degrees(angles: tuple[Value, ...] | None) -> tuple[float, ...] | None:
-    """Convert angles to degrees; None stays None."""
-    return None if angles is None else tuple(math.degrees(float(angle)) for angle in angles)
-
-
-class _Segment(NamedTuple):
-    """A capsule or cylinder; its length is without the caps.
-
-    Attributes:
-        body: Name of its body.
-        label: Name of the body if the geom is the body's only one; else of the geom.
-        kind: "capsule" or "cylinder".
-        radius: Radius, m.
-        length: Length, m.
-    """
-
-    body: str
-    label: str
-    kind: str
-    radius: float
-    length: float
-
-
 def _lengths(
-    source: mujoco.MjModel, target: mujoco.MjModel, one: EffectiveModel, two: EffectiveModel
+    source: mujoco.MjModel, target: mujoco.MjModel, one: Numbers, two: Numbers
 ) -> list[Change]:
-    """Return the differences of lengths and radii of segments, m.
+    """Return the differences of lengths, without caps, and radii of capsules and cylinders, m.
 
-    A geom that touches nothing is reported only if its body differs.
+    A geom that touches nothing is reported only if its body differs; one that is the only one of
+    its body is called by the name of the body.
     """
-    old_bodies, new_bodies = one["bodies"], two["bodies"]
-    touching = one["geoms"].keys() & two["geoms"].keys()
-    segments = _segments(target)
     found: list[Change] = []
-    for geom, before in _segments(source).items():
-        after = segments.get(geom)
-        if after is None or after.kind != before.kind:
+    before, after = _segments(source), _segments(target)
+    touching = one["geoms"].keys() & two["geoms"].keys()
+    for geom in [geom for geom in before if geom in after]:
+        (kind, body, label, old), (new_kind, _, _, new) = before[geom], after[geom]
+        same_body = one["bodies"].get(body) == two["bodies"].get(body)
+        if kind != new_kind or (geom not in touching and same_body):
             continue
-        if geom not in touching and old_bodies.get(before.body) == new_bodies.get(before.body):
-            continue
-        for quantity in ("length", "radius"):
-            old, new = getattr(before, quantity), getattr(after, quantity)
-            if not _equal((old,), (new,), 0.0):
-                found.append(change(quantity, before.label, (old,), (new,), "m"))
+        for quantity, a, b in (("length", 2.0 * old[1], 2.0 * new[1]), ("radius", old[0], new[0])):
+            if not _equal((a,), (b,)):
+                found.append(change(quantity, label, (a,), (b,), "m"))
     return found
 
 
-def _segments(model: mujoco.MjModel) -> dict[str, _Segment]:
-    """Return the capsules and cylinders of a model by name."""
+def _segments(model: mujoco.MjModel) -> dict[str, tuple[str, str, str, list[float]]]:
+    """Return type, body, label and sizes of each capsule and cylinder by its name."""
     names = names_of(model)
-    found: dict[str, _Segment] = {}
-    for geom, kind, owner, (radius, half_length, _) in zip(
-        names.geoms,
-        words(mujoco.mjtGeom, model.geom_type),
-        map(int, model.geom_bodyid),
-        model.geom_size.tolist(),
-        strict=True,
-    ):
+    found: dict[str, tuple[str, str, str, list[float]]] = {}
+    for i, geom in enumerate(names["geoms"]):
+        kind = mujoco.mjtGeom(model.geom_type[i]).name.partition("_")[2].lower()
         if kind in _ROUND:
-            body = names.bodies[owner]
+            owner = int(model.geom_bodyid[i])
+            body = names["bodies"][owner]
             label = body if model.body_geomnum[owner] == 1 else geom
-            found[geom] = _Segment(body, label, kind, radius, 2.0 * half_length)
+            found[geom] = (kind, body, label, model.geom_size[i].tolist())
     return found
+
+
+def _scales(*sections: dict[str, dict[str, Values]]) -> dict[str, float]:
+    """Return the largest finite number of each field over the elements of some sections."""
+    found: dict[str, float] = {}
+    for section in sections:
+        for fields in section.values():
+            for quantity, values in fields.items():
+                found[quantity] = max(found.get(quantity, 0.0), _largest(values))
+    return found
+
+
+def _largest(values: Iterable[float | str]) -> float:
+    """Return the largest magnitude of the finite numbers; 0 without any."""
+    numbers = [abs(v) for v in values if not isinstance(v, str) and math.isfinite(v)]
+    return max(numbers, default=0.0)
+
+
+def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> bool:
+    """Return whether the values of a field agree up to rounding.
+
+    Args:
+        before: Values before.
+        after: Values after.
+        scale: Largest number of this field in both models; 0 if it has no other elements.
+    """
+    if before == after or before is None or after is None or len(before) != len(after):
+        return before == after
+    limit = max(ROUNDING * _largest((*before, *after)), _NOISE * scale)
+    return all(
+        old == new
+        or (
+            not isinstance(old, str)
+            and not isinstance(new, str)
+            and (abs(old - new) <= limit or (math.isnan(old) and math.isnan(new)))
+        )
+        for old, new in zip(before, after, strict=True)
+    )
+
+
+def fingerprint(model: mujoco.MjModel) -> str:
+    """Return the first 16 hex digits of the SHA-256 of all that decides a model's motion.
+
+    It is the same in every process and on every machine, whose compilers and processors may round
+    differently: numbers count up to rounding. It does not change with colours, cameras, lights, or
+    anything else without effect.
+    """
+    return digest_of(moved_numbers(model))
+
+
+def digest_of(numbers: Numbers) -> str:
+    """Return the first 16 hex digits of the SHA-256 of numbers, which are rounded."""
+    rounded: list[object] = []
+    for section, elements in numbers.items():
+        scales = _scales(elements)
+        for element, fields in elements.items():
+            rounded.append(
+                (section, element, {q: _rounded(v, scales[q]) for q, v in fields.items()})
+            )
+    return hashlib.sha256(msgspec.msgpack.encode(rounded)).hexdigest()[:_HEX_DIGITS]
+
+
+def _rounded(values: Values, scale: float) -> Values:
+    """Round the numbers of a field to as many digits as all machines agree on.
+
+    Args:
+        values: The numbers; words stay as they are.
+        scale: The largest number of this field in the model.
+    """
+    # Slightly more, so that a number just below a power of ten counts as that power.
+    largest = max(_largest(values), _NOISE / 10.0 ** (1 - _ROUNDED_TO) * scale) * (1.0 + ROUNDING)
+    places = _ROUNDED_TO - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
+    return tuple(
+        value if isinstance(value, str) or not math.isfinite(value) else round(value, places) + 0.0
+        for value in values
+    )
+
+
+class ModelNumbers:
+    """Fingerprints and differences of the models of envs, as `shapechanger.identity` asks for."""
+
+    @staticmethod
+    def read(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
+        """Return the fingerprints of what moves and of what is sensed, and the numbers of both.
+
+        Args:
+            model: The compiled model.
+            drawn: Whether frames are observed.
+        """
+        moved, sensed = moved_numbers(model), sensed_numbers(model, drawn=drawn)
+        return digest_of(moved), digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
+
+    @staticmethod
+    def changes(old: bytes, new: bytes) -> tuple[str, ...]:
+        """Return the differences of two models in words.
+
+        Args:
+            old: Numbers of the old model, as MessagePack.
+            new: Numbers of the new one.
+
+        Raises:
+            msgspec.MsgspecError: If they are not such numbers.
+        """
+        (moved, sensed), (new_moved, new_sensed) = (
+            msgspec.msgpack.decode(each, type=tuple[Numbers, Numbers]) for each in (old, new)
+        )
+        # A geom that moves differently also lies differently.
+        found = differences(moved, new_moved) or differences(sensed, new_sensed)
+        return tuple(item.sentence for item in grouped(found))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import mujoco
 import numpy as np
 
-from shapechanger.morphology.effective.elements import Names, named, names_of
+from shapechanger.morphology.certificate.numbers import names_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,9 +76,9 @@ def lone_masses(source: mujoco.MjModel, target: mujoco.MjModel) -> tuple[str, ..
         source: Model before.
         target: Model after, with the same bodies.
     """
-    before = dict(zip(names_of(source).bodies, range(source.nbody), strict=True))
+    before = dict(zip(names_of(source)["bodies"], range(source.nbody), strict=True))
     found: list[str] = []
-    for body, i in zip(names_of(target).bodies, range(target.nbody), strict=True):
+    for body, i in zip(names_of(target)["bodies"], range(target.nbody), strict=True):
         j = before.get(body)
         if j is None or target.body_treeid[i] < 0:
             continue
@@ -92,12 +92,12 @@ def lone_masses(source: mujoco.MjModel, target: mujoco.MjModel) -> tuple[str, ..
     return tuple(found)
 
 
-def _impossible_inertias(model: mujoco.MjModel, names: Names) -> list[str]:
+def _impossible_inertias(model: mujoco.MjModel, names: dict[str, list[str]]) -> list[str]:
     """Find moving bodies with mass whose principal moments no solid body has."""
     found: list[str] = []
     for i in np.flatnonzero((model.body_treeid >= 0) & (model.body_mass > 0.0)).tolist():
         small, middle, large = sorted(model.body_inertia[i].tolist())
-        what = f"{names.bodies[i]}: mass {model.body_mass[i]:.4g} kg"
+        what = f"{names['bodies'][i]}: mass {model.body_mass[i]:.4g} kg"
         if small < 0.0 or (large == 0.0 and model.body_dofnum[i] > 0):
             found.append(f"{what} comes with inertia {small:.3g} kg·m².")
         elif small + middle < large * (1.0 - _TOLERANCE):
@@ -108,20 +108,20 @@ def _impossible_inertias(model: mujoco.MjModel, names: Names) -> list[str]:
     return found
 
 
-def _late_bits(model: mujoco.MjModel, names: Names) -> list[str]:
+def _late_bits(model: mujoco.MjModel, names: dict[str, list[str]]) -> list[str]:
     """Find geoms whose contact bits were set after their body's were compiled."""
     owner = model.geom_bodyid
     late = (model.geom_contype & ~model.body_contype[owner]) | (
         model.geom_conaffinity & ~model.body_conaffinity[owner]
     )
     return [
-        f"{names.geoms[i]}: geom_contype or geom_conaffinity has bits that its body was compiled "
-        "without, so they are ignored. Compile the model again."
+        f"{names['geoms'][i]}: geom_contype or geom_conaffinity has bits that its body was "
+        "compiled without, so they are ignored. Compile the model again."
         for i in np.flatnonzero(late).tolist()
     ]
 
 
-def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:
+def _stale_constants(model: mujoco.MjModel, names: dict[str, list[str]]) -> list[str]:
     """Find arrays that `mj_setConst` would change, each with the element that changes most."""
     fresh = copy.deepcopy(model)
     try:
@@ -129,12 +129,12 @@ def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:
     except mujoco.FatalError as error:
         return [f"MuJoCo cannot derive its constants from the model: {error}."]
     owners = {
-        "body": names.bodies,
-        "dof": named(names.joints, model.dof_jntid),
-        "geom": names.geoms,
-        "site": names.sites,
-        "joint": names.joints,
-        "tendon": names.tendons,
+        "body": names["bodies"],
+        "dof": [names["joints"][joint] for joint in model.dof_jntid.tolist()],
+        "geom": names["geoms"],
+        "site": names["sites"],
+        "joint": names["joints"],
+        "tendon": names["tendons"],
     }
     remedy = "Call mujoco.mj_setConst after writing to a compiled model."
     found: list[str] = []

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import pytest
 
-from shapechanger.morphology.certificate.changes import compare_effective
-from shapechanger.morphology.effective.sensed import sensed_model
+from shapechanger.morphology.certificate.changes import differences
+from shapechanger.morphology.certificate.numbers import sensed_numbers
 
 PLAIN = """<mujoco>
   <asset><texture name="sky" type="skybox" builtin="flat" width="4" height="4"/></asset>
@@ -39,7 +39,7 @@ def test_each_change_counts_where_it_can_be_read(old: str, new: str, drawn: bool
         mujoco.MjModel.from_xml_string(text) for text in (PLAIN, PLAIN.replace(old, new, 1))
     )
     for frames in (False, True):
-        models = sensed_model(one, drawn=frames), sensed_model(two, drawn=frames)
-        assert bool(compare_effective(*models, derived=False)) == (frames or not drawn)
-        again = sensed_model(one, drawn=frames)
-        assert not compare_effective(models[0], again, derived=False)
+        models = sensed_numbers(one, drawn=frames), sensed_numbers(two, drawn=frames)
+        assert bool(differences(*models)) == (frames or not drawn)
+        again = sensed_numbers(one, drawn=frames)
+        assert not differences(models[0], again)

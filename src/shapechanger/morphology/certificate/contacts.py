@@ -16,14 +16,11 @@ Measured, and easy to get wrong:
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-
-from shapechanger.morphology.effective.elements import Names, Rows, Section, is_any
-from shapechanger.morphology.spec.elements import unique_namer
 
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
@@ -32,6 +29,7 @@ _Floats = NDArray[np.float64]
 # For each contact dimension how many of (slide, slide, spin, roll, roll) act.
 _FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
 _SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
+_FLAT: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
 def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
@@ -68,7 +66,7 @@ def _bits_match(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
-    flat = is_any(model.geom_type[pairs], mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+    flat = np.isin(model.geom_type[pairs], _FLAT)
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
     return np.logical_and(~np.all(flat, axis=1), np.any(moving, axis=1))
 
@@ -104,25 +102,14 @@ def geoms_of_pairs(model: mujoco.MjModel, explicit: _Ints) -> _Ints:
     return both[explicit].astype(np.int64)
 
 
-def contacts(model: mujoco.MjModel, names: Names) -> Section:
-    """Return the contacts that can move something, with the parameters that act.
+def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
+    """Return the contacts that can move something, a row each, with the parameters that act.
 
-    A contact is called `floor + left_foot`, its geoms in alphabetical order; a second explicit
-    `<pair>` of the same geoms is another contact, `floor + left_foot (2)`. Its fields are:
-
-    - dimension: 1 without friction, 3 with sliding, 4 with torsional and 6 with rolling friction;
-    - friction: the coefficients that act: slide, slide, spin, roll, roll. Those of sliding are
-      dimensionless, the others are in m;
-    - solref: time constant, s, and damping ratio; or minus stiffness and minus damping;
-    - friction solref: the same for the directions of friction, where it differs;
-    - solimp: impedance at contact, at full width, width, m, midpoint, power;
-    - margin: distance below which the geoms push each other, m;
-    - gap: distance beyond the margin up to which a contact is found, but does not push, m;
-    - adhesion: force with which the contact can pull, N.
-
-    Args:
-        model: The model.
-        names: Names of its elements.
+    Arrays are called as those of explicit pairs, with `contact_` in front: `contact_geoms` (n, 2),
+    `contact_dim`, `contact_friction` (n, 5): slide, slide, spin, roll, roll, 0 where it does not
+    act; `contact_solref`, `contact_solreffriction`, `contact_solimp`, `contact_margin`,
+    `contact_gap` and `contact_adhesion`. `contact_softens` tells whether friction has a solref of
+    its own.
     """
     explicit, dynamic = colliding_pairs(model)
     values = {
@@ -136,29 +123,18 @@ def contacts(model: mujoco.MjModel, names: Names) -> Section:
         values["solimp"][:] = option.o_solimp
         values["margin"][:] = option.o_margin
     dimensions = values["dim"].astype(np.int64)
-    solref = safe_solref(model, values["solref"])
-    friction_solref = safe_solref(model, values["solreffriction"])
-    # Pyramidal cones mix the normal with the friction directions, so only `solref` is used.
-    own = values["solreffriction"].any(axis=1) & (friction_solref != solref).any(axis=1)
-    own &= (dimensions > 1) & (option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
-
-    free = unique_namer((), " ({})")
-    pairs = np.vstack([geoms_of_pairs(model, explicit), dynamic]).tolist()
-    rows = Rows(
-        [free(" + ".join(sorted(names.geoms[int(geom)] for geom in pair))) for pair in pairs]
-    )
-    rows.numbers("contact dimension", dimensions)
+    acting = np.array([_FRICTION_COUNT[dimension] for dimension in dimensions.tolist()], np.int64)
     friction = np.maximum(values["friction"], mujoco.mjMINMU)
-    acting = [_FRICTION_COUNT[dimension] for dimension in dimensions.tolist()]
-    rows.numbers("contact friction", friction, counts=acting)
-    rows.numbers("contact solref", solref)
-    rows.numbers("contact friction solref", friction_solref, own)
-    rows.numbers("contact solimp", values["solimp"])
-    rows.numbers("contact margin", values["margin"])
-    rows.numbers("contact gap", values["gap"])
+    values["friction"] = np.where(np.arange(5) < acting[:, None], friction, 0.0)
+    softness, own = (safe_solref(model, values[name]) for name in ("solref", "solreffriction"))
+    # Pyramidal cones mix the normal with the friction directions, so only `solref` is used.
+    elliptic = option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+    differs = values["solreffriction"].any(axis=1) & (own != softness).any(axis=1)
+    values["softens"] = differs & (dimensions > 1) & elliptic
     # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
-    rows.numbers("contact adhesion", values["adhesion"] * model.flg_adhesion)
-    return rows.section()
+    values["adhesion"] = values["adhesion"] * model.flg_adhesion
+    values["geoms"] = np.vstack([geoms_of_pairs(model, explicit), dynamic])
+    return {f"contact_{name}": array for name, array in values.items()}
 
 
 def mixed_parameters(model: mujoco.MjModel, pairs: _Ints) -> dict[str, _Floats]:
