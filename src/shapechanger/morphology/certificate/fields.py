@@ -311,7 +311,12 @@ _BODY_FIELDS: Final = (
     Field("inertia", "body_inertia", "kg·m²", moving),
     Field("centre of mass", "body_ipos", "m", moving),
     Field("inertia axes", "body_iquat", "", moving),
-    Field("gravity compensation", "body_gravcomp", "", lambda m: moving(m) & m.flg_gravcomp),
+    Field(
+        "gravity compensation",
+        "body_gravcomp",
+        "",
+        lambda m: moving(m) & (m.body_gravcomp != 0.0) & m.flg_gravcomp,
+    ),
     Field("mocap", "body_mocap", "", "body_mocap"),
     Field("sleep policy", "body_sleep_policy", "", _asleep),
 )
