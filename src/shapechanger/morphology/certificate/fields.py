@@ -375,7 +375,7 @@ _FLEX_FIELDS: Final = tuple(
 )
 MOVED: Final = {
     "options": Kind("option", OPTIONS),
-    "sizes": Kind("size", (Field("dimensions", "", "1"),)),
+    "sizes": Kind("model size", (Field("dimensions", "", "1"),)),
     "bodies": Kind("body", _BODY_FIELDS, NAMED["bodies"], "mass"),
     "joints": Kind("joint", _JOINT_FIELDS, NAMED["joints"], in_order=True),
     "geoms": Kind("geom", _GEOM_FIELDS, NAMED["geoms"]),
