@@ -9,6 +9,7 @@ from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.envs.naming import default_learner
 from shapechanger.errors import UnknownName
 from shapechanger.policy import load_policy
+from shapechanger.transfer.identities import ENV, identify, known
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import FOLDER, load_references, reference_of, reference_policy
 
@@ -35,6 +36,7 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     assert policy.card.env == env
     assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
     assert policy.card.learner == reference.learner
+    assert policy.card.identity == known({ENV: identify(env).identity})
     # Those of the pendulums were trained when learners acted in N.
     in_newtons = "Pendulum" in env_id and "Double" not in env_id
     assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)

@@ -10,7 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology.certificate.changes import Change, change, compare, grouped
+from shapechanger.morphology.certificate.changes import (
+    Change,
+    ModelNumbers,
+    change,
+    compare,
+    grouped,
+)
 from shapechanger.morphology.certificate.numbers import moved_numbers
 from tests.morphology.scenes import asset, asset_spec, everything
 
@@ -290,3 +296,24 @@ def test_comparing_two_ants_is_fast() -> None:
         compare(source, target)
         times.append(time.process_time() - start)
     assert min(times) < 0.1  # CPU seconds, with a margin of 10.
+
+
+def test_another_height_explains_derived_constants() -> None:
+    model = asset("ant")
+    model.body_subtreemass[1] *= 2.0
+    heights = (0.7, 1.4)
+    (item,) = compare(asset("ant"), model, standing_height=heights)
+    assert (item.quantity, item.before, item.after) == ("standing height", *heights)
+    (alone,) = compare(asset("ant"), model)
+    assert (alone.quantity, alone.element) == ("derived constant", "body_subtreemass")
+
+
+@pytest.mark.parametrize("drawn", [False, True])
+def test_stored_numbers_tell_how_a_model_changed(drawn: bool) -> None:
+    moved, sensed, numbers = ModelNumbers.read(asset("ant"), drawn=drawn)
+    assert ModelNumbers.read(asset("ant"), drawn=drawn) == (moved, sensed, numbers)
+    other = ModelNumbers.read(_ant(_longer), drawn=drawn)
+    assert other[0] != moved
+    found = ModelNumbers.changes(numbers, other[2])
+    assert any("mass 0.06759 kg -> 0.1245 kg (x1.84)" in sentence for sentence in found)
+    assert ModelNumbers.changes(numbers, numbers) == ()
