@@ -253,12 +253,12 @@ def _section(
             for quantity in dict.fromkeys((*old, *new))
             if not _equal(old.get(quantity), new.get(quantity), scales[quantity])
         ]
-    shared = [
+    old_order, new_order = (
         [name for name in names if name in other]
         for names, other in ((before, after), (after, before))
-    ]
-    if shared[0] != shared[1]:
-        found.append(change("order", section, *shared))
+    )
+    if old_order != new_order:
+        found.append(change("order", section, old_order, new_order))
     return found
 
 

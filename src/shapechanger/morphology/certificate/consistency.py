@@ -128,7 +128,7 @@ def _stale_constants(model: mujoco.MjModel, names: dict[str, list[str]]) -> list
         mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
     except mujoco.FatalError as error:
         return [f"MuJoCo cannot derive its constants from the model: {error}."]
-    owners = {
+    owners: dict[str, list[str]] = {
         "body": names["bodies"],
         "dof": [names["joints"][joint] for joint in model.dof_jntid.tolist()],
         "geom": names["geoms"],

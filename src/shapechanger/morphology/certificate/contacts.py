@@ -112,7 +112,7 @@ def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
     its own.
     """
     explicit, dynamic = colliding_pairs(model)
-    values = {
+    values: dict[str, NDArray[Any]] = {
         name: np.concatenate([getattr(model, f"pair_{name}")[explicit], mixed])
         for name, mixed in mixed_parameters(model, dynamic).items()
     }

@@ -10,7 +10,8 @@ model, which decides what the numbers of its state and its control mean; all els
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -28,7 +29,8 @@ _W: Final = mujoco.mjtWrap
 _E: Final = mujoco.mjtEq
 
 
-class Field(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Field:
     """One array of `mujoco.MjModel`, or of `contact_arrays`; `opt_` stands for its options.
 
     Attributes:
@@ -51,7 +53,8 @@ class Field(NamedTuple):
     padded: bool = False
 
 
-class Kind(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Kind:
     """The elements of a section.
 
     Attributes:

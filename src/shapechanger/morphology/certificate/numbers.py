@@ -148,7 +148,7 @@ class _Reader:
             for name in ("nq", "nv", "nu", "na")
         }
         geoms, free = self.names["geoms"], unique_namer((), " ({})")
-        pairs = self._made["contact_geoms"].tolist()
+        pairs: list[list[int]] = self._made["contact_geoms"].tolist()
         contacts = [free(" + ".join(sorted(geoms[geom] for geom in pair))) for pair in pairs]
         rows = self._fields(CONTACT_FIELDS, len(contacts))
         found["contacts"] = dict(sorted(zip(contacts, rows, strict=True)))
@@ -262,7 +262,7 @@ class _Reader:
     def _relevant(self) -> dict[str, NDArray[np.bool_]]:
         """Return masks of the bodies, geoms and sites that take part in the motion."""
         model = self._model
-        used: dict[str, set[int]] = {kind: set() for kind in NAMED} | {"": set()}
+        used: dict[str, set[int]] = {kind: set() for kind in (*NAMED, "")}
         for field in (*ACTUATOR_FIELDS, *TENDON_FIELDS, *EQUALITY_FIELDS):
             if field.of is not None and not isinstance(field.of, type):
                 values = self._array(field.array)
@@ -288,7 +288,8 @@ class _Reader:
         """Return numbers in place of names; elements that do not count change none of them."""
         found: dict[str, list[str]] = {}
         for kind, (_, count) in NAMED.items():
-            kept = self.kept.get(kind, np.ones(getattr(self._model, count), np.bool_)).copy()
+            everything = np.full(int(getattr(self._model, count)), fill_value=True)
+            kept = self.kept.get(kind, everything).copy()
             if kind == "bodies":
                 kept[0] = True  # The world comes first, whatever else matters.
             places = np.argsort(np.argsort(~kept, kind="stable"))
