@@ -43,6 +43,13 @@ def test_layouts_are_in_newtons_and_metres() -> None:
     assert state.size == 32
 
 
+def test_an_action_of_two_tendons_has_no_newtons() -> None:
+    start, end = _TEXT.index("[action.FDS]"), _TEXT.index("[action.EIP]")
+    text = changed("mix = { FDS = 1.0 }", "mix = { FDP = 1.0 }", _TEXT[:start] + _TEXT[end:])
+    action = read(text).action_layout()["FDP"]
+    assert (action.gain, action.gain_unit) == (1.0, "")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
