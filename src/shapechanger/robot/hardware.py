@@ -1,8 +1,8 @@
 """Hardware below the drivers: pins, buses and clocks, real or of a twin.
 
 The processes of a robot get the source of their hardware as MODULE:FUNCTION and one argument.
-`RealHardware` is the Raspberry Pi, and a twin has its own class, so the same drivers run on both,
-and no code of the robot depends on a twin.
+`raspberry_pi` has the real ones, and a twin has its own, so the same drivers run on both, and no
+code of the robot depends on a twin.
 """
 
 from __future__ import annotations
@@ -11,15 +11,9 @@ import importlib
 import select
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
-from shapechanger.errors import RobotError
-
-if TYPE_CHECKING:  # Only a rig needs them.
-    from shapechanger.robot.drivers.servos.registers import ServoPort
-    from shapechanger.robot.drivers.servos.settings import BusSettings
-
-REAL: Final = "shapechanger.robot.hardware:real"
+REAL: Final = "shapechanger.robot.raspberry_pi:real"
 """Default source of the hardware."""
 
 
@@ -136,8 +130,8 @@ class Hardware(Protocol):
         """Open the pins that send servo pulses."""
         ...
 
-    def servo_port(self, settings: BusSettings) -> ServoPort:
-        """Open the port of a servo bus."""
+    def servo_port(self, settings: Any) -> Any:
+        """Open the port of a servo bus: a `ServoPort` for `BusSettings`, of `drivers.servos`."""
         ...
 
     def close(self) -> None:
@@ -169,64 +163,6 @@ class RealClock:
         import asyncio  # Imported here, because the guard does not need it.
 
         await asyncio.sleep(seconds)
-
-
-class RealHardware:
-    """Pins and buses of a Raspberry Pi; each library is imported when it is needed."""
-
-    def __init__(self) -> None:
-        self.clock = RealClock()
-        """The machine's clock."""
-        self._pin_factory: Any = None
-
-    def pin_factory(self) -> Any:
-        """Return gpiozero's factory for lgpio, independent of the environment variables.
-
-        Its pins go low at once; see `lgpio_pins`.
-
-        Raises:
-            RobotError: If the pins do not exist or cannot be opened.
-        """
-        if self._pin_factory is None:
-            try:
-                from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
-
-                self._pin_factory = LowAtOnceFactory()
-            except Exception as error:  # Of gpiozero or lgpio, or one of them is missing.
-                raise RobotError(
-                    f"Cannot open this machine's pins ({str(error) or type(error).__name__}); "
-                    "`shapechanger robot serve --twin` needs none."
-                ) from error
-        return self._pin_factory
-
-    def i2c(self, bus: int) -> I2cBus:
-        """Open a bus with smbus2."""
-        from smbus2 import SMBus
-
-        return SMBus(bus)
-
-    def servo_pins(self) -> ServoPins:
-        """Open the pins with lgpio."""
-        from shapechanger.robot.drivers.lgpio_pins import LgpioServoPins
-
-        return LgpioServoPins()
-
-    def servo_port(self, settings: BusSettings) -> ServoPort:
-        """Open a serial port with `dynamixel_sdk`."""
-        from shapechanger.robot.drivers.servos.serial_port import open_serial_port
-
-        return open_serial_port(settings)
-
-    def close(self) -> None:
-        """Close the pins."""
-        if self._pin_factory is not None:
-            self._pin_factory.close()
-            self._pin_factory = None
-
-
-def real(_: str = "") -> RealHardware:
-    """Return the hardware of this machine."""
-    return RealHardware()
 
 
 def load(place: str) -> Any:

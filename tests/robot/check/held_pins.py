@@ -6,9 +6,9 @@ from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
-from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.raspberry_pi import RealHardware
 
 
 def shipped(kind: str) -> Profile:

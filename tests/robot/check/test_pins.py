@@ -11,8 +11,8 @@ from gpiozero.pins.mock import MockConnectedPin, MockFactory
 from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.pins import check_jumper, plan_of_pins, probed_pin
-from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.raspberry_pi import RealHardware
 
 _PLAN = GuardPlan(
     "car",

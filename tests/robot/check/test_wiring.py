@@ -16,8 +16,8 @@ from shapechanger.robot.check.computer import examine
 from shapechanger.robot.check.wiring import StandingRobot
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
-from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard

@@ -62,11 +62,11 @@ class TrainClone:
         """Train, evaluate and write the files."""
         self._require_files()
         # The report comes last; check its requirements before the work.
-        import_module("shapechanger.demos.cloning.report")
+        import_module("shapechanger.demos.clone_report")
+        from shapechanger.demos.clone_report import clone_html, write_numbers
         from shapechanger.demos.cloning.evaluation import duration_s, judge, outlook
         from shapechanger.demos.cloning.examples import judged_steps
         from shapechanger.demos.cloning.learn import learn
-        from shapechanger.demos.cloning.report import clone_html, write_numbers
         from shapechanger.demos.cloning.settings import settings_for
         from shapechanger.demos.cloning.shrinking import ShrunkFrames
         from shapechanger.transfer.learners.presets import LEARNERS
@@ -273,7 +273,7 @@ class Evaluate:
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:
-            from shapechanger.demos.cloning.report import clone_html, write_numbers
+            from shapechanger.demos.clone_report import clone_html, write_numbers
 
             require_file(self.report)
             page = clone_html(self.policy.name, policy, data, judgement, None, note)

@@ -14,7 +14,8 @@ from shapechanger.robot.check.check import Finding, judged
 from shapechanger.robot.drivers.chip import open_output
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
 from shapechanger.robot.guard.outputs import enable_device
-from shapechanger.robot.hardware import Hardware, RealHardware
+from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.setup.computer import needs_pins
 
 _TOGGLES: Final = 50

@@ -23,8 +23,9 @@ from shapechanger.robot.drivers.chip import open_sensor
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
-from shapechanger.robot.hardware import Hardware, RealHardware
+from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.raspberry_pi import RealHardware
 
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
     from shapechanger.robot.drivers.as5600 import As5600, JointEncoder

@@ -14,8 +14,9 @@ from shapechanger.robot.check.pins import BenchLamp, probed_pin
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.outputs import make_safe
-from shapechanger.robot.hardware import Hardware, RealHardware
+from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.judge import time_to_rest
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
