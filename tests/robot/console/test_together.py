@@ -305,4 +305,4 @@ def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_pa
         console.await_words("#policy-state", "None runs.")
         (folder / "student.onnx").write_bytes(b"changed")
         page.click("#policy-run")
-        console.await_words("#policy-state", "not a cloned policy")
+        console.await_words("#policy-state", "is not a policy that")

@@ -114,7 +114,7 @@ class DrivingWorld(World):
     Args:
         parts: Parts that the robot's outputs move, such as "wheels".
         size: Width and height of the frames in pixels.
-        seed: Seed of the first start.
+        seed: Seed of where the stripes on the walls begin, and of the first start.
         pitch_deg: Angle of the camera's axis below the horizon, degrees; None for level.
         fovy_deg: Vertical field of view of the camera, degrees; None for 90 degrees across.
 
@@ -132,7 +132,8 @@ class DrivingWorld(World):
         fovy_deg: float | None = None,
     ) -> None:
         self._drive = _drive_of(parts)
-        self._camera = _FrontCamera(size, pitch_deg, fovy_deg)
+        first_stripe = random.Random(f"room {seed}").uniform(0.0, 2.0 * _STRIPE)
+        self._camera = _FrontCamera(size, first_stripe, pitch_deg, fovy_deg)
         self.resting_v = RESTING_V
         self._travelled = 0.0
         self.place(seed)
@@ -259,11 +260,16 @@ _WALLS: Final = np.array(((220, 70, 60), (70, 150, 220), (235, 190, 60), (90, 18
 
 
 class _FrontCamera:
-    """Draws the room; see `DrivingWorld` for the arguments."""
+    """Draws the room, whose stripes begin at `first_stripe`, m; see `DrivingWorld`."""
 
     def __init__(
-        self, size: tuple[int, int], pitch_deg: float | None, fovy_deg: float | None
+        self,
+        size: tuple[int, int],
+        first_stripe: float,
+        pitch_deg: float | None,
+        fovy_deg: float | None,
     ) -> None:
+        self._first_stripe = first_stripe
         width, height = size
         if fovy_deg is None:
             focal = (width / 2) / math.tan(_FIELD_OF_VIEW / 2)  # In pixels.
@@ -294,7 +300,7 @@ class _FrontCamera:
         """Draw a frame from a pose, RGB, shape (height, width, 3)."""
         distance, wall, along = _cast(x, y, heading + self._angles)
         light = 0.25 + 0.75 * np.exp(-distance / _FADE)
-        light *= np.where((along // _STRIPE) % 2 == 0, 1.0, 0.72)
+        light *= np.where(((along + self._first_stripe) // _STRIPE) % 2 == 0, 1.0, 0.72)
         colours = (_WALLS[wall] * light[:, np.newaxis]).astype(np.uint8)
         # Below the camera where the line of sight meets the wall, m.
         rise = self._slopes * distance.astype(np.float32)[self._rays]
