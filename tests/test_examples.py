@@ -25,7 +25,7 @@ _SAYS = {
     "six_legged_ant": ("ankle_1_5/motor <- ankle_1/motor", "six legs came "),
     "two_bodies": ("hinge/angle      rad", "pole: length 0.6 m -> 1.2 m (x2)", "pole of 1.20 m: "),
     "simulation_and_robot": ("in 64 steps, 0 collisions",),
-    "new_vehicle": ("steering  1.0, throttle 0.0: tracks  1.00 and -1.00", "driven 1."),
+    "new_vehicle": ("steering  1.0, throttle 0.0: tracks  1.00 and -1.00", "driven 2."),
     "new_method": ("Transfer ",),
     "study_on_ray": ("fine-tune-1 has ended", "report.html"),
 }
