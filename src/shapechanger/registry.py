@@ -107,6 +107,7 @@ POLICIES: Final[Registry[Any]] = Registry("kind of policy", "shapechanger.polici
 """Functions that read a file, by the kind of policy that its header names."""
 
 ROBOTS: Final[Registry[Any]] = Registry("reader of robots", "shapechanger.robots")
-"""Functions that read what a simulation needs of a robot: numbers only, so that none imports it."""
+"""Readers of the numbers of a robot that its simulation needs, so that simulations import no robot."""
+
 MODELS: Final[Registry[Any]] = Registry("kind of model", "shapechanger.models")
-"""Readers of what decides how a model moves, by the library that it is of."""
+"""Readers of the numbers of a compiled model, keyed by the library that compiled it."""

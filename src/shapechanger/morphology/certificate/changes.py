@@ -419,11 +419,11 @@ def _rounded(values: Values, scale: float) -> Values:
 
 
 class ModelNumbers:
-    """Fingerprints and differences of the models of envs, as `shapechanger.identity` asks for."""
+    """Fingerprints and differences of MuJoCo models, the reader that `shapechanger.identity` loads."""
 
     @staticmethod
     def read(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
-        """Return the fingerprints of what moves and of what is sensed, and the numbers of both.
+        """Return two fingerprints, of the motion and of all other readable numbers, and the numbers.
 
         Args:
             model: The compiled model.

@@ -85,7 +85,7 @@ _DRAWN: Final = (
 
 
 def moved_numbers(model: mujoco.MjModel, *, anonymous: bool = False) -> Numbers:
-    """Return everything that decides the motion of a compiled model.
+    """Return the numbers that decide the motion of a compiled model.
 
     Args:
         model: The compiled model.
