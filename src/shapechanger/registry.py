@@ -107,7 +107,7 @@ POLICIES: Final[Registry[Any]] = Registry("kind of policy", "shapechanger.polici
 """Functions that read a file, by the kind of policy that its header names."""
 
 ROBOTS: Final[Registry[Any]] = Registry("reader of robots", "shapechanger.robots")
-"""Readers of the numbers of a robot that its simulation needs, so that simulations import no robot."""
+"""Readers of the numbers of a robot for its simulation, which imports no robot."""
 
 MODELS: Final[Registry[Any]] = Registry("kind of model", "shapechanger.models")
 """Readers of the numbers of a compiled model, keyed by the library that compiled it."""

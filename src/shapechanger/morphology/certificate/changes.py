@@ -419,11 +419,11 @@ def _rounded(values: Values, scale: float) -> Values:
 
 
 class ModelNumbers:
-    """Fingerprints and differences of MuJoCo models, the reader that `shapechanger.identity` loads."""
+    """Fingerprints and differences of MuJoCo models, for `shapechanger.identity`."""
 
     @staticmethod
     def read(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
-        """Return two fingerprints, of the motion and of all other readable numbers, and the numbers.
+        """Return the fingerprints of the motion and of the other numbers, and all numbers.
 
         Args:
             model: The compiled model.
