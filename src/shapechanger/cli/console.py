@@ -49,10 +49,10 @@ _ENOUGH_TO_TELL: Final = 0.05
 
 
 class StudyProgress:
-    """Progress of several runs, by their steps.
+    """Progress of several runs, measured in steps.
 
     Args:
-        steps: Number of steps of each run by its name, at least 1.
+        steps: Number of steps of each run, keyed by its name, at least 1.
         console: The console; None for standard error.
     """
 

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
 _PACKAGE: Final = "shapechanger"
-# Extras that hold no packages of their own, or are for those who change Shapechanger.
+# Extras that combine others, or are for developers of Shapechanger.
 _NOT_LISTED: Final = ("all", "dev")
 # Longer than any driver needs for one picture, s.
 _PATIENCE_S: Final = 120
-# Drawn in a process of its own, because a broken driver ends the process.
+# Drawn in a separate process, because a broken driver ends the process.
 _DRAW: Final = """
 from shapechanger.rendering import choose_gl
 choose_gl()
@@ -154,7 +154,7 @@ def _films() -> Results:
 
 
 def _torch() -> Results:
-    """Yield on what PyTorch computes."""
+    """Report PyTorch's device."""
     import torch
 
     where = f"{torch.get_num_threads()} threads of the CPU"
@@ -164,7 +164,7 @@ def _torch() -> Results:
 
 
 def _warp() -> Results:
-    """Yield on what `make_vec(..., backend="warp")` steps."""
+    """Report the devices available to Warp."""
     warp: Any = importlib.import_module("shapechanger.envs.warp.devices").wp
     if devices := [device.name for device in warp.get_cuda_devices()]:
         yield "good", f"Steps on {', '.join(devices)}."

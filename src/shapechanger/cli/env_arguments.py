@@ -91,7 +91,7 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
 
 
 def executor_of(kind: str, workers: int | None, address: str | None) -> Executor:
-    """Return what runs the jobs of a study.
+    """Return the executor of a study's jobs.
 
     Args:
         kind: "processes" or "ray".
@@ -105,7 +105,7 @@ def executor_of(kind: str, workers: int | None, address: str | None) -> Executor
 
         return RayCluster(address)
     if address is not None:
-        raise StudyError("--address is that of a Ray cluster: give --executor ray, too.")
+        raise StudyError("--address names a Ray cluster: give --executor ray, too.")
 
     return Processes(workers)
 

@@ -48,7 +48,7 @@ class ListEnvs:
             table.add_row(env_id, f"{vehicle}: {summary}")
         for env_id, task in FINGER_ENVS.items():
             table.add_row(env_id, task.summary)
-        table.add_row(OWN_ROBOT, "an MJCF or URDF file of yours: give FILE or FILE@TASK as ENV")
+        table.add_row(OWN_ROBOT, "your MJCF or URDF file: give FILE or FILE@TASK as ENV")
         robots = len({entry.family for entry in ODRL_ENVS.values()})
         targets = len(ODRL_ENVS) - robots
         table.add_row(

@@ -36,7 +36,7 @@ class Identify:
     """File for the parameters, such as finger.json: what an env of the finger takes as
     `parameters`."""
     report: Path | None = None
-    """The page to write; beside the log if not given."""
+    """The page to write; by default next to the log."""
     geared: bool = False
     """Take the motors for geared servos, as the shipped rig has, where the log says nothing about
     them. A log that `record` has written of a rig says it by itself."""
@@ -190,7 +190,7 @@ class ExportFinger:
 
 
 def _parameters(given: str) -> FingerParameters:
-    """Return a set of parameters by name, or from a file."""
+    """Return a named set of parameters, or one from a file."""
     from shapechanger.demos.episodes.files import read_file
     from shapechanger.finger.parameters import PARAMETER_SETS, FingerParameters, named_set
 

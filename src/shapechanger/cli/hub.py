@@ -26,7 +26,7 @@ _Repo = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="REPO")]
 
 @dataclass(frozen=True)
 class PushPolicy:
-    """Upload a policy to the Hugging Face Hub, with a card that says what it is."""
+    """Upload a policy to the Hugging Face Hub, with a card that describes it."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, or a clone."""
@@ -36,7 +36,7 @@ class PushPolicy:
     """Let everybody read a new repository; it is private, if not given."""
 
     def run(self) -> None:
-        """Check the policy, upload it, and print where it is."""
+        """Check the policy, upload it, and print its address."""
         from shapechanger import hub
 
         card = _policy_card(self.file, self.repo)
@@ -85,7 +85,7 @@ class PullPolicy:
 
 @dataclass(frozen=True)
 class PushDemonstrations:
-    """Upload a recording to the Hugging Face Hub, with a card that says what it is."""
+    """Upload a recording to the Hugging Face Hub, with a card that describes it."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, or one episode of it."""
@@ -95,7 +95,7 @@ class PushDemonstrations:
     """Let everybody read a new repository; it is private, if not given."""
 
     def run(self) -> None:
-        """Check the episodes, upload them, and print where they are."""
+        """Check the episodes, upload them, and print their address."""
         from shapechanger import hub
 
         with tempfile.TemporaryDirectory() as folder:
@@ -156,7 +156,7 @@ class PullDemonstrations:
 
 
 def _described_policy(file: Path) -> dict[str, Any]:
-    """Load a policy, which checks its hash, and return what its card says."""
+    """Load a policy, which checks its hash, and return its card."""
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.policy import kind_of, load_policy
 

@@ -137,7 +137,7 @@ def find_command(arguments: Sequence[str]) -> tuple[str, type | None]:
 
 
 def options_of(kind: type) -> dict[str, Any]:
-    """Return the options of a command by their names, such as `--out`, with their types."""
+    """Return the types of a command's options, keyed by option, such as `--out`."""
     named: dict[str, Any] = {}
     for field, hint in get_type_hints(kind, include_extras=True).items():
         settings = getattr(hint, "__metadata__", ())
@@ -181,7 +181,7 @@ def _require_single(arguments: Sequence[str]) -> None:
 
 
 def _commands(kind: Any) -> dict[str, Any]:
-    """Return the subcommands of a command, or those of a union, by name."""
+    """Return the subcommands of a command or of a union, keyed by name."""
     if isinstance(kind, type):
         grouped = "command" in kind.__annotations__
         kind = get_type_hints(kind, include_extras=True)["command"] if grouped else None

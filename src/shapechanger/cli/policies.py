@@ -68,12 +68,12 @@ class Show:
 
 
 def _lines(card: Any) -> dict[str, str]:
-    """Return what a card says of a policy's origin, by name."""
+    """Return the facts of a policy's origin from its card, keyed by name."""
     return _card_lines(card) if hasattr(card, "observation") else _clone_lines(card)
 
 
 def _card_lines(card: PolicyCard | OnnxCard) -> dict[str, str]:
-    """Return the origin of a policy, by name."""
+    """Return the facts of a policy's origin, keyed by name."""
     explored: tuple[float, ...] | None = getattr(card, "start_log_std", None)
     return {
         "env": str(card.env),
@@ -91,7 +91,7 @@ def _deviations(log_std: tuple[float, ...]) -> str:
 
 
 def _clone_lines(card: CloneCard) -> dict[str, str]:
-    """Return what a clone's card says, by name."""
+    """Return the facts of a clone's card, keyed by name."""
     actions = ("steering", "throttle") if card.action_layout is None else card.action_layout.names
     return {
         "env": str(card.data.get("env", "recorded")),
@@ -116,7 +116,7 @@ class ListPolicies:
     """List the policies that ship instead, one for each env."""
 
     def run(self) -> None:
-        """Print a line for each policy; a file that is none gets its reason."""
+        """Print a line for each policy; a file that is not a policy gets its reason."""
         if self.references:
             self._print_references()
             return
@@ -156,12 +156,12 @@ class EvaluatePolicy:
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, or one that was exported as ONNX."""
     env: str = ""
-    """Id of another env, where it acts through the body map of same names; that of its training by
-    default."""
+    """Id of another env, if it acts through the body map of same names; by default the one of its
+    training."""
     body: Body = ""
     learner: OwnLearner = ""
     episodes: int = 10
-    """Number of episodes; their starts are those of every evaluation."""
+    """Number of episodes; they start like every evaluation's."""
 
     def run(self) -> None:
         """Evaluate."""
@@ -192,8 +192,8 @@ class PlayPolicy(Watching):
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, or one that was exported as ONNX."""
     env: str = ""
-    """Id of another env, where it acts through the body map of same names; that of its training by
-    default."""
+    """Id of another env, if it acts through the body map of same names; by default the one of its
+    training."""
     body: Body = ""
 
     def run(self) -> None:
@@ -237,8 +237,8 @@ class ExportPolicy:
     out: Path
     """The file to write, such as ant.onnx."""
     env: str = ""
-    """Id of the env of the body that a policy of limbs is exported for; that of its training by
-    default. Other policies are exported for their own."""
+    """Id of the env of the body that a policy of limbs is exported for; by
+    default the one of its training. Other policies are exported for their own."""
     body: Body = ""
     learner: OwnLearner = ""
     format: Literal["onnx"] = "onnx"

@@ -39,8 +39,8 @@ class Train:
     steps: int | None = None
     """Env steps; the learner's own number if not given."""
     learner: str | None = None
-    """Name of the learner's settings, a TOML file of them, or a class or function of yours as
-    module:name; those tuned for the env if not given."""
+    """Name of the learner's settings, a TOML file of them, or your class or function as
+    module:name; by default the settings tuned for the env."""
     set: tuple[str, ...] = ()
     """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     seed: int = 0
@@ -78,7 +78,7 @@ class Train:
     def _of_many(self, env: EnvRef) -> EnvRef:
         """Return the env with bodies to draw from its family."""
         if self.bodies < 0 or self.body:
-            raise StudyError("--bodies takes a number above 0, and no --body beside it.")
+            raise StudyError("--bodies takes a number above 0, and no --body.")
         draw = BodyDraw(count=self.bodies, seed=self.seed)
         return env.having({"bodies": msgspec.to_builtins(draw)})
 
@@ -138,7 +138,7 @@ class Train:
         from shapechanger.vehicles.learning import STUDENT_STEPS, train_student
 
         if self.learner is not None or self.set or self.tensorboard is not None:
-            raise StudyError("A student has no learner of its own: give --teacher without one.")
+            raise StudyError("A student has no learner: give --teacher without one.")
         if not teacher.exists():
             raise StudyError(
                 f"There is no teacher {teacher}: `shapechanger train CarRanges` makes a car's."

@@ -60,8 +60,8 @@ class Transfer:
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
     """Source steps of a source policy; the learner's own number if not given: half as many as
-    target steps, and more for a rig. Beside --source-policy, those of arms that train a policy of
-    their own, such as identified."""
+    target steps, and more for a rig. With --source-policy, the steps of arms that train their own
+    policy, such as identified."""
     quick: bool = False
     """Two seeds and an eighth of the steps: a check that everything works, not a result."""
     out: Path | None = None
@@ -83,19 +83,19 @@ class Transfer:
     """Quantity that policies are compared by: a measure of the target such as "forward speed", a
     reward term such as reward_forward, or return; the target's default if not given."""
     learner: str | None = None
-    """Name of the learner's settings, a TOML file of them, or a class or function of yours as
-    module:name; those tuned for the target if not given."""
+    """Name of the learner's settings, a TOML file of them, or your class or function as
+    module:name; by default the settings tuned for the target."""
     set: tuple[str, ...] = ()
     """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
     arms: tuple[str, ...] = ()
     """Methods to compare; scratch is required. `shapechanger methods` lists them, and module:name
-    is one that a module of your own registers. The default is scratch, zero-shot and fine-tune;
-    where the target is the same task in another finger, also randomised and identified."""
+    is a method that your module registers. The default is scratch, zero-shot and fine-tune;
+    if the target is the same task in another finger, also randomised and identified."""
     rule: tuple[str, ...] = ()
     """Rules of the body map for entries without a partner, as NAME=RULE: "foot_*/motor=learn",
     "foot_*/motor=copy ankle_*/motor", "*/contact/*=zero", "ankle_4/angle=hold"."""
     map: Path | None = None
-    """The body map as a TOML file, in place of --rule and --units."""
+    """The body map as a TOML file, instead of --rule and --units."""
     units: Literal["same", "torque"] = "same"
     """Whether actions are mapped directly or by the torque that they produce."""
     seed: int = 0
@@ -244,7 +244,7 @@ def _split_rule(text: str) -> tuple[str, str]:
     """Split NAME=RULE."""
     name, equals, rule = text.partition("=")
     if not (name and equals and rule):
-        raise MapError(f"A rule is written NAME=RULE, as in 'foot_*/motor=learn', not {text!r}.")
+        raise MapError(f"A rule is written NAME=RULE, such as 'foot_*/motor=learn', not {text!r}.")
     return name, rule
 
 

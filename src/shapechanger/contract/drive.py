@@ -32,7 +32,7 @@ class DriveReward:
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> DriveReward:
-        """Create the reward from weights by name, as in a robot's profile.
+        """Create the reward from weights keyed by name, as in a robot's profile.
 
         Args:
             weights: Weights that replace the defaults.

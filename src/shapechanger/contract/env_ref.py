@@ -18,7 +18,7 @@ from shapechanger.layout import Layout
 
 
 class EnvRef(msgspec.Struct, frozen=True):
-    """An env by its id and arguments, so that another process can make it.
+    """An env's id and arguments, from which another process can make it.
 
     Attributes:
         id: A registered id, or `module:id` to import a module first.
@@ -209,7 +209,7 @@ class LimbNumbers(Protocol):
 
     @property
     def actuator(self) -> str:
-        """Name of the actuator that moves the joint; empty if there is none."""
+        """Name of the actuator that moves the joint; empty if no actuator does."""
         ...
 
     @property

@@ -135,7 +135,7 @@ class Bump:
         """Update with a new sensing.
 
         Args:
-            quantities: Readings by name.
+            quantities: Readings keyed by name.
             now_ns: Robot's time, ns.
         """
         touches = quantities.get("bump", 0.0) > 0.0
@@ -174,7 +174,7 @@ class Stall:
         """Update with a new sensing.
 
         Args:
-            quantities: Readings by name.
+            quantities: Readings keyed by name.
             push: Applied push, -1 to 1.
             now_ns: Robot's time, ns.
         """

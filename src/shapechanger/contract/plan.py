@@ -214,7 +214,7 @@ _DRIVEN: Final = ("forward", "backward", "enable", "phase", "pin")
 
 
 def driven_pins(plan: GuardPlan) -> dict[int, str]:
-    """Return the use of each BCM pin that drives an output or the enable line, by its number."""
+    """Return the use of each pin that drives an output or the enable line, by BCM number."""
     found = {
         pin: f"{output.name} {key}"
         for output in plan.outputs

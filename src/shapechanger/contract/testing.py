@@ -88,7 +88,7 @@ def names_every_number(make: MakeEnv) -> None:
     box = cast("Any", env.action_space)
     _require(
         np.allclose(box.low, action.low) and np.allclose(box.high, action.high),
-        "The bounds of the action layout are not those of the action space.",
+        "The bounds of the action layout differ from the action space's.",
     )
     env.close()
 

@@ -83,7 +83,7 @@ class World(Protocol):
         self.place(seed)
 
     def truth(self) -> dict[str, float]:
-        """Ground truth for evaluation, by name, which no sensor measures; may be empty."""
+        """Ground truth for evaluation, which no sensor measures, keyed by name; may be empty."""
         ...
 
     def place(self, seed: int) -> None:

@@ -65,7 +65,7 @@ def _name(env: NamedEnv) -> str:
 def check_actions(
     actions: Any, num_envs: int, shape: tuple[int, ...], ignored: NDArray[np.bool_]
 ) -> NDArray[Any]:
-    """Return the actions of many envs as one array of their own dtype.
+    """Return the actions of many envs as one array of the action space's dtype.
 
     Args:
         actions: One action per env.
@@ -121,7 +121,7 @@ def check_arguments(
         env: Class of the env; its Gymnasium base class defines the arguments.
         family: Name of the family, for messages.
         own: Arguments of every env that Gymnasium's constructors lack, with their defaults.
-        arguments: Arguments by name.
+        arguments: Arguments keyed by name.
 
     Raises:
         UnknownName: If there is no such argument.
@@ -143,7 +143,7 @@ def check_arguments(
 
 
 def _mismatch(default: Any, value: Any) -> str:
-    """Return what a value must be, judged by the argument's default; empty if it fits."""
+    """Describe the type that a value must have, from the argument's default; empty if it fits."""
     if isinstance(default, bool):
         return "" if isinstance(value, (bool, np.bool_)) else "True or False"
     if isinstance(default, (int, float)):

@@ -1,7 +1,7 @@
 """The ant, a sphere on four legs, each with a hip and an ankle, and its envs: run forwards.
 
-The model is `ant.xml` of Gymnasium (MIT). The bodies are those of the 2017 Shapechanger release;
-the edits below reproduce its masses, inertias, ranges, gears and lengths exactly. The third
+The model is `ant.xml` of Gymnasium (MIT). The bodies come from the original Shapechanger release
+(2017); the edits below reproduce its masses, inertias, ranges, gears and lengths exactly. The third
 segments of the release had no motors; here they have, and `ExtendedAntPassive` is the body without.
 """
 
@@ -69,7 +69,7 @@ def _extended(gear: float | None) -> Body:
 
 
 def _range(leg: int, degrees: tuple[float, float]) -> tuple[float, float]:
-    """Range of a leg's joint, rad, from that of the legs that turn forwards, degrees."""
+    """Range of a leg's joint, rad, from the range of the legs that turn forwards, degrees."""
     lower, upper = (math.radians(x) for x in degrees)
     return (-upper, -lower) if leg in _TURNS_BACK else (lower, upper)
 
@@ -110,7 +110,7 @@ _sum: Final = np.add.reduce
 
 
 class _Ant(Binding):
-    """Views of an ant's data, and buffers for what is computed from them."""
+    """Views of an ant's data, and buffers for values computed from them."""
 
     def __init__(self, watch: ModelWatch, env: AntEnv) -> None:
         super().__init__(watch, env.data, env.frame_skip)
@@ -134,14 +134,14 @@ class _Ant(Binding):
         self._main_xy = memoryview(cast("Any", self.main_xy))
 
     def remember(self) -> bytes:
-        """Return what `conclude` needs from before the physics: the place of the main body."""
+        """Return the main body's place, which `conclude` needs from before the physics."""
         return self._main_xy.tobytes()
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Gymnasium's `Ant-v5` with any body of the ant family.
 
-    Actions, observations, rewards and infos are those of `Ant-v5`; `observation_layout` and
+    Actions, observations, rewards and infos equal `Ant-v5`'s; `observation_layout` and
     `action_layout` name each number. Three things depend on the body:
 
     - **Start pose**: the model's own, with each joint at least a tenth of its range inside its
@@ -157,7 +157,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         body: Name of an ant, edits of `shapechanger.morphology`, or their JSON.
         healthy_z_range: Heights of the torso between which the ant is healthy, m; None derives the
             upper one from the body and sets no lower one.
-        **arguments: All arguments of `Ant-v5`, and those of `Reshapable`.
+        **arguments: All arguments of `Ant-v5` and of `Reshapable`.
     """
 
     family = ANT
@@ -343,7 +343,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             contact_cost,
             healthy,
         )
-        infos["reward_survive"] = infos["reward_survive"].tolist()  # Python numbers, as in step().
+        infos["reward_survive"] = infos["reward_survive"].tolist()  # Python numbers, like step()'s.
         terminated = ~healthy & bool(self._terminate_when_unhealthy)
         diverged: Sequence[int] = ()
         if warnings.any():
@@ -394,9 +394,9 @@ class ExtendedAntEnv(AntEnv):
     """The ant with a third segment on each leg, which makes both spaces larger than the ant's.
 
     Args:
-        body: As in `AntEnv`; None for the extended ant.
-        actuated_extension: Whether the third segments have motors of their own, which makes 12; the
-            2017 release had 8.
+        body: See `AntEnv`; None for the extended ant.
+        actuated_extension: Whether the third segments have motors, which makes 12; the
+            original release (2017) had 8.
         **arguments: All arguments of `AntEnv`.
     """
 

@@ -199,7 +199,7 @@ _TASK_IDS: Final = (
 )
 _EPISODE_STEPS: Final = 1000
 _RANGES_STEPS: Final = 400  # A learner meets more courses.
-# Families with a fast step of their own, which Gymnasium's wrappers would slow down.
+# Families with their own fast step, which Gymnasium's wrappers would slow down.
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
 
@@ -258,7 +258,7 @@ def find(env_id: str) -> CatalogueEntry:
     """Return the entry of an id, or of a name such as `BigAnt` or `odrl/ant-friction-0.5`.
 
     Raises:
-        UnknownName: If there is none.
+        UnknownName: If no such env exists.
     """
     name = _name(env_id)
     full = f"{NAMESPACE}/{name}-v1"

@@ -33,7 +33,7 @@ def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
     """Require that all envs have the same spaces and layouts.
 
     Raises:
-        SpaceMismatch: If a space, or the names of its numbers, differ from those of the first env.
+        SpaceMismatch: If a space, or the names of its numbers, differ from the first env's.
     """
     first = envs[0]
     for number, env in enumerate(envs[1:], 1):
@@ -44,14 +44,14 @@ def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
                 continue
             if ours.shape != theirs.shape:
                 how = (
-                    f"{_size(theirs)} numbers, and that of env 0 ({describe_body(first)}) has "
+                    f"{_size(theirs)} numbers, and the one of env 0 ({describe_body(first)}) has "
                     f"{_size(ours)}"
                 )
             elif names != others:
                 apart = next((a, b) for a, b in zip(names, others, strict=True) if a != b)
-                how = f"{apart[1]!r} where that of env 0 ({describe_body(first)}) has {apart[0]!r}"
+                how = f"{apart[1]!r}, not {apart[0]!r} like env 0 ({describe_body(first)})"
             else:
-                how = f"other bounds than that of env 0 ({describe_body(first)})"
+                how = f"other bounds than env 0 ({describe_body(first)})"
             raise SpaceMismatch(
                 f"The {side} space of env {number} ({describe_body(env)}) has {how}: the envs of a "
                 "vector env share their spaces, so make one vector env for each kind of body."

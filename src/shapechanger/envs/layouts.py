@@ -182,7 +182,7 @@ def _of_each_body(
     Args:
         model: The model.
         block: Name of the block.
-        quantities: Unit of each quantity by name.
+        quantities: Unit of each quantity, keyed by its name.
         low: Smallest value of all quantities.
         high: Largest value of all quantities.
     """

@@ -86,9 +86,9 @@ def make_vec(
         threads: How many threads step the envs, including the caller's; 1 starts none. None for as
             many as the cores that this process may use. The results do not depend on it.
         device: Of the backend `warp`: `cpu`, `cuda:0`, ...; None for the first GPU, or the CPU
-            where there is none.
+            if there is no GPU.
         bodies: One body per env instead of one for all. With threads, lengths and masses may
-            differ, spaces may not; on a device they may, too. Those of fingers, on a device alone,
+            differ, spaces may not; on a device they may, too. Bodies of fingers, on a device alone,
             are their parameters.
         pool: Of the backend `warp`, instead of `bodies`: any number of bodies, which are compiled
             once and stay on the device. Each start of an episode draws one of them.
@@ -98,7 +98,7 @@ def make_vec(
         njmax: The same for rows of constraints.
         task_infos: Of the backend `warp`: whether steps return the infos of the CPU env, which
             cost time and no learner reads.
-        autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium; None for
+        autoreset_mode: When to reset an env whose episode has ended, see Gymnasium; None for
             `NEXT_STEP` with threads and `SAME_STEP`, the only one there, on a device.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
             On a device they are always copies.
@@ -159,7 +159,7 @@ def make_vec(
         )
         spec = copying.deepcopy(envs.envs[0].spec)
         chosen |= {"copy": copy} | ({} if threads is None else {"threads": threads})
-    # `gymnasium.make_vec(spec)` makes the same again; it sets the spec of its own results too.
+    # `gymnasium.make_vec(spec)` repeats this call; it sets the spec of its own results too.
     if spec is not None and spec.vector_entry_point is not None:
         spec.kwargs.update(arguments, num_envs=count, vectorization_mode="vector_entry_point")
         spec.kwargs.update(autoreset_mode=mode.value, **chosen)

@@ -66,7 +66,7 @@ def allow_own_modules(*names: str | None) -> None:
     """Let names such as `my_methods:warm-start` import modules of the current folder.
 
     Only names that the user gives may do so: the name of a class in a policy's file must not find a
-    module that lies beside it.
+    module in the same folder.
     """
     here = str(Path.cwd())
     own = any(name and (":" in name or name.endswith(".toml")) for name in names)
@@ -75,7 +75,7 @@ def allow_own_modules(*names: str | None) -> None:
 
 
 def default_learner(env: EnvRef) -> str:
-    """Return the learner tuned on the env's family; for other envs, that of the ant."""
+    """Return the learner tuned on the env's family; for other envs, the ant's."""
     if env.id in VEHICLE_ENVS:
         return "cloning"
     if env.id in WAYPOINT_ENVS:

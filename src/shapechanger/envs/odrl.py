@@ -1,6 +1,6 @@
 """Bodies of the locomotion tasks of ODRL (Off-Dynamics RL, NeurIPS 2024), as edits.
 
-ODRL publishes one model file per task; the names are those of its files. These edits give bodies
+ODRL publishes one model file per task; the names are its files'. These edits give bodies
 that move equally: masses, inertias, joints, geoms, limits, frictions and gravity agree to 1e-12, in
 the world's frame at the start pose. The origins of some bodies, which move nothing, lie elsewhere.
 
@@ -15,14 +15,14 @@ conversions by others, which agree where both were read:
   github.com/shivambhagat79/off-dynamics-explorative-rl, commit b13843f: hoppers and walkers in
   local coordinates and round numbers.
 
-The tasks and their levels are those of `envs/mujoco/call_mujoco_env.py` of
+The tasks and their levels come from `envs/mujoco/call_mujoco_env.py` of
 github.com/OffDynamicsRL/off-dynamics-rl, commit d1a69cd. Where only six digits are known, such as a
 half-length of 0.0777817, the round ends that give it, (0, 0, 0) and (0.11, 0, -0.11), are meant.
 That every half cheetah weighs 14 kg is the setting `settotalmass` of Gym's file, which a file that
 MuJoCo has written lacks; `envs/mujoco/assets/halfcheetah_morph_easy.xml` of
 github.com/shivambhagat79/off-dynamics-rl, commit 995bf26, a changed thigh of ODRL, has kept it.
 
-`odrl.json` holds them by their full names, such as `odrl-ant-friction-0.1`. Frictions are those of
+`odrl.json` keys them by their full names, such as `odrl-ant-friction-0.1`. Frictions are those of
 all geoms, except that the hopper's floor keeps its own; gravity is a factor of 9.81 m/s²; easy,
 medium and hard leave 0.8, 0.5 and 0.2 of the range of a joint. A walker has one foot of less
 friction than the other, as Gym's, which Gymnasium's v5 has made equal.
@@ -38,10 +38,10 @@ from typing import Any
 
 @cache
 def odrl_bodies() -> dict[str, list[dict[str, Any]]]:
-    """Return the edits of each body by its name, as JSON."""
+    """Return the edits of each body as JSON, keyed by the body's name."""
     return json.loads(Path(__file__).with_suffix(".json").read_bytes())
 
 
 def published(robot: str) -> dict[str, list[dict[str, Any]]]:
-    """Return the bodies of a robot of ODRL, such as "ant", by their full names."""
+    """Return the bodies of a robot of ODRL, such as "ant", keyed by their full names."""
     return {name: body for name, body in odrl_bodies().items() if name.split("-")[1] == robot}

@@ -49,7 +49,7 @@ from shapechanger.morphology.robot import robot_bodies
 
 _Floats = NDArray[np.float64]
 
-# By default as many physics steps as come nearest to this; that of Gymnasium's runners is 8 to
+# By default as many physics steps as come nearest to this; Gymnasium's runners take 8 to
 # 50 ms.
 _CONTROL_STEP_S: Final = 0.02
 # The pose that collections of models call so is where a robot starts.
@@ -84,7 +84,7 @@ class _TaskEnv(MujocoEnv, EzPickle):
         """Draw a start state around the start pose."""
         own = cast("OwnRobotEnv", self)
         scale, rules = own.reset_noise_scale, own.start_rules()
-        # Nothing is drawn for objects, so that a robot starts alike with and without them.
+        # Nothing is drawn for objects, so that a robot starts the same with and without them.
         place, speed = self.init_qpos.copy(), self.init_qvel.copy()
         moved, pushed = int(rules.robot_places.sum()), int(rules.robot_dofs.sum())
         place[rules.robot_places] += self.np_random.uniform(-scale, scale, moved)
@@ -114,22 +114,22 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
       height, noise and lift are the robot's alone, and objects keep the file's own start.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
       at least a tenth of its range inside its limits; the feet stand above the floor, and coupled
-      joints and closed loops are closed as well as in the file. The standing height is that of this
-      pose.
+      joints and closed loops are closed as well as in the file. The standing height is the one of
+      this pose.
     - **End**: where the task ends it, and where the simulation diverges, with a reward of 0.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`.
-        task: `walk`, or a task of your own: `module:Name`, a class, a function or an object; see
+        task: `walk`, or your own task: `module:Name`, a class, a function or an object; see
             `shapechanger.envs.own_tasks`.
         task_options: Arguments of the task's class.
         body: Edits of `shapechanger.morphology`, or their JSON; the file's own robot by default.
-        rig: Edits that come before those of any body, such as `AddMotor("*")` and `AddFloor()`, or
+        rig: Edits that come before any body's, such as `AddMotor("*")` and `AddFloor()`, or
             their JSON.
         frame_skip: Physics steps per action; None for a step of 20 ms.
         reset_noise_scale: Half-width of the uniform noise of the start pose, rad and m, and
-            standard deviation of that of its velocities, rad/s and m/s.
-        **arguments: Arguments of Gymnasium's `MujocoEnv`, and those of `Reshapable`.
+            standard deviation of the noise of its velocities, rad/s and m/s.
+        **arguments: Arguments of Gymnasium's `MujocoEnv` and of `Reshapable`.
 
     Attributes:
         task: The task.
@@ -175,7 +175,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
             frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
         if frame_skip < 1:
             raise EnvArgumentError(f"frame_skip must be at least 1, got {frame_skip}.")
-        # `_finish` replaces the space by that of the layout.
+        # `_finish` replaces the space by the layout's.
         space = gym.spaces.Box(-np.inf, np.inf, (0,), np.float64)
         cast("Any", MujocoEnv).__init__(self, str(self._file.path), frame_skip, space, **arguments)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.dt)}
@@ -262,7 +262,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return np.concatenate(blocks)
 
     def _number(self, name: str) -> float:
-        """Return a number by its name."""
+        """Return the number of a name."""
         if name not in self._place_of:
             raise UnknownName(f"number of {self.family.name}", name, self._place_of)
         return float(self._all_numbers(contacts=True)[self._place_of[name]])
@@ -272,7 +272,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return self.data.xpos[self._trunk].copy()
 
     def seen(self, action: NDArray[Any], before: _Floats) -> RobotState:
-        """Return what a task sees.
+        """Return a task's view of the robot.
 
         Args:
             action: The last action, shape (nu,).
@@ -368,15 +368,15 @@ def from_mjcf(
     max_episode_steps: int = 1000,
     **arguments: Any,
 ) -> gym.Env[Any, Any]:
-    """Return an env of a robot and a task of your own, as `gymnasium.make` returns it.
+    """Make an env of your own robot and task, as `gymnasium.make` does.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
             `go2_mj_description`, which downloads it.
-        task: `walk`, or a task of your own: `module:Name`, a class, a function or an object; see
+        task: `walk`, or your own task: `module:Name`, a class, a function or an object; see
             `shapechanger.envs.own_tasks`. Worker processes need one that they can import.
         body: Edits of `shapechanger.morphology`, or their JSON.
-        rig: Edits that come before those of any body, such as `AddMotor("*")` and `AddFloor()`.
+        rig: Edits that come before any body's, such as `AddMotor("*")` and `AddFloor()`.
         task_options: Arguments of the task's class.
         max_episode_steps: Steps after which an episode is truncated.
         **arguments: More arguments of `OwnRobotEnv`, such as `frame_skip` or `render_mode`.

@@ -15,7 +15,7 @@ from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError,
 from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_json
 from shapechanger.morphology.families import Family
 
-# Names of the package are those of its modules.
+# Names of the package are its modules' names.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
 _COLLADA: Final = ".dae"
@@ -69,7 +69,7 @@ class OwnFamily(Family):
 
 
 def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
-    """Replace the `package://` paths of a URDF, which only ROS resolves, by those of files."""
+    """Replace the `package://` paths of a URDF, which only ROS resolves, by paths of files."""
     for element in (*spec.meshes, *spec.textures):
         if element.file.lower().endswith(_COLLADA):
             raise BrokenModel(
@@ -86,7 +86,7 @@ def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
         if not found:
             raise BrokenModel(
                 f"{path.name} names the file {element.file}, and neither a folder {name!r} that it "
-                f"is in nor one beside these has {rest}: copy the package's folder next to "
+                f"is in nor one next to these has {rest}: copy the package's folder next to "
                 f"{path.name}, or write a path relative to it."
             )
         element.file = str(found[0])
@@ -98,7 +98,7 @@ def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
             `go2_mj_description`, which downloads it.
-        rig: Edits that come before those of any body.
+        rig: Edits that come before any body's.
 
     Raises:
         UnknownName: If there is no such file, or the package has no robot of this name.
@@ -178,6 +178,6 @@ def require_robot(model: mujoco.MjModel, path: Path) -> None:
     ]
     if unlimited:
         raise MorphologyError(
-            f"These actuators of {path.name} have no ctrlrange, so nobody knows what to send them: "
+            f"These actuators of {path.name} have no ctrlrange, so their range is unknown: "
             f"{', '.join(unlimited)}."
         )

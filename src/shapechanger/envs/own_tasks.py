@@ -1,4 +1,4 @@
-"""Tasks for robots of the user's own: what a task sees, what it returns, and where it is found.
+"""Tasks for the user's own robots: their observations, their rewards, and how they are found.
 
 A task is any object with a method `reward`, or a function:
 
@@ -48,7 +48,7 @@ class RobotState:
         standing_height: Height of the trunk above the floor when it stands, m; None for a robot
             that does not.
         can_travel: Whether the trunk can go anywhere.
-        numbers: All numbers that can be observed, by name.
+        numbers: All numbers that can be observed, keyed by name.
         floor: Height in the world of the floor below the start, m; 0 without a floor.
     """
 
@@ -71,7 +71,7 @@ class RobotState:
         return float(self.place[2]) - self.floor
 
     def __getitem__(self, name: str) -> float:
-        """Return a number by its name in the layout, such as `knee/angle`, observed or not.
+        """Return the number of a name in the layout, such as `knee/angle`, observed or not.
 
         Raises:
             UnknownName: If the robot has no such number.
@@ -91,7 +91,7 @@ class OwnTask(Protocol):
     """
 
     def reward(self, robot: RobotState, /) -> Mapping[str, float]:
-        """Return the terms of the reward by name; the reward is their sum."""
+        """Return the terms of the reward, keyed by name; the reward is their sum."""
         ...
 
 
@@ -158,7 +158,7 @@ class Walk:
 
 
 BUILT_IN: Final[Mapping[str, type[OwnTask]]] = {"walk": Walk}
-"""Tasks by name."""
+"""Tasks, keyed by name."""
 
 
 class _OfFunction:

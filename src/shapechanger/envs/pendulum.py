@@ -35,8 +35,8 @@ PENDULUM: Final = Family(
     name="InvertedPendulum",
     bodies={
         "InvertedPendulum": (),
-        # Those of the 2017 release end at (0.001, 0, h) m with h = 0.3 and 1.2: stretching along z
-        # keeps the lean of 1 mm.
+        # The poles of the original release (2017) end at (0.001, 0, h) m with h = 0.3 and 1.2:
+        # stretching along z keeps the lean of 1 mm.
         "SmallInvertedPendulum": (Stretch("pole", 0.5, axis="z"),),
         "BigInvertedPendulum": (Stretch("pole", 2.0, axis="z"),),
     },
@@ -67,13 +67,13 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
 ):
     """Gymnasium's `InvertedPendulum-v5` with any body of the pendulum family.
 
-    Actions, observations, rewards, infos and the start are those of `InvertedPendulum-v5`;
+    Actions, observations, rewards, infos and the start equal `InvertedPendulum-v5`'s;
     `observation_layout` and `action_layout` name each number. An episode ends when the pole leans
     by more than 0.2 rad, whatever its length.
 
     Args:
         body: Name of a pendulum, edits of `shapechanger.morphology`, or their JSON.
-        **arguments: All arguments of `InvertedPendulum-v5`, and those of `Reshapable`.
+        **arguments: All arguments of `InvertedPendulum-v5` and of `Reshapable`.
     """
 
     family = PENDULUM
@@ -127,7 +127,7 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
 ):
     """Gymnasium's `InvertedDoublePendulum-v5` with an editable body.
 
-    Actions, observations, rewards, infos and the start are those of `InvertedDoublePendulum-v5`;
+    Actions, observations, rewards, infos and the start equal `InvertedDoublePendulum-v5`'s;
     `observation_layout` and `action_layout` name each number. Reward and end use the tip's
     height relative to the poles' length: Gymnasium's limit of 1 m for poles of 1.2 m becomes 2 m
     for poles twice as long.
@@ -135,7 +135,7 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON. It
             must keep two hinges, which the observation and the reward rely on.
-        **arguments: All arguments of `InvertedDoublePendulum-v5`, and those of `Reshapable`.
+        **arguments: All arguments of `InvertedDoublePendulum-v5` and of `Reshapable`.
     """
 
     family = DOUBLE_PENDULUM

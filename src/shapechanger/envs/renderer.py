@@ -191,7 +191,7 @@ _DISTANCE_PER_REACH: Final = 3.0
 _HEADLIGHT: Final = 0.5
 # Geoms of the groups 3 to 5 are not drawn unless a viewer asks for them.
 _HIDDEN_GROUP: Final = 3
-# Value of the depth buffer, from 0 to 1, where nothing was drawn.
+# Value of the depth buffer, from 0 to 1, for a pixel without geoms.
 _FARTHEST: Final = 1.0
 _BACKGROUND: Final = 235
 # Largest width and height, pixels; GPUs do not draw much larger images.
@@ -301,7 +301,7 @@ def _geoms(
 def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
     """Make a model's floor, lights and sky fit to look at; nothing of this moves a body.
 
-    Neither does a sensor see it: range finders see a geom by its opacity, which stays.
+    Sensors do not see it either: range finders detect a geom by its opacity, which stays.
 
     Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
     body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows

@@ -352,7 +352,7 @@ class Reshapable(MujocoEnv):
         if trunk is not None and self._given_camera is None:
             camera = {"distance": _VIEW_DISTANCE_PER_REACH * self.reach, "elevation": -20.0}
         elif self._given_camera is None:
-            # Gymnasium's distance is that of its own pole: a longer one would be cut.
+            # Gymnasium's distance fits its own pole: a longer one would be cut.
             least = _FIXED_DISTANCE_PER_REACH * self.reach
             middle = self.model.body(1).pos.tolist()
             camera = {"distance": max(camera.get("distance", 0.0), least), "lookat": middle}

@@ -1,6 +1,6 @@
 """Half cheetah, hopper, walker, swimmer and humanoid: their families of bodies, and their envs.
 
-All models are those of Gymnasium (MIT).
+All models are Gymnasium's (MIT).
 """
 
 from __future__ import annotations
@@ -94,13 +94,13 @@ class Runner(Reshapable):
 
     The start pose is Gymnasium's, with each joint moved to its nearest limit where the model puts
     it beyond, and the trunk high enough for the feet. Noise is drawn as in Gymnasium; joints stay
-    inside their limits and feet above the floor. The standing height is that of the start pose,
+    inside their limits and feet above the floor. The standing height is the start pose's,
     because in the middle of their ranges these legs are folded.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None
             for the family's first.
-        **arguments: All arguments of Gymnasium's env, and those of `Reshapable`.
+        **arguments: All arguments of Gymnasium's env and of `Reshapable`.
 
     Attributes:
         measures: What a policy is measured by.
@@ -203,7 +203,7 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Gymnasium's `HalfCheetah-v5` with an editable body.
 
-    Actions, observations, rewards and infos are those of `HalfCheetah-v5`. See `Runner` for the
+    Actions, observations, rewards and infos equal `HalfCheetah-v5`'s. See `Runner` for the
     arguments, and for the start pose, which follows from the body.
     """
 
@@ -222,7 +222,7 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Gymnasium's `Hopper-v5` with an editable body.
 
-    Actions, observations, rewards and infos are those of `Hopper-v5`. See `HealthyRunner` for the
+    Actions, observations, rewards and infos equal `Hopper-v5`'s. See `HealthyRunner` for the
     arguments, and for the start pose and the healthy heights, which follow from the body.
     """
 
@@ -235,7 +235,7 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Gymnasium's `Walker2d-v5` with an editable body.
 
-    Actions, observations, rewards and infos are those of `Walker2d-v5`. See `HealthyRunner` for the
+    Actions, observations, rewards and infos equal `Walker2d-v5`'s. See `HealthyRunner` for the
     arguments, and for the start pose and the healthy heights, which follow from the body.
     """
 
@@ -248,7 +248,7 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Gymnasium's `Swimmer-v5` with an editable body.
 
-    Actions, observations, rewards and infos are those of `Swimmer-v5`. It swims in the horizontal
+    Actions, observations, rewards and infos equal `Swimmer-v5`'s. It swims in the horizontal
     plane and has no standing height. See `Runner` for the arguments.
     """
 
@@ -261,7 +261,7 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Gymnasium's `Humanoid-v5` with an editable body.
 
-    Actions, observations, rewards and infos are those of `Humanoid-v5`. See `HealthyRunner` for the
+    Actions, observations, rewards and infos equal `Humanoid-v5`'s. See `HealthyRunner` for the
     arguments, and for the start pose and the healthy heights, which follow from the body: the knees
     start at their limit, bent by 2 degrees, where Gymnasium's start straight.
     """

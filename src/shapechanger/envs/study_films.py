@@ -81,8 +81,8 @@ def film_study(
         longest = max(len(row) for row in rows)
         # An episode that ended stays at its last frame.
         padded = [np.concatenate([row, row[-1:].repeat(longest - len(row), 0)]) for row in rows]
-        beside: NDArray[np.uint8] = np.concatenate(padded, axis=2)
-        write_film([*beside], film, fps)
+        side_by_side: NDArray[np.uint8] = np.concatenate(padded, axis=2)
+        write_film([*side_by_side], film, fps)
     return strips
 
 

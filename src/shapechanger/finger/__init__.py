@@ -2,7 +2,7 @@
 
 Begin with `anatomy` (joints, tendons, sources of all numbers), `parameters` (what differs between
 fingers) and `reach` (the env `Finger-v1`; `track` follows `paths`). `controller` moves one, `gap`
-draws fingers like those of a rig, `identify` finds a finger's parameters from a log, `remote` runs
+draws fingers like a rig's, `identify` finds a finger's parameters from a log, `remote` runs
 the same tasks on a rig, `twin` simulates one, and `gpu` steps many fingers at once.
 """
 

@@ -30,7 +30,7 @@ PHALANX_LENGTH_M: Final = (0.0463, 0.0270, 0.0183)
 # Chosen: half the breadth of an adult's finger at each phalanx.
 PHALANX_RADIUS_M: Final = (0.0085, 0.0075, 0.0068)
 TISSUE_DENSITY: Final = 1100.0
-"""Density of the finger, kg/m³, between that of muscle, 1060, and bone."""
+"""Density of the finger, kg/m³, between the densities of muscle, 1060, and bone."""
 
 JOINT_RANGE: Final[NDArray[np.float64]] = np.radians(
     [[-20.0, 90.0], [-20.0, 20.0], [0.0, 105.0], [-5.0, 80.0]]
@@ -39,7 +39,7 @@ JOINT_RANGE: Final[NDArray[np.float64]] = np.radians(
 lower end of the knuckle is its hyperextension, 0 to 45 degrees in adults."""
 
 DIP_BY_PIP: Final = 0.6
-"""Angle of the end joint over that of the middle joint, as the extensor hood and its ligaments
+"""Ratio of the angles of end joint and middle joint, as the extensor hood and its ligaments
 couple them. Chosen; animators take two thirds (Rijpkema & Girard 1991, "Computer animation of
 knowledge-based human grasping", SIGGRAPH)."""
 DIP_BAND: Final = math.radians(8.0)
@@ -59,7 +59,7 @@ JOINT_STIFFNESS: Final[NDArray[np.float64]] = np.array([0.04, 0.04, 0.02, 0.008]
 END_STIFFNESS: Final = 4.0
 """Stiffness of a joint at the farther end of its range over that at rest. The torque of human
 knuckles rises there like an exponential (fitted by Kuo & Deshpande 2012, J. Biomechanics 45:2531);
-a cubic rises likewise, and this size is chosen."""
+a cubic rises similarly, and this size is chosen."""
 
 JOINT_DAMPING: Final[NDArray[np.float64]] = np.array([0.015, 0.015, 0.010, 0.005])
 """Passive joint damping, N·m·s/rad. Chosen so that even full, alternating tensions move no joint
@@ -71,7 +71,7 @@ JOINT_FRICTION: Final[NDArray[np.float64]] = np.array([1.0, 1.0, 0.7, 0.4]) * 1e
 
 # Moment arms, mm. The laboratory of Valero-Cuevas publishes the force and torque at the fingertip
 # of each tendon of a cadaver's index finger (R/main.r of github.com/bc/stfeasibility), in an
-# unspecified posture. FDS and DI pass the end joint without an arm, which gives the lever of that
+# unspecified posture. FDS and DI pass the end joint without an arm, which gives the lever of this
 # joint: 16 mm, flexed by 10 degrees. With knuckle and middle joint flexed by 45 degrees, as in
 # other work of that laboratory, and the two phalanges above, the arms below follow; a different
 # posture causes small errors. Often quoted numbers of An et al. 1983 (J. Biomechanics 16:419)

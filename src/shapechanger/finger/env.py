@@ -62,13 +62,13 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     Args:
         actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
-        parameters: Parameters of the finger, as `FingerParameters`, their JSON, some by name, or
-            the name of a set, "an-1983"; by default the nominal finger.
+        parameters: Parameters of the finger, as `FingerParameters`, their JSON, some keyed by name,
+            or the name of a set, "an-1983"; by default the nominal finger.
         gap: Distribution, or its name, that the finger is drawn from instead of `parameters`; see
             `shapechanger.finger.gap`.
         finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
             (domain randomisation).
-        reward: Weights that replace the default ones, by name.
+        reward: Weights that replace the default ones, keyed by name.
         render_mode: "human", "rgb_array" or "depth_array".
         width: Width of frames, pixels.
         height: Height of frames, pixels.
@@ -215,7 +215,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Return the entries of `info` that the task has at the start too."""
 
     def _terms(self, senses: FingerSenses) -> dict[str, float]:
-        """Return the terms of the reward, whose sum it is, by name."""
+        """Return the terms of the reward, keyed by name; the reward is their sum."""
         effort, change = float(np.mean(self._pulled**2)), float(np.mean(self._change**2))
         return self._reward.terms(self._distance, effort, change, CONTROL_DT)
 
@@ -243,7 +243,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return frame if frame is None else tendon_legend(frame, self._pulled)
 
     def _markers(self) -> list[dict[str, Any]]:
-        """Return what frames show besides the finger."""
+        """Return the marks that frames show besides the finger."""
         return []
 
     @property
@@ -281,7 +281,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def motors(self) -> FingerParameters | None:
-        """Motors and path that a rig's profile states; None where there is no path."""
+        """Motors and path that a rig's profile states; None without a path."""
         own = self.parameters
         if own.path is None:
             return None
@@ -345,7 +345,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
 
 FingerLike = FingerParameters | Mapping[str, Any] | str
-"""A finger as users give it: parameters, their JSON, some by name, or the name of a set."""
+"""A finger as users give it: parameters, their JSON, some keyed by name, or the name of a set."""
 
 
 def as_finger(value: FingerLike | None) -> FingerParameters:
@@ -368,7 +368,7 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
                 raise UnknownName("parameter of a finger", name, known)
         given = NOMINAL.replace(**named)
     if not isinstance(given, FingerParameters):
-        raise FingerError(f"Parameters of a finger must be numbers by name or JSON, got {given!r}.")
+        raise FingerError(f"Parameters of a finger must be numbers or JSON, got {given!r}.")
     if given not in PARAMETER_SETS.values():
         require_balance(given)
     return given

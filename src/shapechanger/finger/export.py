@@ -106,7 +106,7 @@ def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
 
 
 def _write(element: ElementTree.Element, kind: str, number: int, model: Any) -> None:
-    """Replace the numbers of an element by those of the compiled model, as many as there are."""
+    """Replace the numbers of an element by the compiled model's, as many as the element has."""
     for key, array in _EXACT[kind].items():
         if key in element.attrib:
             many = len(element.attrib[key].split())
@@ -132,7 +132,7 @@ def _custom(parameters: FingerParameters) -> ElementTree.Element:
 
 
 def _limits(parameters: FingerParameters) -> str:
-    """Return what the file does not simulate, for the comment at its top."""
+    """List the effects that the file does not simulate, for the comment at its top."""
     words = [
         "A finger of Shapechanger. Controls are -1 to 1 in the order of the actuators.",
         f"Not simulated by this file: noise of the joints ({parameters.joint_noise:g} rad) and of "
@@ -148,5 +148,5 @@ def _limits(parameters: FingerParameters) -> str:
             "least to the most."
         )
     delay = f"{1e3 * parameters.command_delay:g} ms"
-    words.append(f"The delay of the commands, {delay}, is that of the actuators (MuJoCo 4).")
+    words.append(f"The delay of the commands, {delay}, is the actuators' (MuJoCo 4).")
     return " " + "\n  ".join(words) + " "

@@ -189,7 +189,7 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
         ),
     }
 )
-"""Gaps by name."""
+"""Gaps, keyed by name."""
 
 
 def with_gears(parameters: FingerParameters) -> FingerParameters:

@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from typing_extensions import override
 
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
@@ -60,8 +61,8 @@ class DeviceFinger(DeviceTask):
         first = np.asarray(plant.model.actuator_historyadr) + 2 + samples
         self._former_places = first[:, None] + np.arange(samples)
 
+    @override
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
-        """See `DeviceTask`."""
         count, device = worlds.count, worlds.device
         zeros = partial(torch.zeros, dtype=self.precision, device=device)
         whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
@@ -79,10 +80,10 @@ class DeviceFinger(DeviceTask):
         self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
         self._seeds, self._episodes, self._steps = whole(), whole(), whole()
 
+    @override
     def start(
         self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
     ) -> None:
-        """See `DeviceTask`."""
         _put(self._seeds, mask, seeds)
         _put(self._episodes, mask, episodes)
         self._steps.masked_fill_(mask, 0)
@@ -119,8 +120,8 @@ class DeviceFinger(DeviceTask):
     def _succeeds(self) -> Tensor:
         """Whether each finger does its task, shape (n,)."""
 
+    @override
     def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
-        """See `DeviceTask`."""
         before = self._commands
         self._commands = actions.to(self.precision).clip(-1.0, 1.0)
         self._change = self._commands - before
@@ -186,16 +187,16 @@ class DeviceFinger(DeviceTask):
         """Points in the observation, of which the first is the target, m, shape (n, k, 3)."""
         return self._target[:, None]
 
+    @override
     def observations(self, worlds: Worlds) -> Tensor:
-        """See `DeviceTask`."""
         tip, points = self._seen_tip, self._points
         offsets = (points - tip[:, None]).flatten(1)
         return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(worlds.qpos.dtype)
 
+    @override
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
     ) -> DeviceOutcome:
-        """See `DeviceTask`."""
         pulled = worlds.actuator_force / constants["most"]
         terms: dict[str, Tensor] = self._env._reward.terms(
             length(self._tip - self._target),
@@ -210,8 +211,8 @@ class DeviceFinger(DeviceTask):
         infos = {**self.start_infos(worlds, constants), **plain}
         return DeviceOutcome(cast("Tensor", rewards).to(worlds.qpos.dtype), never, infos)
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         return {
             "is_success": self._succeeds,
             "distance": length(self._tip - self._target).to(worlds.qpos.dtype),
@@ -222,8 +223,8 @@ class DeviceFinger(DeviceTask):
 class DeviceReach(DeviceFinger):
     """Fingers that reach for a point."""
 
+    @override
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
-        """See `DeviceTask`."""
         super().attach(model, worlds)
         self._near = torch.zeros_like(self._steps)
         self._low, self._high, self._rest = (
@@ -259,8 +260,8 @@ class DeviceTrack(DeviceFinger):
     copies points to it.
     """
 
+    @override
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
-        """See `DeviceTask`."""
         super().attach(model, worlds)
         self._path, self._angles_there = self._env.path, self._env.start_angles
         self._times = np.zeros(worlds.count)
@@ -309,8 +310,8 @@ class DeviceTrack(DeviceFinger):
     def _succeeds(self) -> Tensor:
         return self._rms < FOLLOWS_M
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         rms = self._rms.to(worlds.qpos.dtype)
         return {**super().start_infos(worlds, constants), "rms": rms}
 
@@ -326,7 +327,7 @@ def _put(target: Tensor, mask: Tensor, values: Tensor) -> None:
 
 
 def _turned(arms: Tensor, angles: Tensor) -> Tensor:
-    """Return what joint angles wind up of the tendons, m, shape (n, 7)."""
+    """Return tendon excursions for the given joint angles, m, shape (n, 7)."""
     return torch.einsum("ntj,nj->nt", arms, angles[:, :_J])
 
 
@@ -374,7 +375,7 @@ class FingerReader:
             )
 
     def body(self, value: FingerLike | None) -> FingerParameters:
-        """Return the parameters of a finger; those of the env for None; see `as_finger`."""
+        """Return the parameters of a finger; None gives the env's; see `as_finger`."""
         return self._env.parameters if value is None else as_finger(value)
 
     def read(self, body: FingerParameters) -> tuple[DeviceBody, BatchKind]:
@@ -447,12 +448,12 @@ def _device_delay(parameters: FingerParameters, timestep: float) -> float:
             f"so take {delay - 0.1 * timestep:g} s, which never is."
         )
     # A delay ends at a step, so that it may as well end half a step before, where single precision
-    # decides alike.
+    # decides the same way.
     return (math.ceil(steps) - 0.5) * timestep if delay > 0.0 else 0.0
 
 
 def _described(parameters: FingerParameters) -> str:
-    """Return what sets a finger apart, for messages."""
+    """Describe how a finger differs from the nominal one, for messages."""
     own = [
         f"{name}={getattr(parameters, name)}"
         for name in parameters.__struct_fields__

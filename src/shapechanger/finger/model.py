@@ -221,7 +221,7 @@ def _add_tendon(
         ctrllimited=True,
         ctrlrange=[-1.0, 1.0],
         forcelimited=True,
-        # `sign` is that of a pulling force.
+        # `sign` is the sign of a pulling force.
         forcerange=sorted((sign * parameters.least_tension, sign * parameters.most_tension[i])),
         dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
         gaintype=mujoco.mjtGain.mjGAIN_AFFINE,

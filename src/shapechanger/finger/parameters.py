@@ -39,7 +39,7 @@ def as_numbers(value: Any) -> NDArray[np.float64]:
 
 
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the commands of a rig become tensions; names and units are those of its profile.
+    """How the commands of a rig become tensions; names and units are its profile's.
 
     Without a path, the tensions follow commands, lengths and speeds in each simulation step. Lag
     and delay are `motor_lag` and `command_delay` of `FingerParameters`, with a path or without.
@@ -51,7 +51,8 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             `control_hz`.
         slew_per_s: Fastest rise of a tension, in ranges from the least to the most tension per
             second; None for no limit.
-        slew_down_per_s: Fastest fall of a tension, likewise.
+        slew_down_per_s: Fastest fall of a tension, share of its range per second; None for no
+            limit.
         tension_step: Resolution of the tensions, N, which are rounded down; 0 for none.
 
     Raises:
@@ -101,7 +102,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         command_delay: Delay of the commands, s.
         joint_noise: Standard deviation of a measured angle, rad.
         tension_noise: Standard deviation of a measured tension, N.
-        path: Path of the commands on a rig, or its values by name; None if the motors follow
+        path: Path of the commands on a rig, or its values keyed by name; None if the motors follow
             commands, lengths and speeds without one.
 
     Raises:
@@ -221,12 +222,12 @@ NOMINAL: Final = FingerParameters()
 PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
     {"an-1983": NOMINAL.replace(moment_arms=AN_1983_ARMS)}
 )
-"""Other sets of parameters, by name. No tensions balance the moment arms of "an-1983"; see
+"""Other sets of parameters, keyed by name. No tensions balance the moment arms of "an-1983"; see
 `anatomy.AN_1983_ARMS`."""
 
 
 def named_set(name: str) -> FingerParameters:
-    """Return a set of parameters; raise UnknownName if there is none of this name."""
+    """Return a set of parameters; raise UnknownName for an unknown name."""
     if name not in PARAMETER_SETS:
         raise UnknownName("set of finger parameters", name, PARAMETER_SETS)
     return PARAMETER_SETS[name]

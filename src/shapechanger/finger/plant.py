@@ -158,7 +158,7 @@ _WHOLE: Final = 1e-6
 
 
 class HeldTensions:
-    """Simulates a finger whose commands take a path, in place of a drive in each simulation step.
+    """Simulates a finger whose commands take a path, instead of a drive in each simulation step.
 
     A command lasts `control_dt`, s, with `computations` of tensions; each is sent in `ticks` ticks
     of `steps` simulation steps, each `timestep`, s, long.

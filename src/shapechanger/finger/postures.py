@@ -39,7 +39,7 @@ def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
 def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, Any, Any, Any]:
     """Return angles of a finger with its tissue from independent ones, rad, arrays or tensors.
 
-    `abduction` is that of the straight knuckle, which has less when flexed; `off` is the angle of
+    `abduction` is the straight knuckle's, which has less when flexed; `off` is the angle of
     the end joint beyond the one that follows from the middle joint. The nominal finger can hold all
     angles within `inner_range`.
     """
@@ -48,7 +48,7 @@ def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, A
 
 
 def draw_start(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Sample angles, rad, (4,), near those of a finger at rest."""
+    """Sample angles, rad, (4,), near the angles of a finger at rest."""
     low, high = inner_range()
     return np.clip(JOINT_REST + rng.uniform(-START_SPREAD, START_SPREAD, 4), low, high)
 
@@ -125,7 +125,7 @@ def angles_for(
 
     Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, m, (3,),
     those near the start are preferred whose end joint is within the band of the hood. `near` are
-    angles to start from, rad, (4,); those of a finger at rest by default. The distance of the
+    angles to start from, rad, (4,); by default a finger's at rest. The distance of the
     fingertip from the point, m, is returned too.
     """
     best = _search(place, JOINT_REST if near is None else near)

@@ -42,7 +42,7 @@ class FingerReachEnv(FingerEnv):
     ## Reward
     `FingertipReward`: nearness to the target minus effort, and minus the change of the commands
     where `reward={"change": 5.0}` or so gives it a weight. With `goal=True` it is -1 where the
-    measured fingertip is farther than 5 mm from the target and 0 elsewhere, as in
+    measured fingertip is farther than 5 mm from the target and 0 elsewhere, like
     `compute_reward`.
 
     ## Start

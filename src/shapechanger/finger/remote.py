@@ -71,7 +71,7 @@ class RigMixin(FingerEnv):
         timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
             its own twin, whose clock waits for a busy machine.
         actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
-        reward: Weights that replace the default ones, by name.
+        reward: Weights that replace the default ones, keyed by name.
         render_mode: "human", "rgb_array" or "depth_array": the finger as measured.
         width: Width of frames, pixels.
         height: Height of frames, pixels.
@@ -161,19 +161,19 @@ class RigMixin(FingerEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Start an episode; the options are those of the task in simulation.
+        """Start an episode; the options equal the simulated task's.
 
         Raises:
             UnknownName: If there is no such option.
             FingerError: If a posture or a target is malformed or out of range.
-            PathError: If a path is none, or the finger cannot follow it.
+            PathError: If a path is invalid, or the finger cannot follow it.
             RobotRefused: If the rig was not armed in time, refuses the connection, stops on the way
                 to the start, or its lengths fit no posture.
             LinkError: If it cannot be reached in time.
         """
         self._seed = seed
         if self._own is not None and self._operator is not None:
-            for name in TENDONS:  # Cool the servos of its own twin; those of a rig cool in pauses.
+            for name in TENDONS:  # Cool the servos of its own twin; a rig's cool in pauses.
                 self._operator.break_servo(name, "")
         observation, info = super().reset(seed=seed, options=options)
         return observation, self._with_rig(info)
@@ -248,7 +248,7 @@ class RigMixin(FingerEnv):
                 senses = self._on_the_way(rig.length_values(by_length.lengths(senses)))
             else:
                 senses = self._on_the_way(rig.values(way.tensions(senses)))
-        # The command for the present tensions, as in simulation.
+        # The command for the present tensions, like in simulation.
         tensions = np.clip(senses.tensions, rig.least, rig.most)
         command = self.drive.command(tensions, senses.lengths, rig.speeds)
         self._command = np.clip(command, -1.0, 1.0)
@@ -295,7 +295,7 @@ class RigMixin(FingerEnv):
         return senses
 
     def _with_rig(self, info: dict[str, Any]) -> dict[str, Any]:
-        """Return an info of the task with those of the rig, and with the true state of a twin."""
+        """Return an info of the task with the rig's, and with the true state of a twin."""
         of_rig = {n: v for n, v in self._rig_info.items() if not n.startswith(_DRIVING)}
         info = {"truncated_because": "", **of_rig, **info}
         if self._truth:
@@ -308,7 +308,7 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
     ## Action and observation space, reward
-    Those of `Finger-v1`, with the same layouts, so a script runs on both by changing the id.
+    Equal to `Finger-v1`'s, with the same layouts, so a script runs on both by changing the id.
     Actions are converted to tensions here, by the newest lengths and speeds of the tendons at the
     servos. On a rig with encoders at its joints, as the shipped one, the angles are theirs, noise
     included, and velocities are their differences over 20 ms, smoothed over 40 ms. Otherwise angles
@@ -321,7 +321,7 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
     `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of a radian
     as measured, or farther off where gears stick; the target is the same. The servos of its own
-    twin are cool at the start; those of a rig need pauses, or switch off by themselves.
+    twin are cool at the start; a rig's servos need pauses, or switch off by themselves.
 
     ## End
     Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
@@ -350,7 +350,7 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     """Follow a point that moves along a known path with a real finger, or its twin.
 
     ## Action and observation space, reward
-    Those of `FingerTrack-v1`, with the same layouts; they are converted and measured as in
+    Equal to `FingerTrack-v1`'s, with the same layouts; they are converted and measured as in
     `RemoteFinger-v1`.
 
     ## Start

@@ -1,4 +1,4 @@
-"""Convert measurements and commands of a finger rig to those of `Finger-v1`."""
+"""Convert measurements and commands of a finger rig to and from `Finger-v1`'s."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ class RigSenses:
         actions = {feature.name: feature for feature in action_layout}
         lacks = [name for name in TENDONS if name not in actions]
         lacks += [
-            f"{name}/{what}"
-            for what in _QUANTITIES
+            f"{name}/{quantity}"
+            for quantity in _QUANTITIES
             for name in TENDONS
-            if f"{name}/{what}" not in state_layout
+            if f"{name}/{quantity}" not in state_layout
         ]
         if lacks or len(actions) != len(TENDONS):
             raise RobotRefused(
@@ -60,7 +60,8 @@ class RigSenses:
         self._starts = {name: place.start for name, place in slices.items()}
         self._order = [TENDONS.index(name) for name in actions]
         self._places = {
-            what: [self._starts[f"{name}/{what}"] for name in TENDONS] for what in _QUANTITIES
+            quantity: [self._starts[f"{name}/{quantity}"] for name in TENDONS]
+            for quantity in _QUANTITIES
         }
         self.most = np.array([state_layout[f"{name}/tension"].high for name in TENDONS])
         spans = [(actions[name].gain, actions[name].gain_unit) for name in TENDONS]
@@ -123,7 +124,7 @@ class RigSenses:
         missing = {self._starts[name] for name in absent if name in self._starts}
         keep = [i for i in range(len(fresh)) if i not in missing]
         self._state[keep] = fresh[keep]
-        lengths, speeds, tensions = (self._state[self._places[what]] for what in _QUANTITIES)
+        lengths, speeds, tensions = (self._state[self._places[each]] for each in _QUANTITIES)
         self.speeds: NDArray[np.float64] = speeds
         if self.has_encoders:
             angles = self._state[self._encoders]

@@ -168,7 +168,7 @@ class FingerSenses:
 def features_of_senses() -> list[Feature]:
     """Return a feature for each number of `FingerSenses.numbers`.
 
-    Ranges of angles are those of the anatomy, and ranges of tensions end at the largest of the
+    Ranges of angles are the anatomy's, and ranges of tensions end at the largest of the
     nominal finger.
     """
     joints = [(name, Element("joint", name)) for name in JOINTS]

@@ -23,9 +23,9 @@ from shapechanger.finger.parameters import FingerParameters
 
 # Stiffness and damping of an active muscle over its tension, 1/m and s/m. Both grow with tension,
 # as Cui, Perreault, Maas & Sandercock 2008 measured (J. Biomechanics 41:1945, PMC2488157). The size
-# is that of a slow stretch rather than of the first millimetres, which are ten times as stiff: at
+# is a slow stretch's rather than of the first millimetres, which are ten times as stiff: at
 # full flexion, 18 mm shorter than at rest, a flexor with fibres of 65 mm has about half of its
-# force left, as on the ascending limb of the force-length curve. The damping is chosen.
+# force left, like on the ascending limb of the force-length curve. The damping is chosen.
 _MUSCLE_STIFFNESS: Final = 25.0
 _MUSCLE_DAMPING: Final = 1.0
 # Smallest share of its tension that a muscle is taken to have left.
@@ -41,7 +41,7 @@ class TendonDrive:
 
     tension = (`offset` + `gain` u) (1 + `muscle_stiffness` (l - `rest`) + `muscle_damping` dl/dt)
     + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l beyond
-    that of the straight finger, m. A drive of tensors instead of arrays maps tensors.
+    the straight finger's, m. A drive of tensors instead of arrays maps tensors.
 
     Attributes:
         offset: Tension at rest, N, (7,).
@@ -86,7 +86,7 @@ class TendonDrive:
     def _strength(
         self, length: NDArray[np.float64], speed: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Tension of a muscle over that of its command at rest, (7,)."""
+        """Tension of a muscle divided by the tension of its command at rest, (7,)."""
         stretch = length - self.rest
         return 1.0 + self.muscle_stiffness * stretch + self.muscle_damping * speed
 
@@ -142,7 +142,7 @@ def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
     return _MAKERS[mode](np.array(parameters.most_tension))
 
 
-# Tolerance of a torque, N·m: a hundredth of that of a fingertip of 4 g about its joint.
+# Tolerance of a torque, N·m: a hundredth of the torque of a fingertip of 4 g about its joint.
 _TOLERANCE_NM: Final = 1e-6
 _LITTLE: Final = 1e-3
 # Smallest distance between bounds that the solver accepts, N.
@@ -150,7 +150,7 @@ _NOTHING: Final = 1e-9
 
 
 def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
-    """Smallest tensions, each at least 1, without torque about any joint; None if there are none.
+    """Smallest tensions, each at least 1, without torque about any joint; None if impossible.
 
     Moment arms are in m, (tendons, joints), and tensions in multiples of the smallest. With moment
     arms of full rank, every torque is then possible: a negative tension is made positive by adding

@@ -51,7 +51,7 @@ class FingerWorld(World):
 
     The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
     delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
-    The noise of the joints is that of their encoders.
+    The noise of the joints is their encoders'.
     """
 
     def __init__(self, parameters: FingerParameters, seed: int) -> None:
@@ -129,7 +129,7 @@ class FingerWorld(World):
         low, high = JOINT_RANGE.T
         posture = JOINT_REST + rng.uniform(-_START_SPREAD, _START_SPREAD, len(JOINTS))
         mujoco.mj_resetData(self._model, self._data)
-        # A generator of its own, so that the number of readings does not change the starts.
+        # A separate generator, so that the number of readings does not change the starts.
         self._noise = np.random.default_rng([seed, 1])
         self._data.qpos[:] = np.clip(posture, low, high)
         mujoco.mj_forward(self._model, self._data)

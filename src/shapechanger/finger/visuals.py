@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw, ImageFont
 from shapechanger.finger.anatomy import PHALANGES, PHALANX_LENGTH_M, TENDONS
 
 _HAND: Final = "hand"
-"""Name of the hand's body; its axes are those of the finger, at the knuckle."""
+"""Name of the hand's body; its axes are the finger's, at the knuckle."""
 
 
 TendonRoute = tuple[tuple[str, float, float, float] | str, ...]
@@ -264,7 +264,8 @@ def _add_course(
 # Narrower frames have no legend, pixels: its names would not be legible.
 _NARROWEST: Final = 240
 _SMALLEST_FONT: Final = 9.0
-# Height of the font over that of the frame. With the bars, the legend stays above a raised finger.
+# Height of the font, divided by the height of the frame. With the bars, the legend stays above a
+# raised finger.
 _FONT: Final = 1.0 / 36.0
 _INK: Final = (40, 40, 40)
 _EMPTY: Final = (205, 210, 218)

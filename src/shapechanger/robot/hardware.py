@@ -123,7 +123,7 @@ class Hardware(Protocol):
         ...
 
     def i2c(self, bus: int) -> I2cBus:
-        """Open an I2C bus by its number."""
+        """Open the I2C bus of a number."""
         ...
 
     def servo_pins(self) -> ServoPins:

@@ -52,7 +52,7 @@ class Service:
     """How a robot is served, on its hardware or on a twin."""
 
     twin: bool = False
-    """Run on simulated pins and in a simulated world in place of this machine's pins. It is then
+    """Run on simulated pins and in a simulated world instead of this machine's pins. It is then
     known here by its name, unless another robot is."""
     host: str = ""
     """Address to listen at; all of this machine's if not given, only 127.0.0.1 with --twin or
@@ -166,13 +166,13 @@ class Service:
         This process becomes the supervisor. A robot that does not start must not take the name from
         one that runs.
         """
-        # Without TLS, or with credentials of its own and any free port, the caller passes the
+        # Without TLS, or with its own credentials and any free port, the caller passes the
         # address on.
         if self.insecure or (self.credentials is not None and not self.port):
             return
         try:
             check_name(name)
-        except LinkError:  # Not every name of a robot is that of a file.
+        except LinkError:  # Not every name of a robot is a file's.
             return
         plan.daemon["port"] = port  # A daemon that is started again keeps it.
         credentials = load_credentials(self.credentials or credentials_folder(name))
@@ -236,7 +236,7 @@ def make_known(robot: KnownRobot) -> str:
     """Store a local robot among the known robots, unless its name is taken.
 
     Returns:
-        A sentence on what was done.
+        Summary message.
     """
     name = robot.name
     drives = f"`shapechanger robot drive {name}` drives it from here"

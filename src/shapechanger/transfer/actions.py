@@ -1,4 +1,4 @@
-"""Actions of learners, from -1 to 1, and those of envs, in the units of their actuators.
+"""Actions of learners, from -1 to 1, and actions of envs, in the units of their actuators.
 
 A learner explores with the same deviation in every action, so it learns nothing where an actuator
 takes ±200 N·m, and overshoots where one takes ±0.1 rad. Every learner therefore acts from -1 to 1.
@@ -26,9 +26,9 @@ class ActionScale(NamedTuple):
 
     Attributes:
         middle: Shape (n,), in the unit of each action.
-        half: Shape (n,), above zero; likewise.
-        low: Smallest actions of the env, shape (n,); likewise.
-        high: Largest actions of the env, shape (n,); likewise.
+        half: Shape (n,), above zero; in the unit of each action.
+        low: Smallest actions of the env, shape (n,); in the unit of each action.
+        high: Largest actions of the env, shape (n,); in the unit of each action.
     """
 
     middle: _Array
@@ -44,7 +44,7 @@ class ActionScale(NamedTuple):
         scale, and for actions without a range on one of the sides.
         """
         box = cast("Box[Any]", space)
-        # Bounds of a space are in single precision, those of a layout in double.
+        # Bounds of a space are in single precision, bounds of a layout in double.
         low, high = (
             side.astype(box.dtype).astype(np.float64) for side in (layout.low, layout.high)
         )

@@ -30,7 +30,7 @@ OnProgress = Callable[[str, int, bool], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A function call to run in a process of its own.
+    """A function call to run in a separate process.
 
     Attributes:
         name: Its unique name.

@@ -59,8 +59,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         settings: Its settings, the same in every arm.
         steps: Target steps of each run of scratch and fine-tune.
         source_steps: Training steps of each source policy.
-        own_steps: Training steps of methods that train a policy of their own in the source, such as
-            identified, beside a given source policy; 0 for `source_steps`.
+        own_steps: Training steps of methods that train their own policy in the source, such as
+            identified, in addition to a given source policy; 0 for `source_steps`.
         seeds: Number of runs of each arm.
         arms: The arms, by the names of their methods; scratch is always one, because the others are
             compared with it.
@@ -136,7 +136,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         return int(entropy.generate_state(1)[0] >> 1)
 
     def target_of(self, run: Run) -> EnvRef:
-        """The target of a run: where there are individuals, the one of its index."""
+        """The target of a run: the individual of its index, if there are individuals."""
         if not self.individual:
             return self.task.target
         return self.task.target.having({self.individual: run.index})
@@ -200,7 +200,7 @@ class Run(msgspec.Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """Its name, which is also that of its folder."""
+        """Its name, which also names its folder."""
         return f"{self.kind.replace(':', '.')}-{self.index}"
 
     def folder(self, study: Path) -> Path:

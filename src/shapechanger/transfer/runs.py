@@ -1,4 +1,4 @@
-"""The runs of a study, each in a process of its own, and their results.
+"""The runs of a study, each in its own process, and their results.
 
 Everything random in a run follows from its own seed.
 """
@@ -42,8 +42,8 @@ class RunResult(msgspec.Struct, frozen=True):
         seed: Its seed.
         curve: Its evaluations, by steps.
         wall_s: Duration, s; the only number here that another machine would not reproduce.
-        device: Where it learned: "CPU", or the name of a GPU; empty if it did not learn.
-        identity: Version of all that it depends on, as of its plan.
+        device: The device that trained: "CPU", or the name of a GPU; empty without training.
+        identity: Version of everything that it depends on, from its plan.
     """
 
     run: Run
@@ -79,7 +79,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
 
 
 def last_evaluation(study: Path, run: Run) -> Evaluation | None:
-    """Return the last evaluation of a run so far; None if there is none yet."""
+    """Return the last evaluation of a run so far; None before the first."""
     path = run.folder(study) / _CURVE
     try:
         # The last line may be half-written.
@@ -174,7 +174,7 @@ def _evaluate_unskilled(plan: Plan, run: Run, learner: Learner[Any]) -> Evaluati
     """Evaluate random actions, or the action zero, in the target."""
     envs = learner.evaluation_envs(plan.target_of(run))
     try:
-        # Each run draws its own actions, from starts of its own.
+        # Each run draws its own actions and its own starts.
         seed = plan.seed_of(run)
         draw = random_actions if run.kind == "random" else zero_actions
         return evaluate(

@@ -181,14 +181,14 @@ def make_plan(
         settings: Its settings.
         seeds: Number of runs of each arm, at least 2.
         steps: Target steps of a run; None for the learner's default.
-        source_steps: Source steps of a source policy; None for the learner's default. Beside a
-            given one, those of arms that train a policy of their own.
+        source_steps: Source steps of a source policy; None for the learner's default. Next to a
+            given one, the steps of arms that train their own policy.
         source_policy: File of a given source policy; None to train one for each seed.
         arms: The arms to compare, by the names of their methods.
         seed: The seed from which the seeds of all runs are drawn.
-        rules: Rules of the body map for entries without a partner, as in `BodyMap.between`.
-        map_text: The body map as TOML, in place of `rules` and `units`.
-        units: "same" or "torque", as in `BodyMap.between`.
+        rules: Rules of the body map for entries without a partner, see `BodyMap.between`.
+        map_text: The body map as TOML, instead of `rules` and `units`.
+        units: "same" or "torque", see `BodyMap.between`.
         measure: Name of a measure of the target, of one of its reward terms, or "return"; empty
             for the target's default.
         traits: What `inspect_task` returned for the task; None to inspect it now.
@@ -233,8 +233,8 @@ def make_plan(
             methods = [load_method(arm) for arm in arms]
             if all(one.uses_source_policy or not one.uses_source for one in methods):
                 raise StudyError(
-                    "Source steps have no effect beside a given source policy: no arm trains a "
-                    "policy of its own there, as randomised and identified do."
+                    "Source steps have no effect with a given source policy: no arm trains its "
+                    "own policy there, as randomised and identified do."
                 )
             own_steps = settings.whole_updates(own_steps)
         source_budget, digest = origin.steps, _digest(source_policy)

@@ -1,4 +1,4 @@
-"""Versions of what a study is made of, and how those of two studies differ.
+"""Versions of a study's parts, and the differences between two studies.
 
 Identities are kept by the part that something plays: "source" and "target", "learner", and "method
 NAME" for each arm. Parts without a model and without own files have none.
@@ -49,7 +49,7 @@ def parts_of(plan: Plan, run: Run) -> Identities:
 
 
 def shared(mine: Plan, theirs: Plan) -> Iterator[tuple[str, Identity, Identity]]:
-    """Yield the parts that two plans name alike: a title, my identity and theirs."""
+    """Yield the parts that two plans have in common: a title, my identity and theirs."""
     envs = ("source", "target")
     for part in envs:
         for other in envs:
@@ -67,7 +67,7 @@ def _pair(mine: Plan, part: str, theirs: Plan, other: str) -> tuple[Identity, Id
 
 
 def changes_between(old: Plan, new: Plan, *folders: Path) -> str:
-    """Return how what two plans name alike has changed; empty if it has not."""
+    """Describe how the common parts of two plans differ; empty if they do not."""
     found = {
         title: before.changes_to(after, _numbers(before, after, new, folders))
         for title, after, before in shared(new, old)
@@ -120,7 +120,7 @@ def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
 
 
 def require_versions(wanted: Plan, parts: Identities, found: Identities, remedy: str) -> None:
-    """Refuse parts that are no longer those of a plan."""
+    """Refuse parts that differ from a plan's."""
     if words := differences(wanted, parts, found):
         raise ForeignStudy(f"What this study was planned with has changed. {words}. {remedy}")
 

@@ -40,7 +40,7 @@ class RecordDemonstrations:
     lenses: tuple[str, ...] = ()
     """Disturbances of a vehicle's camera, such as night."""
     put_back: bool = False
-    """Put a vehicle back on its lane after a collision, in place of ending the episode."""
+    """Put a vehicle back on its lane after a collision, instead of ending the episode."""
     options: str = ""
     """More arguments of the env as JSON, such as '{"courses": "held-out"}'."""
     seed: int = 0

@@ -151,9 +151,9 @@ class _Steps:
     episode: _Episode
     """Folder of the episode."""
     first: _From = None
-    """The first step; that of the episode if not given."""
+    """The first step; the episode's if not given."""
     last: _To = None
-    """The last step; that of the episode if not given."""
+    """The last step; the episode's if not given."""
 
     def _range(self) -> tuple[Episode, int, int]:
         """Return the episode, and the first and the last step."""
@@ -250,7 +250,7 @@ class Merge:
         if done.layouts > 1:
             say(
                 f"they have {done.layouts} different layouts, and a policy learns from one: "
-                "`shapechanger demos list` says what they are of"
+                "`shapechanger demos list` lists their robots"
             )
 
 
@@ -313,9 +313,9 @@ class Import:
     camera: str = ""
     """Which camera to take from a LeRobot dataset or a tub that has several, such as front."""
     hz: float | None = None
-    """Steps per second, for formats that do not state them; measured by their times otherwise."""
+    """Steps per second, for formats that do not state them; otherwise measured from their times."""
     strict: bool = False
-    """Refuse a source that is incomplete or contradicts itself, in place of importing the rest."""
+    """Refuse a source that is incomplete or contradicts itself, instead of importing the rest."""
 
     def run(self) -> None:
         """Import and print a summary; exit with 3 if something was left out."""
@@ -350,7 +350,7 @@ class Export:
     data: _Data
     """A recording, or one episode of it."""
     out: Path
-    """The folder to make; it must not exist yet. For minari its name ends in a version, as in
+    """The folder to make; it must not exist yet. For minari its name ends in a version, such as
     drive-v0."""
     to: str
     """Format to write: minari, lerobot, csv, mcap, tub or an installed one."""
@@ -359,7 +359,7 @@ class Export:
     task: str = ""
     """What the robot does, in words, for policies that follow language; lerobot only."""
     images: bool = False
-    """Store pictures as they were recorded, in place of video; lerobot only."""
+    """Store images as they were recorded, instead of video; lerobot only."""
 
     def run(self) -> None:
         """Export and print a summary."""

@@ -33,7 +33,7 @@ class TrainClone:
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, one episode of it, or anything that `demos import` reads."""
     out: Path
-    """The file to write, such as policy.safetensors; policy.html and policy.json come beside it."""
+    """The file to write, such as policy.safetensors; policy.html and policy.json go next to it."""
     head: Literal["auto", "class", "regression"] = "auto"
     """Output: one of the demonstrated actions (at most 16), or numbers."""
     inputs: Literal["auto", "picture", "state", "both"] = "auto"
@@ -154,7 +154,7 @@ class TrainClone:
         written += [path for path in (self.sac, self.ppo) if path is not None]
         for path in written:
             if written.count(path) > 1:
-                raise OutputError(f"Cannot write two files to {path}: give each a name of its own.")
+                raise OutputError(f"Cannot write two files to {path}: give each its own name.")
             require_file(path)
 
     def _write_for_sb3(self, policy: CameraPolicy, size: tuple[int, int] | None) -> list[Path]:
@@ -236,7 +236,7 @@ class Evaluate:
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, one episode of it, or anything that `demos import` reads."""
     report: Path | None = None
-    """A page to write, with the worst frames as pictures; the numbers come beside it as JSON."""
+    """A page to write, with the worst frames; the numbers are written next to it as JSON."""
     camera: tuple[float, float] | None = None
     """Pitch and vertical field of view of the camera, degrees, for a waypoint policy on steering;
     those that the recording states if not given."""

@@ -232,7 +232,7 @@ class Calibration:
         names = {"servo": ("full left", "straight", "full right")}.get(
             output.driver, ("its fastest backward", "surely at rest", "its fastest forward")
         )
-        say(f"\n{output.name}: A and D move it, Enter where it is …")
+        say(f"\n{output.name}: A and D move it, Enter when it is …")
         with self._served(settings) as robot:
             # Servo ends are searched for; an ESC's end is full speed.
             cap = self._cap if output.driver == "esc" else 1.0

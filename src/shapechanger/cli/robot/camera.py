@@ -38,7 +38,7 @@ class CameraView:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     picture: Path | None = None
-    """JPEG of the whole field of view; taken by the robot's camera where it is left out."""
+    """JPEG of the whole field of view; taken by the robot's camera if not given."""
     board: str = ""
     """Inner corners of a checkerboard that stands upright before the robot, such as 9x6."""
     horizon: float | None = None
@@ -136,7 +136,7 @@ def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
             camera.close()
         return _decoded(jpeg, "The robot's camera sent")
     try:
-        if path.exists() and not path.is_file():  # A pipe would wait for ever.
+        if path.exists() and not path.is_file():  # A pipe would block indefinitely.
             raise RobotError(f"{path} is not a file: --picture is a JPEG.")
         with path.open("rb") as file:
             jpeg = file.read(_MOST_BYTES + 1)
@@ -150,7 +150,7 @@ def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
 
 
 def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
-    """Decode a JPEG, shape (height, width, 3); the codec's own words would help nobody."""
+    """Decode a JPEG, shape (height, width, 3); the codec's own message would not help."""
     try:
         return decode_picture(jpeg, "")
     except DemosError as error:
@@ -161,7 +161,7 @@ def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
 
 
 def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
-    """Return the picture with the virtual camera's view drawn in, and that view beside it."""
+    """Return the picture with the virtual camera's view drawn in, and the view next to it."""
     from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, Rectifier, draw_view
 
     height, width = (int(n) for n in picture.shape[:2])

@@ -279,7 +279,7 @@ class Driving:
             state = "EMERGENCY STOP"
         elif not seen.mine:
             armed = "armed, " if seen.armed else ""
-            state = f"{armed}commanded by {seen.holder or 'nobody'}"
+            state = f"{armed}commanded by {seen.holder or 'no one'}"
         else:
             state = "armed" if seen.armed else "not armed"
         senses = " ".join(

@@ -145,7 +145,7 @@ class FetchEpisodes:
     out: Annotated[Path, tyro.conf.arg(metavar="DATA")]
     """Folder for the episodes; interrupted downloads there are resumed."""
     episodes: tuple[str, ...] = ()
-    """Only these episodes, by their ids; all of them if not given."""
+    """Ids of the episodes to fetch; all if not given."""
 
     def run(self) -> None:
         """Download; exit with 1 if an episode failed."""

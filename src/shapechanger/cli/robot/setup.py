@@ -56,14 +56,14 @@ class Init:
     """Name of a shipped profile, such as car. Without any argument, up to five questions are
     asked."""
     name: str = ""
-    """Name of the robot; that of its kind if not given."""
+    """Name of the robot; the name of its kind if not given."""
     out: Path | None = None
     """The profile to write; NAME.toml if not given."""
     credentials: Path | None = None
     """Folder for the key and the certificate, if not the robot's own in the user's
     configuration."""
     camera: Literal["", "ribbon", "usb", "none"] = ""
-    """Its camera: on the Pi's ribbon cable, a webcam, or none; that of its kind if not given."""
+    """Its camera: on the Pi's ribbon cable, a webcam, or none; its kind's if not given."""
     arming: Literal["", "person", "anyone"] = ""
     """Who may arm it: only a person, or programs, too; as its kind has it if not given."""
 
@@ -74,7 +74,7 @@ class Init:
             return
         if not self.kind:
             raise RobotError(
-                "Name the kind of the new robot, as in `shapechanger robot init car`. There are: "
+                "Name the kind of the new robot, such as `shapechanger robot init car`. There are: "
                 f"{', '.join(shipped_profiles())}."
             )
         self._write()
@@ -186,7 +186,7 @@ def _one_of(options: Iterable[str], what: str) -> Callable[[str], str]:
 
 
 def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
-    """Ask until an answer passes a check, and return what the check makes of it."""
+    """Ask until an answer passes a check, and return the checked value."""
     while True:
         try:
             answer = input(f"{question} [{default}]: ").strip() or default
@@ -208,7 +208,7 @@ def own_profile(name: str) -> Path:
     path = find_profile(name)
     if path in shipped_profiles().values():
         own = Path(path.name)
-        remedy = f"`shapechanger robot init {path.stem}` writes one of your own"
+        remedy = f"`shapechanger robot init {path.stem}` writes your own"
         if own.is_file():
             remedy = f"{own} in this folder is your own"
         raise RobotError(f"{path.stem} comes with Shapechanger and is not changed: {remedy}.")
@@ -291,7 +291,7 @@ class Install:
             if machine.user == "root":
                 raise RobotError(
                     "Install it as the user that is to run the robot, without sudo, which is "
-                    "called where it is needed."
+                    "called when it is needed."
                 )
             folder = self.credentials or credentials_folder(profile.name)
             load_credentials(folder)
@@ -303,8 +303,8 @@ class Install:
             outcomes.append(outcome)
         then = {outcome.change.then for outcome in outcomes if outcome.level in {"did", "would"}}
         # A restart logs the user in again, too.
-        for what in sorted(then - {"", "log in"} or then - {""}):
-            say(_AFTERWARDS[what])
+        for each in sorted(then - {"", "log in"} or then - {""}):
+            say(_AFTERWARDS[each])
         failed = sum(outcome.level == "failed" for outcome in outcomes)
         if failed:
             say(f"\n{failed} of {len(outcomes)} could not be done.")
@@ -317,7 +317,7 @@ class Install:
             )
 
     def _unit(self, profile: Profile, user: str) -> Path:
-        """Return the unit beside the profile, written now if there is none."""
+        """Return the unit next to the profile, written now if it does not exist."""
         path = profile.path.absolute()
         unit = path.parent / unit_name(profile.name)
         if not unit.exists() and self.dry_run:

@@ -124,9 +124,9 @@ def _in_one_piece(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def _idle(model: mujoco.MjModel) -> int:
-    """Return the disable flags of what a model, without elements such as tendons, has none of."""
+    """Return the disable flags of everything that a model lacks, such as tendons."""
     # If both springs and dampers are disabled, MuJoCo skips all other passive forces too, such as
-    # those of a fluid.
+    # fluid forces.
     has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
     has_springs = model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()
     idle = int(_BIT.mjDSBL_EQUALITY)
@@ -162,7 +162,7 @@ def _without_search(
     joined = geoms_of_pairs(result, np.arange(result.npair))
     for parameter, values in mixed_parameters(result, joined).items():
         getattr(result, f"pair_{parameter}")[:] = values
-    # Leave no geom to the search, neither by itself nor by its body.
+    # Leave no geom to the search, neither by its own bits nor by its body's.
     for bits in (
         result.geom_contype,
         result.geom_conaffinity,
@@ -177,7 +177,7 @@ def _without_search(
 def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
     """Return whether each pair joins the only fixed geom with the only geom of a body.
 
-    The order of the pairs then follows from that of the bodies.
+    The order of the pairs then follows from the order of the bodies.
     """
     bodies = model.geom_bodyid[pairs]
     fixed = model.body_weldid[bodies] == 0
@@ -259,7 +259,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
             mujoco.mj_resetData(model, data)
             data.qpos[:] = pose
             data.qvel[:] = speed
-            mujoco.mj_forward(model, data)  # By the original, as in a reset.
+            mujoco.mj_forward(model, data)  # With the original model, as in a reset.
         for _ in range(_STEPS):
             action = rng.uniform(-1.0, 1.0, model.nu)
             one.ctrl[:] = two.ctrl[:] = action

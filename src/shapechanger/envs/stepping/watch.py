@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 import mujoco
 import numpy as np
 
-# Arrays closer than this in memory, bytes, are compared together with what lies between them.
+# Arrays closer than this in memory, bytes, are compared together with the bytes between them.
 _APART: Final = 64
 
 

@@ -137,7 +137,7 @@ class BatchStep:
         self._observations = observations
         self._bounds: list[Any] = [None] * len(subs)
         # Threads rarely take equally long, so each takes its own tasks from the front and then
-        # those of others from the back. A deque hands out each task once.
+        # the other threads' from the back. A deque hands out each task once.
         self._tasks: list[deque[_Task]] = [deque() for _ in range(threads)]
 
     def begin(
@@ -148,7 +148,7 @@ class BatchStep:
         Args:
             actions: One action per env.
             results: Receives the results.
-            restart: Resets an env by its number after its episode has ended; None if nothing does.
+            restart: Resets the env of an index after its episode has ended; None for no resets.
                 It is not called for envs that are concluded together.
         """
         for tasks in self._tasks:
@@ -156,7 +156,7 @@ class BatchStep:
         self._actions = actions
         self._results = results
         self._restart = restart
-        # What each binding remembers from before the physics; None where it has not stepped.
+        # Each binding's state from before the physics; None if it has not stepped.
         self._before: list[Any] = [None] * len(self._subs)
 
     def advance(
@@ -196,7 +196,7 @@ class BatchStep:
             _work_off(others, others.pop, failures)
 
     def _bind(self, number: int) -> None:
-        """Look up how an env steps its physics; where it does not, take its whole step."""
+        """Look up how an env steps its physics; if it declares no physics, take its whole step."""
         self._bounds[number] = None
         tuned = self._subs[number].tuned
         self._bounds[number] = None if tuned is None else tuned.ready_together()

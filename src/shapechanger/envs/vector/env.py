@@ -34,7 +34,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     """Envs that are stepped together, with the results of Gymnasium's `SyncVectorEnv`.
 
     MuJoCo steps outside Python's lock, so threads share the cores; each has a range of neighbouring
-    envs. Observations, rewards, ends and infos equal those of `SyncVectorEnv` to the last bit, with
+    envs. Observations, rewards, ends and infos equal `SyncVectorEnv`'s to the last bit, with
     any number of threads and after any edit of an env's model. It differs in two ways: actions are
     checked before any env steps, and an env whose simulation diverges is terminated with
     `info["diverged"]` (see `SubEnv`).
@@ -46,7 +46,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         makers: One function per env that makes it; all envs have the same Box spaces.
         threads: How many threads step, including the caller's; at least 1. With
             `render_mode="human"` it is 1, because one thread must draw all windows.
-        autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium.
+        autoreset_mode: When to reset an env whose episode has ended, see Gymnasium.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
 
     Attributes:
@@ -156,7 +156,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             chosen: Numbers of the envs to reset; None for all.
 
         Returns:
-            The observations of all envs, and the info of each, empty where it was not reset.
+            The observations of all envs, and the info of each, empty if it was not reset.
         """
         self._require_open()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

@@ -32,7 +32,7 @@ class InfoColumns(NamedTuple):
 
 
 def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> list[InfoColumns]:
-    """Group the infos of some envs by their keys, and by those of nested infos.
+    """Group the infos of some envs by their keys, including the keys of nested infos.
 
     Args:
         numbers: Numbers of the envs.
@@ -201,7 +201,7 @@ class StepResults:
         return [self._infos[number] for number in range(self.rewards.size)]
 
     def batched(self) -> dict[str, Any]:
-        """Return all infos as Gymnasium's vector envs do, including those of restarts."""
+        """Return all infos as Gymnasium's vector envs do, including the infos of restarts."""
         if self.restarts:
             self._expand()
         numbers = sorted(self._infos)

@@ -50,7 +50,7 @@ class EnvThreads:
     """Threads that each work for a fixed range of envs.
 
     An env stays with its thread: neighbours are close in memory, and OpenGL contexts may not change
-    threads. The first range is that of the caller's thread. The other threads start with the first
+    threads. The first range is the caller's. The other threads start with the first
     work, and again in a forked process. A SimpleQueue stays consistent even when a signal
     interrupts the caller; a pair of locks does not.
 

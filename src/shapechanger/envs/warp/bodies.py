@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shapechanger.envs.warp.devices import mjw, wp
 
 Rows = Mapping[str, NDArray[Any]]
-"""Arrays of one body by name."""
+"""Arrays of one body, keyed by name."""
 
 # Nothing is drawn on the device.
 _DRAWN: Final = ("cam_", "light_", "mat_", "geom_rgba", "geom_matid", "geom_group", "site_type")

@@ -36,7 +36,7 @@ def find_device(name: str | None) -> str:
     """Return the name of a device that Warp and torch can both use.
 
     Args:
-        name: Such as `cpu` or `cuda:0`; None for the first GPU, or the CPU where there is none.
+        name: Such as `cpu` or `cuda:0`; None for the first GPU, or the CPU if there is no GPU.
 
     Raises:
         UnknownName: If there is no such device.

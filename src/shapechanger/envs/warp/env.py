@@ -32,7 +32,7 @@ Tensors = Tensor | tuple[Tensor, ...]
 
 
 class WarpVectorEnv(VectorEnv[Any, Any, Any]):
-    """Worlds with bodies of their own on one device, stepped with mujoco-warp.
+    """Worlds with individual bodies on one device, stepped with mujoco-warp.
 
     Observations, rewards and ends are tensors on the device, in single precision; they follow the
     CPU env of the same id, with its constants. Worlds whose bodies have arrays of the same shapes
@@ -44,7 +44,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     `SAME_STEP`). `infos["final_obs"]` has the observations before that, and `infos["_final_obs"]`
     which worlds have ended; both are there after each step. A world whose simulation diverges is
     terminated with the reward 0, and is true in `infos["diverged"]`, which is there after each step
-    too. The other infos are those of the CPU env: per key a tensor of shape (n,), and under `_key`
+    too. The other infos equal the CPU env's: per key a tensor of shape (n,), and under `_key`
     which worlds have it.
 
     Start states have the distribution of the CPU env, but not its numbers: they depend on the seed
@@ -55,7 +55,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     Args:
         reader: Compiles bodies.
-        bodies: The body of each world, None for that of the reader; or, with `redraws`, the pool of
+        bodies: The body of each world, None for the reader's; or, with `redraws`, the pool of
             bodies.
         num_envs: How many worlds there are.
         device: Name of the device.
@@ -421,7 +421,7 @@ class _Group:
 
     Attributes:
         kind: What the bodies have in common.
-        bodies: What the device needs of each body, keyed by its edits.
+        bodies: The device's arrays of each body, keyed by its edits.
         worlds: The numbers of the worlds in the vector env.
         chosen: The body of each world, a place among `bodies`.
     """
@@ -480,7 +480,7 @@ def _masked(infos: dict[str, Tensor], mask: Tensor) -> dict[str, Any]:
 
 
 def _merged(found: dict[str, Any], infos: dict[str, Tensor], mask: Tensor) -> dict[str, Any]:
-    """Return infos with those of other worlds added.
+    """Return infos with the infos of other worlds added.
 
     Args:
         found: Infos with masks.

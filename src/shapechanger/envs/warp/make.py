@@ -37,8 +37,8 @@ def make_warp(
         env_id: Full id of the task.
         make: Makes a CPU env of it from arguments.
         num_envs: How many worlds.
-        device: Name of the device; None for the first GPU, or the CPU where there is none.
-        bodies: One body per world; None for that of `arguments` in all.
+        device: Name of the device; None for the first GPU, or the CPU if there is no GPU.
+        bodies: One body per world; None for the body of `arguments` in all.
         pool: Bodies of which each start of an episode draws one, instead of `bodies`.
         limits: Contacts (`nconmax`) and rows of constraints (`njmax`) that a world has memory for.
         task_infos: Whether steps and resets return the infos of the CPU env.

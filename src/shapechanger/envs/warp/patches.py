@@ -5,7 +5,7 @@
   plane's normal, and along the world's axes for steeper ones, which turns the pyramid by up to 45
   degrees: an ant's step with a steep shank on the floor then differs by a third in some velocities.
   With elliptic cones, whose friction has no direction, both agree to 1e-5, so nothing else differs.
-- **Moment arms.** mujoco-warp keeps those of fixed tendons, `wrap_prm`, once for all worlds.
+- **Moment arms.** mujoco-warp keeps the arms of fixed tendons, `wrap_prm`, once for all worlds.
 
 Both replace private functions, and so only of the version whose code they were written for;
 `tests/envs/warp/test_patches.py` fails as soon as a version needs one no longer.
@@ -88,7 +88,7 @@ def _write_tendon(
 ):
     """Write the length of a tendon in a world, the sum of arms by angles, and its derivative."""
     world, tendon = wp.tid()
-    own = world * joints.shape[0]  # Its world's arms are behind those of the worlds before.
+    own = world * joints.shape[0]  # Its world's arms follow the previous worlds' arms.
     length = float(0.0)  # noqa: UP018  # Warp tells variables from constants by this.
     for i in range(first[tendon], first[tendon] + count[tendon]):
         length += arms[own + i] * angles[world, angle_of[joints[i]]]
@@ -102,7 +102,7 @@ def _write_tendon(
 
 
 def _tendon(model: Any, data: Any) -> None:
-    """Compute the tendons, and again where each world has arms of its own."""
+    """Compute the tendons, and again if each world has its own arms."""
     _theirs(model, data)
     if model.wrap_prm.size == data.nworld * model.wrap_objid.size and data.nworld > 1:
         wp.launch(

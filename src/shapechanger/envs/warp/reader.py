@@ -28,7 +28,7 @@ class Reader(Protocol):
     spec: Any
 
     def body(self, value: Any) -> Any:
-        """Return a body as it is kept, such as a tuple of edits; that of the arguments for None."""
+        """Return a body as it is kept, such as a tuple of edits; None gives the arguments' body."""
         ...
 
     def read(self, body: Any) -> tuple[DeviceBody, BatchKind]:
@@ -56,7 +56,7 @@ def register_reader(env_class: type, reader: Callable[[gym.Env[Any, Any]], Reade
 def make_reader(
     env_id: str, make: Callable[[dict[str, Any]], gym.Env[Any, Any]], arguments: dict[str, Any]
 ) -> Reader:
-    """Return what reads the bodies of a task.
+    """Return the reader of a task's bodies.
 
     Args:
         env_id: Full id of the task.
@@ -104,7 +104,7 @@ class BodyReader:
         self._usual = cast("Body", self._envs[0].body)
 
     def body(self, value: BodyLike | None) -> Body:
-        """Return the edits of a body; those of the arguments for None."""
+        """Return the edits of a body; None gives the arguments' edits."""
         return self._usual if value is None else self._envs[0].family.body(value)
 
     def read(self, body: Body) -> tuple[DeviceBody, BatchKind]:

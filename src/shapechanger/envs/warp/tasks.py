@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from typing_extensions import override
 
 from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
 from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, NAMESPACE
@@ -118,7 +119,7 @@ class DeviceTask(ABC):
         worlds.step()
 
     def place(self, worlds: Worlds) -> Tensor:
-        """Return what the reward needs from before the physics; a view."""
+        """Return the state from before the physics that the reward needs (a view)."""
         return worlds.qpos[:, :0]
 
     @abstractmethod
@@ -157,9 +158,9 @@ class DeviceAnt(DeviceTask):
         super().__init__(env)
         self._main = int(env.model.body(env.main_body).id)
 
+    @override
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
-        """See `DeviceTask`."""
         low, high = env.healthy_z_range
         return {**DeviceTask.constants(env), "low": np.array(low), "high": np.array(high)}
 
@@ -170,17 +171,17 @@ class DeviceAnt(DeviceTask):
     def _forces(self, worlds: Worlds) -> Tensor:
         return worlds.cfrc_ext.clamp(*self._env._contact_force_range)
 
+    @override
     def observations(self, worlds: Worlds) -> Tensor:
-        """See `DeviceTask`."""
         parts = [worlds.qpos[:, 2 if self._env.place_hidden else 0 :], worlds.qvel]
         if self._env.contacts_observed:
             parts.append(self._forces(worlds)[:, 1:].flatten(1))
         return torch.cat(parts, dim=1)
 
+    @override
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
     ) -> DeviceOutcome:
-        """See `DeviceTask`."""
         env, qpos = self._env, worlds.qpos
         velocity = (self.place(worlds) - before) / constants["dt"][:, None]
         upright = is_upright(
@@ -198,8 +199,8 @@ class DeviceAnt(DeviceTask):
         )
         return DeviceOutcome(rewards, ~healthy & bool(env._terminate_when_unhealthy), infos)
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         place = worlds.qpos[:, :2]
         return {
             "x_position": place[:, 0].clone(),
@@ -211,14 +212,14 @@ class DeviceAnt(DeviceTask):
 class DevicePendulum(DeviceTask):
     """Inverted pendulums of any length."""
 
+    @override
     def observations(self, worlds: Worlds) -> Tensor:
-        """See `DeviceTask`."""
         return torch.cat([worlds.qpos, worlds.qvel], dim=1)
 
+    @override
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
     ) -> DeviceOutcome:
-        """See `DeviceTask`."""
         finite = self.observations(worlds).isfinite().all(dim=1)
         up = finite & (worlds.qpos[:, 1].abs() <= FALLEN_RAD)
         rewards = up.to(worlds.qpos.dtype)
@@ -231,30 +232,30 @@ class DeviceDoublePendulum(DeviceTask):
     normal_velocities = True
     start_forces = True
 
+    @override
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
-        """See `DeviceTask`."""
         found = DeviceTask.constants(env)
         for name in ("foot_m", "length_m", "plain_foot_m", "plain_length_m"):
             found[name] = np.array(getattr(env, f"_{name}"))
         return found
 
+    @override
     def observations(self, worlds: Worlds) -> Tensor:
-        """See `DeviceTask`."""
         qpos, clip = worlds.qpos, (-CLIPPED_AT, CLIPPED_AT)
         hinges = qpos[:, 1:]
         velocities, force = worlds.qvel.clamp(*clip), worlds.qfrc_constraint[:, :1].clamp(*clip)
         return torch.cat([qpos[:, :1], hinges.sin(), hinges.cos(), velocities, force], dim=1)
 
+    @override
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
     ) -> DeviceOutcome:
-        """See `DeviceTask`."""
         env, tip = self._env, worlds.site_xpos[:, 0]
         part = tip[:, 2] - constants["foot_m"]
         height = part * (constants["plain_length_m"] / constants["length_m"])
         height = height + constants["plain_foot_m"]
-        fallen = ~(height > FALLEN_M)  # Also where it is not a number.
+        fallen = ~(height > FALLEN_M)  # True if the height is not a number.
         # Gymnasium's formula, without the bonus, which it adds by a condition.
         there = SimpleNamespace(
             data=SimpleNamespace(qvel=worlds.qvel.T), _healthy_reward=env._healthy_reward
@@ -273,8 +274,8 @@ class DeviceRunner(DeviceTask):
         """Return the place of the trunk, m, shape (n, place_size)."""
         return worlds.qpos[:, : self.place_size]
 
+    @override
     def observations(self, worlds: Worlds) -> Tensor:
-        """See `DeviceTask`."""
         env = self._env
         hidden = env.place_size if env._place_hidden else 0
         velocities = worlds.qvel.clamp(-env.velocity_limit, env.velocity_limit)
@@ -289,10 +290,10 @@ class DeviceRunner(DeviceTask):
         del worlds
         return 0.0
 
+    @override
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
     ) -> DeviceOutcome:
-        """See `DeviceTask`."""
         env = self._env
         velocity = (self.place(worlds) - before) / constants["dt"][:, None]
         healthy = self.healthy(worlds, constants)
@@ -311,8 +312,8 @@ class DeviceRunner(DeviceTask):
         ends = bool(getattr(env, "_terminate_when_unhealthy", False))
         return DeviceOutcome(rewards, ~healthy & ends, {**infos, **terms})
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         return {"x_position": worlds.qpos[:, 0].clone()}
 
 
@@ -321,8 +322,8 @@ class DeviceSwimmer(DeviceRunner):
 
     place_size = 2
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         place = self.place(worlds)
         return {
             "x_position": place[:, 0].clone(),
@@ -340,9 +341,9 @@ class DeviceCheetah(DeviceRunner):
 class DeviceWalker(DeviceRunner):
     """Walkers, which are healthy within heights and leans."""
 
+    @override
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
-        """See `DeviceTask`."""
         low, high = env.healthy_z_range
         return {**DeviceTask.constants(env), "low": np.array(low), "high": np.array(high)}
 
@@ -353,8 +354,8 @@ class DeviceWalker(DeviceRunner):
         upright = (low < lean) & (lean < high)
         return upright & (constants["low"] < height) & (height < constants["high"])
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         qpos, start = worlds.qpos, constants["init_qpos"]
         return {
             "x_position": qpos[:, 0].clone(),
@@ -392,9 +393,9 @@ class DeviceHumanoid(DeviceRunner):
             if getattr(env, f"_include_{name}_in_observation") is True
         ]
 
+    @override
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
-        """See `DeviceTask`."""
         return DeviceWalker.constants(env)
 
     def place(self, worlds: Worlds) -> Tensor:
@@ -402,8 +403,8 @@ class DeviceHumanoid(DeviceRunner):
         mass = worlds.row("body_mass")
         return (mass[..., None] * worlds.xipos[..., :2]).sum(dim=1) / mass.sum(dim=1)[:, None]
 
+    @override
     def observations(self, worlds: Worlds) -> Tensor:
-        """See `DeviceTask`."""
         blocks = [getattr(worlds, name)[:, first:].flatten(1) for name, first in self._blocks]
         return torch.cat([super().observations(worlds), *blocks], dim=1)
 
@@ -418,8 +419,8 @@ class DeviceHumanoid(DeviceRunner):
         cost = _cost(env._contact_cost_weight, worlds.cfrc_ext)
         return cost.clamp(*env._contact_cost_range)
 
+    @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """See `DeviceTask`."""
         place = worlds.qpos[:, :2]
         return {
             "x_position": place[:, 0].clone(),
@@ -466,7 +467,7 @@ def find_device_task(env: gym.Env[Any, Any], env_id: str) -> type[DeviceTask]:
             if task.device
         )
         raise VectorEnvError(
-            f"{env_id} has no batched functions, which backend='warp' needs: there are those of "
+            f"{env_id} has no batched functions, which backend='warp' needs: those exist for "
             f"{', '.join((*known, *own))} and {last}."
         )
     return found

@@ -51,7 +51,7 @@ _OVERFLOWS: Final = {
 class Worlds:
     """Models and data of worlds whose bodies have arrays of the same shapes.
 
-    All tensors are views of what the device steps.
+    All tensors are views of the device's data.
 
     Args:
         model: A body of the batch.

@@ -127,7 +127,7 @@ def robust_covariance(
     """Sandwich estimate of a least-squares fit's covariance, (p, p), with correlated residuals.
 
     Residuals at the optimum, (times, k), with their Jacobian, (times, k, p), may be correlated with
-    others within half a second; the weights are those of Newey & West 1987 (Econometrica 55:703).
+    others within half a second; the weights follow Newey & West 1987 (Econometrica 55:703).
     """
     squares = np.einsum("tip,tiq->pq", jacobian, jacobian)
     bread = np.asarray(np.linalg.pinv(squares, hermitian=True), np.float64)

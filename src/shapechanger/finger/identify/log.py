@@ -60,7 +60,7 @@ class FingerLog:
         commands: Commands that acted in the period ending at `t`, -1 to 1, (n, 7).
         angles: Joint angles, rad, (n, 4); flexion and radial abduction are positive.
         tensions: Tendon tensions, N, (n, 7).
-        lengths: Tendon lengths as wound by their motors, m, (n, 7); winding up shortens them.
+        lengths: Tendon lengths that their motors wound, m, (n, 7); winding up shortens them.
         actions: Meaning of a command; see `shapechanger.finger.tensions.DRIVES`.
         control_dt: Control period, s.
         source: Recorded env or robot, such as an env id.
@@ -285,7 +285,7 @@ def record_babble(
 
     Raises:
         LayoutError: If the env has no `observation_layout`.
-        UnknownName: If its layout is not that of a finger.
+        UnknownName: If its layout is not a finger's.
         FingerError: If its observations are not a vector, or it ends too early.
     """
     if not isinstance(env.observation_space, gym.spaces.Box):

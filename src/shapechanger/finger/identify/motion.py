@@ -141,7 +141,7 @@ class Dynamics:
 
     Attributes:
         values: Parameters by the names of `FACTORS`, in SI units.
-        sd: Standard errors of their logarithms, by name, if the model is right.
+        sd: Standard errors of their logarithms, keyed by name, if the model is right.
     """
 
     values: dict[str, float]
@@ -227,7 +227,7 @@ class _MotionFit:
         return found
 
     def residual(self, x: NDArray[np.float64], parameters: Any, **more: Any) -> Any:
-        """Errors of the angles, window by window, then those of the prior, each over its sd."""
+        """Errors of the angles, window by window, then the prior's, each over its sd."""
         errors, predicted, measured = self._residual(x, parameters, **more)
         priors = x / _PRIOR_SD
         return [*errors, priors], predicted, measured

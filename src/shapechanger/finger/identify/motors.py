@@ -73,7 +73,8 @@ class Motors:
     Attributes:
         lag: Time constant between a command and its force, s.
         delay: Delay of the commands, s.
-        strength: Largest tensions, over those of the finger assumed in the fit.
+        strength: Largest tensions, divided by the largest tensions of the finger assumed in the
+            fit.
         sd: Standard errors of these three.
         saturates: Whether a tendon reached its largest tension, so that `strength` is an estimate.
         tension_noise: Standard deviation of measured tensions, N.
@@ -88,7 +89,7 @@ class Motors:
 
 
 def fit_motors(log: FingerLog) -> Motors:
-    """Fit lag, delay and strength of the motors to a log, over those of its motors, if known."""
+    """Fit lag, delay and strength of the motors to a log, starting from its motors, if known."""
     known = log.motors or NOMINAL
     most = np.array(known.most_tension)
     drive = drive_of(log.actions, NOMINAL)
@@ -123,7 +124,7 @@ def fit_motors(log: FingerLog) -> Motors:
     x = np.asarray(best.x, np.float64)
     left = residual(x).reshape(int(rows.sum()), -1)
     noise = max(_LEAST_NOISE_N, float(1.4826 * np.median(np.abs(left))))
-    # Outliers weigh little, such as those of a servo that switched itself off.
+    # Outliers weigh little, such as the readings of a servo that switched itself off.
     weights = np.minimum(1.0, 3.0 * noise / np.maximum(np.abs(left), _LEAST_NOISE_N))
     jacobian = np.asarray(best.jac).reshape(*left.shape, -1)
     saturated = (demanded(x) > x[2] * most).any(axis=1).mean()

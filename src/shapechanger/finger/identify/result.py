@@ -44,7 +44,7 @@ _FITTED: Final = 0.8
 _NORMAL: Final = 1.96
 # Standard deviations, in logarithms, of the motion fit's errors that come from the model: measured
 # over twenty fingers of the gap "real-like" (`benchmarks/finger_identify.py`). Their tendons
-# stretch; those of the fit do not. The hood hides the stiffness of the end joint, and without a
+# stretch; the fit's do not. The hood hides the stiffness of the end joint, and without a
 # rig's path, stretch hides friction.
 _MODEL_ERROR: Final = {
     "joint_stiffness": 0.15,
@@ -363,7 +363,7 @@ def _stiffness(kinematics: Kinematics) -> float | None:
 
 
 def _stiffness_estimate(kinematics: Kinematics, reach: float) -> ParameterEstimate:
-    """Estimate of the stiffness; its interval is asymmetric, as that of the compliance is not."""
+    """Estimate the stiffness; its interval is asymmetric, because the compliance's is not."""
     half = reach * math.hypot(kinematics.compliance_sd, _STRETCH_ERROR * kinematics.compliance)
     most, least = kinematics.compliance + half, kinematics.compliance - half
     low = 1.0 / most if most > 0.0 else math.inf

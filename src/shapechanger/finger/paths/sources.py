@@ -258,7 +258,7 @@ def as_path(value: PathSource) -> FingertipPath:
 
     Raises:
         UnknownName: If there is no such shape, or it has no such setting.
-        PathError: If it is none of these, or the path is invalid.
+        PathError: If it is not one of these, or the path is invalid.
     """
     given: Any = value  # May be anything where nothing checks types.
     if isinstance(given, FingertipPath):

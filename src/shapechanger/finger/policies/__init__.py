@@ -1,4 +1,4 @@
-"""The policies of the finger that come with the package; `README.md` beside this is their card."""
+"""The policies of the finger that come with the package, with their card in `README.md`."""
 
 from __future__ import annotations
 
@@ -14,4 +14,4 @@ _FOLDER: Final = Path(__file__).parent
 POLICIES: Final[Mapping[str, Path]] = MappingProxyType(
     {task: _FOLDER / f"{task}.safetensors" for task in ("reach", "track")}
 )
-"""File of the policy by what it does: "reach" for `Finger-v1`, "track" for `FingerTrack-v1`."""
+"""File of the policy of each task: "reach" for `Finger-v1`, "track" for `FingerTrack-v1`."""

@@ -21,7 +21,7 @@ CAMERA_DRIVERS: Final = {
     "pipe": "shapechanger.robot.cameras.pipe:Pipe",
     "pattern": "shapechanger.robot.cameras.pattern:Pattern",
 }
-"""MODULE:NAME of each camera driver, by its name in a profile; called with the plan."""
+"""MODULE:NAME of each camera driver, keyed by its name in a profile; called with the plan."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ _MAX_SKIPPED: Final = 1 << 20
 
 
 def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
-    """Check that a frame is a complete JPEG of the expected size, by its header and its end."""
+    """Check that a frame is a complete JPEG of the expected size, from its header and its end."""
     if len(jpeg) > _MAX_JPEG:
         raise RobotError(f"The camera returned {len(jpeg)} bytes; a frame has at most {_MAX_JPEG}.")
     if not simplejpeg.is_jpeg(jpeg):

@@ -53,7 +53,7 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
 
 
 def read_barcode(image: NDArray[np.uint8]) -> int | None:
-    """Read the number that `draw_barcode` drew; None if there is none.
+    """Read the number that `draw_barcode` drew; None without a barcode.
 
     Args:
         image: The image, shape (height, width, 3).

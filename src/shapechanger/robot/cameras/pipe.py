@@ -1,7 +1,7 @@
 """Camera driver for a JPEG stream from a named pipe, a file or a program such as rpicam-vid.
 
 A frame may carry its time of capture in a comment segment (`captured_ns=`, monotonic). Otherwise
-its time is that of its last byte, which hides the delay of the source; so that frames that waited
+it gets the time of its last byte, which hides the delay of the source; so that frames that waited
 in the pipe do not look new, the pipe is drained first.
 """
 

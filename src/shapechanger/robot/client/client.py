@@ -50,7 +50,7 @@ def _own_name() -> str:
 
 
 class RobotClient:
-    """Connection to a robot, made by `connect` and kept by a thread of its own.
+    """Connection to a robot, made by `connect` and kept by its own thread.
 
     All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
     the robot refuses.
@@ -241,7 +241,7 @@ class RobotClient:
 
         Args:
             newer_than: Its `seq` is larger than this.
-            timeout_s: Time limit, s; None for that of the link.
+            timeout_s: Time limit, s; None for the link's.
 
         Raises:
             StaleObservation: If none arrives in time.
@@ -306,7 +306,8 @@ class RobotClient:
             name: Title of the episode.
 
         Raises:
-            RobotRefused: If the robot cannot record, as on a full disk, or records already.
+            RobotRefused: If the robot cannot record, for example on a full disk, or records
+                already.
             LinkError: If it does not answer in time.
         """
         return self._ask_disk(
@@ -338,7 +339,7 @@ class RobotClient:
         )
 
     def run_policy(self, name: str) -> messages.PolicyState:
-        """Start a policy on board in place of the one that runs; only as a person.
+        """Start a policy on board instead of the running one; only as a person.
 
         Args:
             name: Name of the policy; "" to end the one that runs.
@@ -435,7 +436,7 @@ class RobotClient:
         """Release and close without waiting or taking a lock.
 
         For clients that are dropped without `close`: the garbage collector may call this in any
-        thread, including that of the connection.
+        thread, including the connection's.
         """
         loop, connection = self._loop, self._connection
         if self._process != os.getpid() or loop is None or connection is None:
@@ -510,7 +511,7 @@ class RobotClient:
         except LinkError as error:
             self._inbox.fail(error)
         except BaseException as error:
-            # Waiting callers must not wait for ever.
+            # Waiting callers must not block indefinitely.
             self._inbox.fail(LinkError(f"The link to the robot failed: {error!r}."))
             raise
         else:

@@ -94,7 +94,7 @@ class RobotConnection:
         self._posted = asyncio.Event()
 
     def post(self, message: ClientMessage) -> None:
-        """Queue a message, in place of one of the same type that still waits.
+        """Queue a message, replacing a waiting message of the same type.
 
         After a blocked connection the robot so gets the newest command, and no older ones.
         """
@@ -410,7 +410,7 @@ class Inbox:
         last = self.newest
         if last is not None and message.seq <= last.message.seq:
             raise LinkError(
-                f"Observation {message.seq} arrived after {last.message.seq}, as in a replay."
+                f"Observation {message.seq} arrived after {last.message.seq} as if replayed."
             )
         jpeg = message.frame
         if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:

@@ -74,19 +74,19 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     ended half a period late or more; `armed`, `emergency`; `absent`: features of the state without
     a measurement, which have the middle of their range; `captured_ns` and `decided_ns`: capture
     time of the frame, and arrival time of the applied command, ns of the robot's clock;
-    `intervene_action`: command of a person who has control in place of the program.
+    `intervene_action`: command of a person who has control instead of the program.
 
     Args:
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
         key: The robot's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
-        size: Width and height of the pictures, pixels, such as (128, 128) in 2017; see
-            `resize_picture`. None for those of the camera.
+        size: Width and height of the pictures, pixels, such as (128, 128) in the original release;
+            see `resize_picture`. None for the camera's.
         state: Whether observations have the state besides the picture.
         image: Whether observations have a picture; None if the robot has a camera.
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
             for each command and answers one period later.
-        reward: Weights that replace those of the robot's profile, by name.
+        reward: Weights that replace the profile's, keyed by name.
         on_reset: "operator": a person puts the robot back and arms it; where anyone may arm it, the
             env does so at once. "person": always a person. "routine": the reset routine of the
             profile. Or a function that is called with the seed.
@@ -223,7 +223,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if self._on_reset == "routine":
             ready.require_routine(robot)
         ready.take(robot)
-        # Nobody must carry an armed robot, nor may the last command stay in force. Arming it then
+        # An armed robot must not be carried, nor may the last command stay in force. Arming it then
         # confirms that it is at the start.
         if self._on_reset != "routine" and self._has_stepped:
             ready.disarm(robot)

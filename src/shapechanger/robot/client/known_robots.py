@@ -33,7 +33,7 @@ from shapechanger.robot.link.authentication import (
 )
 
 INSECURE: Final = "insecure"
-"""In place of a fingerprint: no encryption, and no proof of the robot's identity."""
+"""Instead of a fingerprint: no encryption, and no proof of the robot's identity."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _FIELDS: Final = ("address", "key", "fingerprint")

@@ -154,7 +154,7 @@ class RobotSpaces:
         return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
 
     def quantity(self, message: Observation, name: str) -> float | None:
-        """Return a quantity of the state by name, or None if no sensor measures it."""
+        """Return a quantity of the state, or None if no sensor measures it."""
         place = self._places.get(name)
         if place is None or message.sources.get(name, _ABSENT) == _ABSENT:
             return None
@@ -167,7 +167,7 @@ class RobotSpaces:
         return message.sources[name] if is_measured else _ABSENT
 
     def shows(self, received: Received) -> bool:
-        """Decode the frame of an observation. Return False if there is none, or it is invalid.
+        """Decode the frame of an observation. Return False for a missing or invalid frame.
 
         After an invalid frame `picture` is still the previous one, and `View.fresh` is False.
         """

@@ -13,7 +13,7 @@ from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.link.messages import Observation
 
-_POLL_S: Final = 0.05  # Period of checks for what a person does.
+_POLL_S: Final = 0.05  # Period of checks for a person's actions.
 _LOG_AFTER_S: Final = 2.0  # Shorter waits are not logged.
 _NS_PER_S: Final = 1e9
 
@@ -70,7 +70,7 @@ class Preparation:
                 raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
 
     def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
-        """Arm the robot where that is allowed, or wait for a person; we then have control."""
+        """Arm the robot if that is allowed, or wait for a person; we then have control."""
         name = robot.welcome.robot
         because = "It waits for a person"
         first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "

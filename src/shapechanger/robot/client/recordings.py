@@ -56,7 +56,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
     """Download one episode, or the new part of it.
 
     An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
-    here are kept after those of the robot, so that they override these.
+    here are kept after the robot's, so that they override these.
     """
     here, part = data / name, data / f".{name}{_PART}"
     folder = here if is_episode(here) else part
@@ -74,7 +74,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
         if begin and [line.encode() + b"\n" for line in piece.lines[:1]] != have[begin - 1 : begin]:
             raise DemosError(
                 f"{folder} has other steps than {name} on the robot, so it stays as it is: "
-                "`--out` with another folder fetches that of the robot."
+                "`--out` with another folder fetches the robot's."
             )
         while piece.lines:
             lines = _kept(piece, folder / FRAMES)

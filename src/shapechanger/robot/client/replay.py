@@ -32,7 +32,7 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
         terminal.keys(0.0)  # Keys pressed before this line was shown are no consent.
         say(
             f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
-            f"{robot.welcome.robot} starts from where it stands now.\n"
+            f"{robot.welcome.robot} starts from its present place.\n"
             "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )
         if not _agreed(robot, terminal):
@@ -66,7 +66,7 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
         )
     if welcome.clock == "twin":
         raise DemosError(
-            f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so nobody "
+            f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so no one "
             "could stop it in time: serve it with `--clock real`."
         )
 
@@ -91,7 +91,7 @@ def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
             robot.emergency_stop("A person pressed a key.")
             return f"stopped by a key after {number} of {len(steps)} steps: emergency stop"
         if not (seen.mine and seen.armed):
-            why = seen.stop_reason or f"{seen.holder or 'nobody'} commands it now"
+            why = seen.stop_reason or f"{seen.holder or 'no one'} commands it now"
             return f"stopped after {number} of {len(steps)} steps: {why}"
         # The applied actions include the caps at that time; the current caps apply on top.
         robot.command(step.action if step.applied is None else step.applied, answers=seen.seq)

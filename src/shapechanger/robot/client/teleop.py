@@ -102,7 +102,7 @@ STOPS: Final = frozenset({"space", "escape"})
 """Keys that stop the robot."""
 
 OTHER: Final = "other"
-"""Name of everything without a meaning of its own: function keys, Alt and Ctrl combinations, pasted
+"""Name of everything without its own meaning: function keys, Alt and Ctrl combinations, pasted
 text, mouse reports and replies of the terminal."""
 
 ESCAPE_WAIT_S: Final = 0.05
@@ -235,7 +235,7 @@ class KeyParser:
         self._state, self._begun_s, self._text, self._is_reported = state, now_s, "", False
 
     def _two_bytes(self, now_s: float) -> None:
-        """Begin a character of another encoding, whose second byte may be that of a letter."""
+        """Begin a character of another encoding, whose second byte may be a letter's."""
         self._begin(_State.TAIL, now_s)
         self._left = 1
 
@@ -319,7 +319,7 @@ class Terminal:
 
     def __init__(self) -> None:
         if not sys.stdin.isatty():
-            raise NoTerminal("Driving with keys needs a terminal, and the standard input is none.")
+            raise NoTerminal("Driving with keys needs a terminal, but stdin is not a terminal.")
         self._fd = sys.stdin.fileno()
         self._before = termios.tcgetattr(self._fd)
         self._parser = KeyParser()

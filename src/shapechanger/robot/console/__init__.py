@@ -21,7 +21,7 @@ _KINDS: Final = {
 
 
 def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
-    """Return the media type and the content (UTF-8) of each file of the console, by name.
+    """Return the media type and the content (UTF-8) of each file of the console.
 
     Raises:
         RobotError: If they cannot be read, as after a failed installation.

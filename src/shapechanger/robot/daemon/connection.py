@@ -109,7 +109,7 @@ class ObservationPacer:
             await session.updated.wait()
         if session.pace == "lockstep" and not self._time.in_steps:
             await self._time.step(self._period_s)
-        # The lease holder advances time, or any client if there is none.
+        # The lease holder advances time, or any client without a holder.
         elif self._time.in_steps and (lease.holder is None or lease.holds(session.client.session)):
             await self._time.step(self._period_s)
             if session.pace == "realtime":

@@ -131,7 +131,7 @@ class StateReader:
         return tuple(values)
 
     def sources(self, state: GuardState | None) -> dict[str, str]:
-        """Return the source of each quantity by name."""
+        """Return the source of each quantity."""
         known = {} if state is None else state.sources
         return {name: _ABSENT for name in self._measured if name not in known} | known
 

@@ -201,7 +201,7 @@ class SessionHub:
         self._suggestion = PendingCommand(client, values, until_ns)
 
     def commanded(self) -> tuple[float, ...]:
-        """Return the values of the command in force, or () if there is none."""
+        """Return the values of the command in force, or () without one."""
         command = self._command
         if command is None or self.state is None or not self.state.armed:
             return ()

@@ -1,4 +1,4 @@
-"""Policies on board: each drives from a process of its own, as a client like any other.
+"""Policies on board: each drives from its own process, as a client like any other.
 
 The process has no other way to the outputs than the link, so lease, deadline, guard and the person
 who takes over hold for it. A policy that crashes loses its connection, and with it control; one
@@ -79,7 +79,7 @@ class PolicyRunner:
         return PolicyState(names=tuple(names), running=self._running, text=self._text)
 
     def run(self, name: str) -> str:
-        """Start a policy in place of the one that runs, or end that one.
+        """Start a policy instead of the running one, or end the running one.
 
         Returns:
             The reason why it is refused, a sentence; "" if it is not.
@@ -171,7 +171,7 @@ async def _finish(process: Process) -> None:
 
 
 def _decoded(line: bytes) -> dict[str, Any]:
-    """Return what a policy's process said; nothing for anything but a JSON object."""
+    """Decode a message of a policy's process; empty unless it is a JSON object."""
     try:
         said = json.loads(line)
     except ValueError:

@@ -48,7 +48,7 @@ _Job = Callable[[EpisodeWriter], EpisodeWriter]
 """Writes to an episode, and returns the writer of the episode that is open after that."""
 
 _Write = Callable[[Step, bytes | None], object]
-"""Writes a step and its frame, which is None if it is that of the step before."""
+"""Writes a step and its frame, which is None if it repeats the previous step's."""
 
 
 class _Seen(NamedTuple):
@@ -71,7 +71,7 @@ class StepBuilder:
 
     The next observation of the same client completes a step, because it reports the applied
     outputs. Of two commands that answer the same observation the later one counts. A command that
-    answers an observation older than that of the last step is ignored, so that time never runs
+    answers an observation older than the last step's is ignored, so that time never runs
     backwards in an episode.
     """
 
@@ -144,7 +144,7 @@ class StepBuilder:
         self._seen.pop(session, None)
 
     def _is_past(self, session: int, seen: _Seen) -> bool:
-        """Return True if an observation is older than that of the newest step."""
+        """Return True if an observation is older than the newest step's."""
         newest = self._newest
         if newest is None or newest.seen is seen:
             return False

@@ -331,8 +331,8 @@ class Server:
 
     async def _robot(self, _: web.Request) -> web.Response:
         """Describe the robot to a page before authentication."""
-        # A page cannot see the certificate of its own connection, and the proof needs its
-        # fingerprint, which is not secret.
+        # A page cannot read the certificate of its connection, and the proof needs its fingerprint,
+        # which is not secret.
         return web.json_response(
             {
                 "robot": self._hub.plan.card.robot,

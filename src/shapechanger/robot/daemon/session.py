@@ -213,7 +213,7 @@ class Session:
         )
 
     def introduce(self, data: bytes) -> messages.Welcome:
-        """Authenticate the client by its first message."""
+        """Authenticate the client with its first message."""
         hello = messages.decode_client_message(data)
         if not isinstance(hello, messages.Hello) or self._is_known:
             raise LinkError("The first message must be a hello.")
@@ -354,7 +354,7 @@ class Session:
 
     def _suggest(self, suggestion: messages.Suggest) -> None:
         if self._hub.lease.holds(self.client.session):
-            refusal = "You have control: send a command in place of a suggestion."
+            refusal = "You have control: send a command instead of a suggestion."
         elif suggestion.seq <= self._suggestion_seq:
             refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
         else:

@@ -44,7 +44,7 @@ _MOST_MISSED: Final = 5
 
 
 class JointKeys(Keys, frozen=True, kw_only=True):
-    """Keys of one joint, which has a table of its own.
+    """Keys of one joint, which has its own table.
 
     Attributes:
         channel: Channel of the multiplexer.
@@ -63,7 +63,7 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
     Attributes:
         bus: I2C bus.
         mux: Address of the multiplexer.
-        rows: Joints by name.
+        rows: Joints, keyed by name.
     """
 
     bus: BusNumber = 1
@@ -76,7 +76,7 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
         for name, joint in self.rows.items():
             other = users.setdefault(joint.channel, name)
             if other != name:
-                words = f"has the channel {joint.channel}, which is that of {other}, too"
+                words = f"has the channel {joint.channel}, which {other} has, too"
                 raise KeyMistake(name, words)
 
     def settings(self) -> dict[str, Any]:

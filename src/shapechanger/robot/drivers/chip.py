@@ -60,7 +60,7 @@ class OutputDriver(Protocol):
 class SharedDevice(Protocol):
     """Device shared by several outputs and written once for all of them: a servo bus.
 
-    Its drivers refer to it by their attribute `device`.
+    Its drivers refer to it in their attribute `device`.
     """
 
     def begin(self) -> None:
@@ -98,7 +98,7 @@ class SensorDriver(Protocol):
     """Driver of one sensor, without threads, that blocks for at most a few milliseconds."""
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return the measurements by name, in SI units, as in `GuardState.quantities`.
+        """Return the measurements in SI units, keyed like `GuardState.quantities`.
 
         Args:
             now_ns: Monotonic time, ns.
@@ -135,13 +135,13 @@ class SensorChip:
     """A kind of sensor.
 
     Attributes:
-        measures: What it measures, as in `SensorPlan.measures`.
+        measures: Its quantities; see `SensorPlan.measures`.
         keys: Its keys in a profile, besides `driver`.
         open: Opens its driver.
         simulate: Its simulation; None where a twin's board has the real one, such as a file.
         features: Features of a state that it alone measures; None where `measures` tells them.
         rows: Keys of each nested table, such as a joint's; None without any. `keys` has them
-            as `rows`, by name.
+            as `rows`, keyed by name.
     """
 
     measures: str
@@ -161,9 +161,9 @@ class OutputChip:
         open: Opens its driver.
         wire: Its wiring on a twin, which reads its state from the levels of the board's outputs;
             called with the output, its value at rest, and the duty of a pin.
-        unpowered: State without power, where that goes through the one-shot of the enable line, as
+        unpowered: State without power, if power goes through the one-shot of the enable line, as
             it does for motors; None for a steering servo or a joint.
-        obeys: The value that a controller makes of its pulses, with a memory of its own; None for
+        obeys: The value that a controller makes of its pulses, with its own memory; None for
             the value of the pulses.
         pulses: Keys of the pulse widths at -1, 0 and 1; empty for an output without pulses.
         differs: Why its value may differ from the one that was asked for.

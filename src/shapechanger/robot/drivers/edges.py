@@ -13,7 +13,7 @@ class EdgeInput:
         pin: BCM number.
         pull: Direction of the internal pull resistor.
         factory: Pin factory of gpiozero.
-        changed: Receives the time, s, on a clock of its own, and the new level. lgpio calls it from
+        changed: Receives the time, s, on its own clock, and the new level. lgpio calls it from
             its own thread.
     """
 

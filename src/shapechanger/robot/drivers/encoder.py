@@ -46,7 +46,7 @@ class EncoderKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         a: Pin of its first channel.
-        b: Pin of its second; -1 for one channel, whose sign is that of the command.
+        b: Pin of its second; -1 for one channel, whose sign is the command's.
         counts_per_turn: Rising edges of one channel for a turn of the wheel.
         wheel_m: Circumference of the wheel, m.
     """
@@ -61,7 +61,7 @@ class Encoder:
     """Encoder with one or two channels; see `SensorDriver`.
 
     With two channels (quadrature) it measures the direction, and each edge is a quarter of a count.
-    With one, each rising edge is a count, and the direction is that of the propulsion.
+    With one, each rising edge is a count, and the direction is the propulsion's.
     """
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:

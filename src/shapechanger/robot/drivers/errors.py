@@ -27,7 +27,7 @@ def device_errors(device: str) -> Generator[None]:
 
 
 def _kinds() -> tuple[type[BaseException], ...]:
-    """Return the errors of the kernel, and of gpiozero and lgpio where they are loaded."""
+    """Return the errors of the kernel, and of gpiozero and lgpio if they are loaded."""
     names = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
     loaded = [(sys.modules.get(module), name) for module, name in names]
     own = tuple(getattr(module, name) for module, name in loaded if module is not None)

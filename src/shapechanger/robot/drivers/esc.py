@@ -136,7 +136,7 @@ _ARM_SHARE: Final = 0.8
 
 
 class SpeedController:
-    """Hobby speed controller: turns the value of its pulses into that of the motor.
+    """Hobby speed controller: turns the value of its pulses into the motor's.
 
     With `reverse` "double" the first backward pulses after driving forward brake; only those after
     another neutral drive backward.

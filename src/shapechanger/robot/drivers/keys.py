@@ -13,7 +13,7 @@ from shapechanger.robot.drivers.pins import I2C_PINS, Pin
 _PRINTABLE: Final = r"\A(?=.*\S)[\x20-\x7e\xa0-\U0010ffff]+\Z"
 
 Text = Annotated[str, Meta(min_length=1, max_length=64, pattern=_PRINTABLE)]
-"""A name; its length is that of names in messages, see `shapechanger.robot.link.messages`."""
+"""A name, as long as names in messages may be; see `shapechanger.robot.link.messages`."""
 
 FilePath = Annotated[str, Meta(min_length=1, max_length=4096, pattern=_PRINTABLE)]
 """Path of a file or a device."""
@@ -59,7 +59,7 @@ class Keys(msgspec.Struct, frozen=True):
         return msgspec.structs.asdict(self)
 
     def claims(self) -> Iterator[Claim]:
-        """Return what the keys claim: by default their pins."""
+        """Return the claims of the keys: by default their pins."""
         for key, value in msgspec.structs.asdict(self).items():
             for pin in cast("list[Any]", value) if isinstance(value, list) else [value]:
                 if isinstance(pin, Pin) and pin >= 0:

@@ -65,7 +65,7 @@ class Pca9685Keys(Keys, frozen=True, kw_only=True):
     output_enable: OptionalPin = NO_PIN
 
     def claims(self) -> Iterator[Claim]:
-        """Return the claims of the channel, and of what all channels of the board share."""
+        """Return the claims of the channel, and the claims that all channels of the board share."""
         board = f"the PCA9685 at {self.address:#x} of I2C bus {self.bus}"
         yield Claim("channel", f"channel {self.channel} of {board}")
         yield from i2c_claims(self.bus, "address", self.address, board)

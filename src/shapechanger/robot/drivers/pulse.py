@@ -95,7 +95,7 @@ DEAD_BAND_US: Final = 20.0
 
 
 def wired_pulse(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
-    """Return what reads the width of an output's pulses on a twin, µs; 0 for none."""
+    """Return a reader of the width of an output's pulses on a twin, µs; 0 for no pulse."""
     over = plan.settings["over"]
     pulse_of = PULSES[over].pulse_of
     if pulse_of is None:

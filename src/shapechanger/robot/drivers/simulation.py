@@ -1,6 +1,6 @@
 """Simulations of chips: levels of a board's outputs, edges of its inputs, and interfaces.
 
-The simulation of a chip is in the chip's own module, beside its driver. It is plain Python over
+The simulation of a chip is in the chip's own module, with its driver. It is plain Python over
 `shapechanger.contract.world.World`; a twin's board runs it, and no robot does.
 """
 
@@ -94,7 +94,7 @@ class Levels:
 
 
 DutyOf = Callable[[Levels, int], float]
-"""Share of the time at which a pin is high, 0 to 1; of an undriven pin by its resistors."""
+"""Share of the time at which a pin is high, 0 to 1; resistors decide for an undriven pin."""
 
 
 class WiredOutput(NamedTuple):

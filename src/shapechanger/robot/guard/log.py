@@ -19,7 +19,7 @@ class _Lines(logging.Handler):
     """Write lines without blocking, and count those that are dropped; never raise.
 
     The descriptor is shared with other processes, so it must not become O_NONBLOCK. A line is no
-    longer than what a writable pipe accepts without blocking.
+    longer than a writable pipe accepts without blocking.
     """
 
     def __init__(self, fd: int) -> None:

@@ -36,7 +36,7 @@ class Order:
         emergency: For "arm": how many emergency stops whoever arms has seen. One that came since
             is not ended.
         reason: Why, in words, for "disarm" and "emergency".
-        person: For "arm": whether a person arms; nobody else ends an emergency stop.
+        person: For "arm": whether a person arms; only persons end an emergency stop.
     """
 
     kind: Literal["command", "halt", "arm", "disarm", "emergency", "end"]
@@ -67,8 +67,8 @@ class GuardState:
         applied_ns: When it reached the outputs.
         refused: Why the newest command was refused; empty if none was since the last state.
         refused_seq: Its number.
-        outputs: Value of each output by name, -1 to 1.
-        quantities: What was sensed, by name and in SI units: "speed" m/s signed, "distance" m,
+        outputs: Value of each output, -1 to 1.
+        quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
             "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
             "stall" 0 or 1, "collision" 0 or 1; without those that nothing measures.
         sources: Where a quantity comes from: name of a sensor, or "estimated".

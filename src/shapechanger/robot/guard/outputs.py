@@ -67,7 +67,7 @@ class Switches:
                 device.close()
 
 
-# Pulses and duties have steps: those of a PCA9685 at 50 Hz are 1 % of a servo's range and 5 % of
+# Pulses and duties have steps: a PCA9685's at 50 Hz are 1 % of a servo's range and 5 % of
 # that of a controller whose profile uses a fifth of it.
 _STEP: Final = 0.06
 
@@ -140,7 +140,7 @@ class OutputBank:
     """All outputs: opened at rest, written together, and stopped independently of each other.
 
     Attributes:
-        values: Actual value of each output, by name.
+        values: Actual value of each output, keyed by name.
         released: Whether the outputs are released.
     """
 

@@ -1,8 +1,8 @@
 """Guard process: the only owner of a robot's outputs.
 
 The daemon requests, `shapechanger.robot.guard.rules.Rules` decides, and this loop writes. It ends,
-with all outputs at rest, on SIGTERM, on the order "end", when the supervisor dies, and on any error
-of its own. The death of the daemon disarms it.
+with all outputs at rest, on SIGTERM, on the order "end", when the supervisor dies, and on any
+internal error. The death of the daemon disarms it.
 
 Exit codes: 0 if it was asked to end or the supervisor died, 1 after an error.
 """

@@ -173,7 +173,7 @@ class Stopping:
         return self._then == "release" and now_ns >= self.end_ns
 
     def next_ns(self, now_ns: int) -> int | None:
-        """Return the time of the next change; None if there is none or it is continuous."""
+        """Return the time of the next change; None if it never or continuously changes."""
         return next((t for t in (self._hold_end_ns, self.end_ns) if t > now_ns), None)
 
     def _left(self, now_ns: int) -> float:

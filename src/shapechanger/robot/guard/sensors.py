@@ -49,9 +49,9 @@ class Sensing:
     """Sensor readings of one round.
 
     Attributes:
-        quantities: Readings by name, in SI units; see `GuardState.quantities`.
+        quantities: Readings in SI units, keyed by name; see `GuardState.quantities`.
         sources: Name of the sensor behind each quantity.
-        failures: Why a sensor did not respond, by its name.
+        failures: Why a sensor did not respond, keyed by sensor.
         slow: Failed sensors that took too long.
         silent: Distance sensors that responded without a distance.
     """

@@ -10,7 +10,7 @@ from typing import Final
 from shapechanger.errors import LinkError
 
 DEFAULT_PORT: Final = 5000
-"""Port of a robot unless another is given, as in 2017."""
+"""Default port of a robot, as in the original release (2017)."""
 
 SERVICE: Final = "_shapechanger._tcp.local."
 """DNS-SD service type of robots."""

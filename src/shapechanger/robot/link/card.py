@@ -21,18 +21,18 @@ class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
         action_layout: JSON of the `Layout` of `Command.values`.
         state_layout: JSON of the `Layout` of `Observation.state`. A feature takes the value of the
             guard's quantity of the same name, "NAME/applied" that of the applied action NAME, and
-            NaN where no sensor measures it.
+            NaN if no sensor measures it.
         image_size: Width and height of the frames, pixels; None without a camera.
         camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if the
             profile does not state it.
-        camera_fovy_deg: Vertical field of view of the camera, degrees; None likewise.
+        camera_fovy_deg: Vertical field of view of the camera, degrees; None if unknown.
         control_hz: Commands per second that the robot expects.
         tick_hz: Rate of the guard, Hz.
         slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
         slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
         deadline_ms: Longest time that a command acts, ms; the guard enforces it.
         max_observation_age_ms: Oldest observation that a command may answer, ms.
-        reward: Weights of the task, by name.
+        reward: Weights of the task, keyed by name.
         reset: Commands that return the robot to the start: values and duration, s, of each; empty
             for none.
         arming: Who may arm the robot.
@@ -77,7 +77,7 @@ def card_of(
 
     Args:
         profile: The robot.
-        arming: Who may arm it, in place of the profile's; "" for the profile's.
+        arming: Who may arm it, instead of the profile's; "" for the profile's.
         clock: Source of its time.
         pictures: Whether its camera is used.
     """

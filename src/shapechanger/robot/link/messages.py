@@ -63,7 +63,7 @@ _Name = Annotated[str, Meta(max_length=64)]
 _Words = Annotated[str, Meta(max_length=1024)]
 _Sequence = Annotated[int, Meta(ge=0, le=2**53)]
 _Values = Annotated[tuple[float, ...], Meta(max_length=64)]
-# A folder directly in that of the recordings: no separator, and no leading dot.
+# A folder directly in the folder of recordings: no separator, and no leading dot.
 _Episode = Annotated[str, Meta(max_length=128, pattern=r"^[0-9A-Za-z][0-9A-Za-z._-]*\Z")]
 _Before = Annotated[str, Meta(max_length=128, pattern=r"^([0-9A-Za-z][0-9A-Za-z._-]*)?\Z")]
 
@@ -72,7 +72,7 @@ class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_
     """A message of either side."""
 
     def __repr__(self) -> str:
-        """Show bytes by their number only: frames and proofs do not belong in a log."""
+        """Show only the number of bytes: frames and proofs do not belong in a log."""
         fields = (
             f"{name}=<{len(value)} bytes>" if isinstance(value, bytes) else f"{name}={value!r}"
             for name, value in msgspec.structs.asdict(self).items()
@@ -110,7 +110,7 @@ class Command(_Message, frozen=True):
         seq: Number of the command, larger than the one before.
         answers: `seq` of the observation that the command answers.
         values: One number for each action of the robot, in the order of its action layout.
-        ttl_ms: Lifetime from the arrival, ms; the robot's deadline holds where it is shorter.
+        ttl_ms: Lifetime from the arrival, ms; the robot's deadline holds if it is shorter.
         scale: Cap of the client, 0 to 1, by which the values are multiplied.
     """
 
@@ -139,7 +139,7 @@ class Arm(_Message, frozen=True):
     """Request to let the outputs move; from a person it also ends an emergency stop.
 
     Attributes:
-        answers: `seq` of a recent observation, as in a command: a delayed request must not arm a
+        answers: `seq` of a recent observation, like a command's: a delayed request must not arm a
             robot that its operator no longer watches.
         emergency: Number of emergency stops that the sender has seen
             (`Observation.emergencies`). A later one stays in force.
@@ -254,9 +254,9 @@ class Judge(_Message, frozen=True):
 
 
 class RunPolicy(_Message, frozen=True):
-    """Start of a policy on board, in place of the one that runs; only from a person.
+    """Start of a policy on board, instead of the running one; only from a person.
 
-    Answered by `PolicyState` to all clients, or by `Refused`. The policy is a client of its own, a
+    Answered by `PolicyState` to all clients, or by `Refused`. The policy is a separate client, a
     program: it waits until nobody has control, takes it, and drives once a person arms the robot.
 
     Attributes:
@@ -487,11 +487,12 @@ class Piece(_Message, frozen=True):
 
     Attributes:
         episode: Id of the episode.
-        first: Number of the first line, as in the request.
+        first: Number of the first line, like in the request.
         total: Number of complete lines in `steps.jsonl` now.
         lines: Lines from `first` on, without line ends; fewer than requested at the end of the
-            file, and where they would make the message too large.
-        frames: JPEG that the `frame` of each line names; None for none, or that of the line before.
+            file, and if they would make the message too large.
+        frames: JPEG that the `frame` of each line names; None without a frame, or to repeat the
+            line before.
         header: Text of `episode.json` now.
     """
 

@@ -1,4 +1,4 @@
-"""Calibration: profile changes from what a person found while an output was jogged."""
+"""Calibration: profile changes from a person's findings while jogging an output."""
 
 from __future__ import annotations
 

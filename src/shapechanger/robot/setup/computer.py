@@ -25,7 +25,7 @@ def boot_config(root: Path) -> Path | None:
 
 
 def boot_lines(config: Path) -> list[str]:
-    """Return the lines of a config.txt that apply to every model, without those of a filter."""
+    """Return the lines of a config.txt that apply to every model, without filtered ones."""
     lines: list[str] = []
     section = "all"
     for line in config.read_text(encoding="utf-8", errors="replace").splitlines():

@@ -167,7 +167,7 @@ def changes_to_install(
     Args:
         guard: Outputs and sensors of the robot.
         camera: Its camera; None without one.
-        unit: Its systemd unit, beside the profile.
+        unit: Its systemd unit, next to the profile.
         machine: The computer.
     """
     groups = {*device_groups(guard).values(), *(["video"] if camera is not None else [])}
@@ -212,7 +212,7 @@ def _service(unit: Path, root: Path) -> SystemChange:
     path = root / _UNITS / unit.name
     return SystemChange(
         "service",
-        f"{path} is the unit beside the profile.",
+        f"{path} is the unit next to the profile.",
         lambda: path.exists() and path.read_bytes() == unit.read_bytes(),
         (
             RootCommand(("install", "-m", "644", str(unit), str(path))),
@@ -304,7 +304,7 @@ _CAMERA_OVERLAYS: Final = tuple(f"dtoverlay={chip}" for chip in ("imx", "ov5647"
 
 
 def _by_raspi_config(change: SystemChange, root: Path, call: tuple[str, str]) -> SystemChange:
-    """Return a change made by raspi-config, where it is there: it knows the models."""
+    """Return a change made by raspi-config, if it exists: it supports all models."""
     if not (root / "usr/bin/raspi-config").exists():
         return change
     return replace(change, commands=(RootCommand(("raspi-config", "nonint", *call)),))
@@ -317,7 +317,7 @@ def _without_config(change: SystemChange) -> SystemChange:
 
 
 def _serial(guard: GuardPlan, machine: Machine, config: Path | None) -> Iterator[SystemChange]:
-    """Yield what the port of a servo bus needs: the header's own, or that of a USB adapter."""
+    """Yield the changes for the port of a servo bus: the header's own, or a USB adapter's."""
     rule = machine.root / _UDEV
     cmdline = config.with_name("cmdline.txt") if config else None
 

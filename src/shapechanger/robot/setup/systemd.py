@@ -24,7 +24,7 @@ def unit_name(robot: str) -> str:
 
 
 def unit_word(text: str) -> str:
-    """Return a word of a command line, in quotes where it needs them (systemd.service(5))."""
+    """Return a word of a command line, in quotes if it needs them (systemd.service(5))."""
     if _PLAIN_WORD.fullmatch(text):
         return text
     return f'"{"".join(_ESCAPES.get(character, character) for character in text)}"'
@@ -58,7 +58,7 @@ def unit_text(
 def write_unit(
     robot: str, profile: Path, credentials: Path | None = None, user: str = ""
 ) -> tuple[Path, bool]:
-    """Write the unit beside a profile; an existing file stays.
+    """Write the unit next to a profile; an existing file stays.
 
     Args:
         robot: Name of the robot.

@@ -1,4 +1,4 @@
-"""The twin's board, a process of its own: pins, chips, ledger, world and time.
+"""The twin's board, a separate process: pins, chips, ledger, world and time.
 
 It is started before the robot and outlives the robot's processes, as hardware does. It ends on
 SIGTERM, or with the process at the other end of its owner's descriptor.
@@ -214,11 +214,11 @@ class RealTime:
     """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
 
     def wait(self, connection: BoardConnection, call_id: int, until_ns: int) -> object:
-        """Refuse: nobody advances real time."""
+        """Refuse: real time cannot be advanced."""
         raise RobotError("This board runs in real time, which cannot be advanced.")
 
     def sleep(self, connection: BoardConnection, call_id: int, ns: int) -> object:
-        """Refuse: nobody advances real time."""
+        """Refuse: real time cannot be advanced."""
         raise RobotError("This board runs in real time, which cannot be advanced.")
 
     def now_ns(self) -> int:

@@ -142,7 +142,7 @@ class BoardClient:
                 self.while_held_up()
 
     def _receive(self) -> bool:
-        """Receive one message; False if there is none."""
+        """Receive one message; False without one."""
         try:
             data = self._socket.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
         except BlockingIOError:

@@ -149,7 +149,7 @@ class TwinPinFactory(PiFactory):
         board.on_edge = self._report_edge
 
     def pin(self, name: int | str) -> TwinPin:
-        """Return a pin by its name, such as 22, "GPIO22" or "BOARD15"."""
+        """Return the pin of a name, such as 22, "GPIO22" or "BOARD15"."""
         pin: TwinPin = super().pin(name)
         self._by_number[pin.number] = pin
         return pin

@@ -164,7 +164,7 @@ class TwinBus:
         self._board.ask(None, "write_chip", self._bus, i2c_addr, register, list(data))
 
     def close(self) -> None:
-        """Let go of the bus; its chips continue with what they do."""
+        """Let go of the bus; its chips keep running."""
 
 
 class TwinServoPins:
@@ -233,7 +233,7 @@ class TwinHardware:
         return self._pin_factory
 
     def i2c(self, bus: int) -> TwinBus:
-        """Return an I2C bus by its number."""
+        """Return the I2C bus of a number."""
         return TwinBus(self.board, bus)
 
     def servo_pins(self) -> TwinServoPins:

@@ -32,7 +32,8 @@ class Whereabouts(NamedTuple):
         travelled_m: Distance rolled by the wheels, m; driving backward counts down.
         bumped: Whether something presses the bumper.
         distance_m: Free distance ahead of the nose, m.
-        truth: Quantities that no sensor measures, such as the progress along a course, by name.
+        truth: Quantities that no sensor measures, such as the progress along a course, keyed by
+            name.
         t: Time, ns.
     """
 

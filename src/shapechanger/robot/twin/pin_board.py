@@ -86,7 +86,7 @@ class PinBoard:
         return self._surroundings.advance(now_ns, self.levels)
 
     def require_rig(self) -> Rig:
-        """Return the servos; raise RobotError if there are none."""
+        """Return the servos; raise RobotError without servos."""
         if self.rig is None:
             raise RobotError("This twin has no servo bus.")
         return self.rig
@@ -127,7 +127,7 @@ class PinBoard:
         pull: str,
         level: int,
     ) -> int:
-        """Claim a pin, and return its level: for an input that of its sensor, pull or resistors."""
+        """Claim a pin, and return its level: for an input its sensor's, pull's or resistors'."""
         claim = self._claims.setdefault(pin, _Claim())
         if claim.owner is not None and claim.owner is not owner:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")

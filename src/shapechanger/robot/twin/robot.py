@@ -1,4 +1,4 @@
-"""A robot that is served on its twin, and the operator beside it."""
+"""A robot that is served on its twin, and its operator."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from shapechanger.robot.twin.start import BoardAt
 
 
 class Operator:
-    """A person beside the robot, who moves the vehicle and breaks and presses things.
+    """A person next to the robot, who moves the vehicle and breaks and presses things.
 
     Each request takes effect after everything that the robot's processes sent before it.
 
@@ -132,7 +132,7 @@ class Operator:
         self._client.ask(None, "break_magnet", joint, state)
 
     def tensions(self) -> dict[str, float]:
-        """Return the tension of each tendon on the servo bus, N, by name."""
+        """Return the tension of each tendon on the servo bus, N."""
         return self._client.ask(dict[str, float], "tensions")
 
     def levels(self) -> Levels:
@@ -216,12 +216,12 @@ class RunningRobot:
         return self.known_at(f"127.0.0.1:{self.port}")
 
     def known_at(self, address: str) -> KnownRobot:
-        """Return the credentials with another address, such as that of a proxy."""
+        """Return the credentials with another address, such as a proxy's."""
         key = (self.folder / "credentials" / "key").read_text().strip()
         return KnownRobot("robot", address, key, self._ready.fingerprint or "insecure")
 
     def client(self, **options: Any) -> RobotClient:
-        """Connect to it; the options are those of `RobotClient.connect`."""
+        """Connect to it; the options are `RobotClient.connect`'s."""
         return RobotClient.connect(self.known, **options)
 
     def operator(self) -> Operator:

@@ -199,7 +199,7 @@ class DrivingWorld(World):
         self._speed = _lagged(self._speed, ahead, drive.lag_s, dt_s)
         self._side_turn = _lagged(self._side_turn, turn, drive.lag_s, dt_s)
         steering = outputs.get(drive.rudder, 0.0)
-        if steering is not None:  # A servo without pulses stays where it is.
+        if steering is not None:  # A servo without pulses keeps its position.
             self._steering = _lagged(self._steering, steering, _STEERING_LAG_S, dt_s)
         self._yaw_rate = self._side_turn - drive.curvature * self._steering * self._speed
         middle = self._heading + self._yaw_rate * dt_s / 2

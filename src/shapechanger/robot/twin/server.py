@@ -68,7 +68,7 @@ class BoardConnection:
         return bool(self._outbox)
 
     def receive(self) -> Call | None:
-        """Return the next call; None if there is none now."""
+        """Return the next call; None without a waiting call."""
         try:
             data = self._socket.recv(MAX_MESSAGE)
         except BlockingIOError:
@@ -135,7 +135,7 @@ class Function(NamedTuple):
 def functions_of(
     takes: Literal["hardware", "time", "operator"], functions: Iterable[Callable[..., object]]
 ) -> dict[str, Function]:
-    """Return functions by name, for `BoardServer`."""
+    """Return the functions for `BoardServer`, keyed by name."""
     found: dict[str, Function] = {}
     for function in functions:
         hints = get_type_hints(function)

@@ -1,4 +1,4 @@
-"""Start a board in a process of its own, or find one that runs."""
+"""Start a board in its own process, or find one that runs."""
 
 from __future__ import annotations
 

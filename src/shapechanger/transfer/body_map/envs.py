@@ -35,7 +35,7 @@ def body_map(
     Args:
         source_env: The env that a policy was trained in.
         target_env: The env that it acts in.
-        rules: Rules by name or glob.
+        rules: Rules keyed by a feature's name or a glob.
         observation_rules: Rules of source observation features only.
         action_rules: Rules of target action features only.
         otherwise: The rule of features that nothing matches.
@@ -64,8 +64,8 @@ def body_map(
 class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
     """Target env in which a policy of the source acts unchanged.
 
-    Observations are those of the source body, in float64; actions are the source's. Rewards,
-    terminations and infos are those of the target.
+    Observations and actions are the source body's, observations in float64. Rewards,
+    terminations and infos are the target's.
 
     Attributes:
         body_map: Map between the two bodies.

@@ -149,10 +149,10 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             target_observation: Layout of the target's observations.
             source_action: Layout of the source's actions.
             target_action: Layout of the target's actions.
-            rules: Rules by name or glob of source observation and target action features. A rule is
-                a `Copy`, `Zero`, `Hold` or `Learn`, or one of "zero", "hold" (the middle of the
-                range), "learn" and "copy NAME"; stars in NAME stand for what the wildcards of the
-                glob matched, as in `{"foot_*/motor": "copy ankle_*/motor"}`.
+            rules: Rules, keyed by the name or glob of source observation and target action
+                features. A rule is a `Copy`, `Zero`, `Hold` or `Learn`, or one of "zero", "hold"
+                (the middle of the range), "learn" and "copy NAME"; stars in NAME stand for what the
+                wildcards of the glob matched, as in `{"foot_*/motor": "copy ankle_*/motor"}`.
             observation_rules: Rules of source observation features only; they take precedence.
             action_rules: Rules of target action features only; they take precedence.
             otherwise: The rule of features that nothing matches.

@@ -230,7 +230,7 @@ class Gather:
         rows: Output indices that are copied, shape (n_copied,).
         columns: Their input indices, shape (n_copied,).
         scale: Their factors, shape (n_copied,).
-        offset: Constant of each output, 0 where it is copied, shape (n_into,); read-only.
+        offset: Constant of each output, 0 for copied ones, shape (n_into,); read-only.
     """
 
     kind: str

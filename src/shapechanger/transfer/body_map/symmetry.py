@@ -156,7 +156,7 @@ def _check_pair(feature: Feature, partner: Feature, scale: float) -> None:
 
 
 def _close(a: float, b: float) -> bool:
-    """Return whether two bounds are equal up to rounding, such as that of degrees to radians."""
+    """Return whether two bounds are equal up to rounding, such as from degrees to radians."""
     return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12)
 
 
@@ -209,7 +209,7 @@ def mirror(
             place.
         flip: Globs of elements whose coordinate changes sign, such as the hinges about a vertical
             axis; both elements of a pair or neither. Components along axes of the world, such as
-            `torso/vy`, are found by name.
+            `torso/vy`, are recognised by their names.
 
     Raises:
         MapError: If the pairs contradict each other, one element of a pair flips and the other
@@ -260,7 +260,7 @@ def _fitting(glob: str, elements: tuple[str, ...]) -> list[str]:
 
 
 def _reflected(feature: Feature, partners: Mapping[str, str], flipped: frozenset[str]) -> Copy:
-    """The feature that the mirrored body has in place of `feature`."""
+    """The feature that the mirrored body has instead of `feature`."""
     if feature.shape:
         raise MapError(f"{feature.name!r} is a block of numbers, which cannot be mirrored by name.")
     element, *path = feature.name.split("/", 1)

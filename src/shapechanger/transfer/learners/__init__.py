@@ -45,7 +45,7 @@ class LearnerSettings:
     Attributes:
         takes: What the learner takes.
         learner: Its class, as `module:class`.
-        packages: Packages that its numbers depend on, besides those of every study.
+        packages: Packages that its numbers depend on, in addition to the packages of every study.
         steps: Default env steps of a training.
         source_steps: Default env steps of a source policy; 0 for half as many as on the target.
         eval_every: Steps between two evaluations.
@@ -89,7 +89,7 @@ class LearnerSettings:
         raise NotImplementedError
 
     def rhythm(self) -> str:
-        """Return when policies are evaluated, and what they learn from, as in "every 10 steps."."""
+        """Describe the evaluations and the training data, such as "every 10 steps."."""
         return f"every {self.eval_every:,} steps."
 
     def require_budget(self, steps: int, which: str = "", option: str = "") -> None:
@@ -97,8 +97,8 @@ class LearnerSettings:
 
         Args:
             steps: The budget.
-            which: "target" or "source", where there are two budgets.
-            option: What sets the budget, where the user has not.
+            which: "target" or "source", if there are two budgets.
+            option: The option that sets the budget, if the user has not.
 
         Raises:
             StudyError: If it does.
@@ -130,7 +130,7 @@ _Settings = TypeVar("_Settings", bound=LearnerSettings, covariant=True)
 
 
 class Learner(Generic[_Settings]):
-    """Base class of learners; their policies are of their own type.
+    """Base class of learners; each has its own type of policy.
 
     Attributes:
         name: Name of the learner, for the cards of its policies.
@@ -153,7 +153,7 @@ class Learner(Generic[_Settings]):
 
     @property
     def device(self) -> str:
-        """Where it learns: "CPU", or the name of a GPU."""
+        """The device that trains: "CPU", or the name of a GPU."""
         return "CPU"
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
@@ -188,7 +188,7 @@ class Learner(Generic[_Settings]):
             seed: Seed of the training.
             start: A source policy to start from; None for a new policy.
             body_map: Map between the bodies of `start` and `env`.
-            on_evaluation: Called with each evaluation; `ignore` where none is needed.
+            on_evaluation: Called with each evaluation; `ignore` if no callback is needed.
             on_steps: Called with the number of steps done.
 
         Raises:

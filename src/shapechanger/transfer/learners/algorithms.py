@@ -79,7 +79,7 @@ def require_class(algorithm: str) -> None:
 
 
 def checked_settings(settings: ImportedSettings) -> ImportedSettings:
-    """Import an algorithm, check its arguments by name, and fill in how often it updates."""
+    """Import an algorithm, check the names of its arguments, and fill in how often it updates."""
     made = _load(settings.algorithm)
     if not callable(made) or (isinstance(made, type) and not _is_class(made)):
         raise StudyError(
@@ -92,7 +92,7 @@ def checked_settings(settings: ImportedSettings) -> ImportedSettings:
         if name not in known and not anything:
             raise UnknownName(f"setting of {settings.algorithm}", name, known)
     for name in ("n_steps", "train_freq"):
-        # Off-policy algorithms have both, and there `n_steps` is that of the returns.
+        # Off-policy algorithms have both, and their `n_steps` counts the steps of a return.
         if name == "n_steps" and "buffer_size" in takes:
             continue
         default: Any = takes[name].default if name in takes else None

@@ -22,7 +22,7 @@ from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import UnknownName
 
 EVALUATION_SEED: Final = 10_000_000
-"""Seed of the first evaluation episode: far from those of training."""
+"""Seed of the first evaluation episode: far from the seeds of training."""
 # Option of an env that selects one of many bodies by its seed, and how many bodies get episodes of
 # their own before those repeat: seeds of episodes end at 2^32.
 _INDIVIDUAL: Final = "finger_seed"
@@ -43,9 +43,9 @@ class Evaluation(msgspec.Struct, frozen=True):
         terms: Mean sum over an episode of each reward term that the env reports.
         success: Share of the episodes whose last `info["is_success"]` is true; None if the env does
             not report success.
-        measures: Mean of each measure that the env declares besides the return, by its name.
-        standing: Share of the steps whose `info["standing"]` is true; None if the env, as all but
-            those of vehicles, does not report it.
+        measures: Mean of each measure that the env declares besides the return, keyed by name.
+        standing: Share of the steps whose `info["standing"]` is true; None if the env does not
+            report it; only vehicles do.
     """
 
     steps: int
@@ -57,7 +57,7 @@ class Evaluation(msgspec.Struct, frozen=True):
     standing: float | None = None
 
     def value(self, measure: str) -> float:
-        """Return the value of a measure, or the sum of a reward term, by name.
+        """Return the value of a measure, or the sum of a reward term.
 
         Raises:
             UnknownName: If the evaluation has none of this name.
@@ -72,7 +72,7 @@ def evaluation_seed(env: EnvRef, episodes: int) -> int:
     """Return the seed of the first evaluation episode in an env.
 
     It is the same for all policies, so arms are compared on equal episodes. Each individual body,
-    such as a finger of a gap, has episodes of its own, so that a mean over bodies is also one over
+    such as a finger of a gap, has its own episodes, so that a mean over bodies is also one over
     many targets.
     """
     individual = int(env.kwargs.get(_INDIVIDUAL) or 0) % _MOST_INDIVIDUALS
@@ -120,13 +120,13 @@ def evaluate(
 
 
 def _standing(played: Sequence[_Episode]) -> float | None:
-    """Return the share of all steps at which a vehicle stood; None where that is not reported."""
+    """Return the share of all steps at which a vehicle stood; None if no episode reports it."""
     stood = [episode.stood for episode in played if episode.stood is not None]
     return sum(stood) / sum(episode.length for episode in played) if stood else None
 
 
 def _means(episodes: Sequence[dict[str, float]]) -> dict[str, float]:
-    """Average numbers by name over all episodes; a missing one counts as 0."""
+    """Average numbers of one name over all episodes; a missing one counts as 0."""
     names = dict.fromkeys(name for episode in episodes for name in episode)
     return {name: sum(e.get(name, 0.0) for e in episodes) / len(episodes) for name in names}
 

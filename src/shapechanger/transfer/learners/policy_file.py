@@ -2,9 +2,9 @@
 
 A file holds safetensors: the weights, the normalisation statistics and the bounds of the model's
 own spaces; in its metadata a JSON card (env, learner, settings, steps, seed, version, command, both
-layouts) and a hash of the tensors. The model's actions are scaled from the bounds of its own space
-to those of the action layout; in files of older versions the two are equal. Loading a file only
-reads numbers and JSON, so it cannot run code.
+layouts) and a hash of the tensors. The model's actions are scaled from the bounds of the model's
+space to those of the action layout; in files of older versions the two are equal. Loading a file
+only reads numbers and JSON, so it cannot run code.
 """
 
 from __future__ import annotations
@@ -123,7 +123,8 @@ class TrainedPolicy:
 
         Args:
             command: The command that made it; "" keeps the present one.
-            identity: Version of what it was made of; None keeps the present one.
+            identity: Version of its ingredients (env, learner, packages); None keeps the present
+                one.
         """
         card = msgspec.structs.replace(
             self.card,
@@ -220,7 +221,7 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
     long as the network itself.
     """
     policy: Any = model.policy
-    if hasattr(policy, "act"):  # It has mean actions of its own.
+    if hasattr(policy, "act"):  # It defines its own mean actions.
         return policy.act
     kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
     if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):

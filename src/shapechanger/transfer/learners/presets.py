@@ -29,7 +29,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 @cache
 def _preset(name: str) -> LearnerSettings:
     table = _tables()[name]
-    # What is not said here is that of the preset that this one is like.
+    # Missing values come from the preset named by `like`.
     while like := table.get("like"):
         table = {**_tables()[like], **{n: v for n, v in table.items() if n != "like"}}
     values = {key: value for key, value in table.items() if key not in _ABOUT}
@@ -37,7 +37,7 @@ def _preset(name: str) -> LearnerSettings:
 
 
 class _Presets(Mapping[str, LearnerSettings]):
-    """Shipped settings by name, each read when it is first asked for."""
+    """Shipped settings, keyed by name; each is read on first access."""
 
     def __getitem__(self, name: str) -> LearnerSettings:
         if name not in _tables():
@@ -52,7 +52,7 @@ class _Presets(Mapping[str, LearnerSettings]):
 
 
 LEARNERS: Final[Mapping[str, LearnerSettings]] = _Presets()
-"""The shipped settings by name."""
+"""The shipped settings, keyed by name."""
 
 
 def in_many_bodies(name: str) -> str:
@@ -61,7 +61,7 @@ def in_many_bodies(name: str) -> str:
 
 
 def tuned_on(name: str) -> tuple[str, ...]:
-    """Return the envs that the settings of a learner were tuned on; none where it is not known."""
+    """Return the envs that the settings of a learner were tuned on; empty if unknown."""
     return tuple(_tables().get(name, {}).get("tuned_on", ()))
 
 
@@ -90,8 +90,8 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
         learner: Name of shipped settings; a TOML file; the name of a kind of learner that another
             package adds; or `module:name`, a class of models that is compatible with
             Stable-Baselines3, or a function that builds one.
-        changed: New values by name, as TOML or JSON hold them. With `module:name`, those that are
-            no settings of ours are arguments of the class or function.
+        changed: New values keyed by name, as TOML or JSON hold them. With `module:name`, those that
+            are no settings of ours are arguments of the class or function.
 
     Raises:
         UnknownName: If there is no such learner, or it has no such setting.

@@ -1,9 +1,9 @@
-"""PPO of rsl-rl on many worlds of one device, with policies as those of Stable-Baselines3.
+"""PPO of rsl-rl on many worlds of one device, with the policies of Stable-Baselines3.
 
 Everything that learns is on the device: worlds, networks, statistics and batches. A training begins
 with the network of Stable-Baselines3's PPO of the same settings, and its weights go back there
 for evaluations, which the CPU env does, and into files. So cards, curves, transplants and exports
-are the same as those of other learners.
+are the same as for other learners.
 """
 
 # The learner of Stable-Baselines3 has what both need.
@@ -139,7 +139,7 @@ class RslLearner(Sb3Learner):
 
     @property
     def device(self) -> str:
-        """Where it learns: "CPU", or the name of a GPU."""
+        """The device that trains: "CPU", or the name of a GPU."""
         device = self.settings.device or ("cuda" if torch.cuda.is_available() else "cpu")
         return "CPU" if device == "cpu" else torch.cuda.get_device_name(device)
 
@@ -352,7 +352,7 @@ class RslTraining:
         self._ppo.update()
 
     def _pairs(self) -> list[tuple[Any, Any]]:
-        """Return modules of rsl-rl's networks, each with that of Stable-Baselines3's policy."""
+        """Pair the modules of rsl-rl's networks with those in Stable-Baselines3's policy."""
         policy = self._model.policy
         extractor = policy.mlp_extractor
         pairs: list[tuple[Any, Any]] = []

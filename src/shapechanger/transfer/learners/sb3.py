@@ -61,7 +61,7 @@ training from a policy.
 A converged policy hardly explores: with the standard deviations of 0.06 to 0.22 of the shipped
 finger's policy, fine-tuning reached no target of another finger in 30,720 steps
 (`python -m benchmarks.run finger-gap`, measured before this was raised). A source that explores
-more keeps its own deviation, and none starts above that of a new policy because of this.
+more keeps its own deviation, and no policy starts above a new policy's deviation because of this.
 """
 
 

@@ -84,7 +84,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
         return f"{super().rhythm()} {seen}"
 
     def _own(self) -> dict[str, Any]:
-        """The arguments of the class, by name."""
+        """The arguments of the class, keyed by name."""
         left_out = {*Sb3Settings.__struct_fields__, *self._ours}
         return {n: getattr(self, n) for n in self.__struct_fields__ if n not in left_out}
 
@@ -168,7 +168,7 @@ class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
 
     Attributes:
         device: Name of the device, such as `cuda:0` or `cpu`; empty for the first GPU, or the CPU
-            where there is none.
+            if there is no GPU.
     """
 
     device: str = ""

@@ -47,7 +47,7 @@ class ThreadVecEnv(DummyVecEnv):
             **arguments,
         )
         self.envs = self._envs.envs
-        # Not that of DummyVecEnv, which makes envs and buffers of its own.
+        # Skips DummyVecEnv's, which would make its own envs and buffers.
         cast("Any", VecEnv).__init__(
             self, num_envs, self._envs.single_observation_space, self._envs.single_action_space
         )
@@ -122,8 +122,8 @@ def with_scaled_actions(envs: VecEnv, layout: Layout, name: str) -> VecEnv:
 def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
     """Make the parallel envs of a training, with actions in the units of their actuators.
 
-    Envs of the catalogue are stepped by threads. Those of others may share state, so they are
-    stepped one after another; the numbers would be the same.
+    Envs of the catalogue are stepped by threads. Envs of other packages may share state, so they
+    are stepped one after another; the numbers would be the same.
     """
     spec = gym.registry.get(env.id.rpartition(":")[2])
     if spec is not None and str(spec.vector_entry_point).startswith("shapechanger."):

@@ -33,7 +33,7 @@ class DeviceRows:
 
     def __init__(self, envs: Any, each: Sequence[LimbRows]) -> None:
         self.room = each[0].room
-        # Each batch has spaces of its own, and so tensors of its own.
+        # Each batch has its own spaces, and so its own tensors.
         self._apart = isinstance(envs.single_action_space, gym.spaces.Tuple)
         self._batches = [
             _Batch(batch.numbers, [each[int(i)] for i in batch.numbers.tolist()])
@@ -99,7 +99,7 @@ class LimbModel(MLPModel):
     """A network of a policy of limbs as rsl-rl's actor or critic."""
 
     def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
-        # Not that of MLPModel, which builds a network.
+        # Skips MLPModel's, which builds a network.
         nn.Module.__init__(self)
         self.obs_groups, self.obs_normalization = [GROUP], False
         self.obs_normalizer = nn.Identity()

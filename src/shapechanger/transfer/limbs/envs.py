@@ -54,8 +54,8 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         """Start an episode.
 
         Args:
-            seed: As of the env.
-            options: Those of the env that leave the body as it is.
+            seed: Seed of the env.
+            options: Options of the env that do not change the body.
 
         Raises:
             StudyError: If an option would change the body.
@@ -69,7 +69,8 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         """Take one step.
 
         Args:
-            action: A number from -1 to 1 for each limb; those of limbs without a motor do nothing.
+            action: A number from -1 to 1 for each limb; actions of limbs without a motor have no
+                effect.
         """
         observation, *rest = self.env.step(self.rows.actions(action))
         return self.rows.of(observation), *rest
@@ -87,7 +88,7 @@ def limb_spaces(rows: LimbRows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
 def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]:
     """Return envs as rows, all of the same spaces."""
     bodies = each_body(env)
-    # Room for all bodies, also where there are fewer envs.
+    # Room for all bodies, even if there are fewer envs.
     room = rows_of_each(bodies, room)[0].room
     return [LimbEnv(bodies[i % len(bodies)].make(), room) for i in range(count)]
 
@@ -228,7 +229,7 @@ class _Group:
 def bodies_in_turn(
     env: EnvRef, num_envs: int, room: int = 0
 ) -> tuple[list[EnvRef], list[LimbRows]]:
-    """Return the body of each of many envs, which have those of one env in turn, and its rows."""
+    """Return the body and the rows of each of many envs, which cycle through one env's bodies."""
     bodies = each_body(env)
     if len(bodies) > num_envs:
         raise StudyError(

@@ -24,7 +24,7 @@ NUMBERS: Final = 22
 """Columns of a row for the numbers that describe a trunk or a limb."""
 
 DESCRIBED: Final = 2 + NUMBERS
-"""Columns of a row before those of what is sensed: it exists, it has a motor, and the numbers."""
+"""Columns of a row before the sensed ones: it exists, it has a motor, and the numbers."""
 
 # Brings each number of a row to about 1: runners turn their joints at about 10 rad/s and move at 3
 # m/s. Contact forces are clipped to 1 by the envs.
@@ -41,7 +41,7 @@ class Columns(msgspec.Struct, frozen=True):
 
     @property
     def width(self) -> int:
-        """Numbers of a row. The trunk's row ends with zeros where it is shorter, and vice versa."""
+        """Numbers of a row; the shorter of the trunk's row and a limb's ends with zeros."""
         return DESCRIBED + max(len(self.trunk), len(self.limb))
 
 
@@ -187,13 +187,13 @@ def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
     if learned != own:
         strange = [name for name in own if name not in learned] or list(own)
         raise TransplantError(
-            f"The policy has learned in bodies of another family than that of {env}: it knows no "
+            f"The policy has learned in bodies of another family than {env}: it has no "
             f"{strange[0]!r} among {', '.join(learned[:3])} and {len(learned) - 3} more."
         )
 
 
 def _meanings(layout: Layout) -> tuple[str, ...]:
-    """Return what the numbers of a trunk and of a limb are."""
+    """Return the features of a trunk and of a limb."""
     rows: dict[str, list[str]] = {}
     for name in layout.names:
         row, _, what = name.partition(": ")

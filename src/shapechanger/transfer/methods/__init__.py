@@ -44,8 +44,8 @@ class MethodRun:
         shared: Returns the shared file of a kind of run: "source" or "scratch".
         kind: The kind of the run.
         identity: Version of the method, if it is the user's own, for the card of its policy.
-        report: Records an evaluation on the target. Those of a method that learns on the target are
-            at the same steps as those of scratch.
+        report: Records an evaluation on the target. Evaluations of a method that learns on the
+            target are at the same steps as the evaluations of scratch.
         on_steps: Called with the number of steps done in all trainings of this run.
     """
 
@@ -91,7 +91,7 @@ class MethodRun:
             env: The env to train in.
             steps: Its steps.
             start: A policy of another body to start from; None for a new one.
-            body_map: Map from that body to that of `env`.
+            body_map: Map from that body to the body of `env`.
             on_evaluation: Called with each evaluation in `env`.
             **more: Arguments of learners that the method `needs`, such as `callback`.
         """
@@ -142,7 +142,7 @@ class Method:
 
     Attributes:
         name: Its name, as in `--arms`.
-        paper: Where it comes from.
+        paper: The publication that describes it.
         uses_source_policy: Whether it starts from the source policy that the study trains.
         uses_source: Whether it has cost source steps, which count in total steps.
         trains: Whether it trains a policy, which `learn` returns.
@@ -193,7 +193,7 @@ def register(method: type[Method]) -> type[Method]:
         method: The class.
 
     Raises:
-        StudyError: If the name is empty, that of a kind of run, or taken.
+        StudyError: If the name is empty, taken, or the name of a kind of run.
     """
     if method.name in ("source", "random", "zero-action"):
         raise StudyError(
@@ -204,7 +204,7 @@ def register(method: type[Method]) -> type[Method]:
 
 
 def load_method(name: str) -> Method:
-    """Return a method by its name."""
+    """Return the method of a name."""
     method: Any = METHODS.load(name)
     if not (isinstance(method, type) and issubclass(method, Method)):
         raise StudyError(f"The method {name} is {method!r}, not a subclass of Method.")

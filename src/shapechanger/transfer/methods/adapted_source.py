@@ -43,7 +43,7 @@ class AdaptedSource(Method):
 
 
 class Randomised(AdaptedSource):
-    """Learn in a source whose body is drawn anew for each episode.
+    """Learn in a source whose body is drawn again for each episode.
 
     A target that knows the plausible range of its body, as a finger does, gives it. Otherwise, in a
     family of bodies, each body lies on the way from the source to the target, both ends included.
@@ -55,8 +55,8 @@ class Randomised(AdaptedSource):
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Require two bodies of one family and space, or a target that knows its own range."""
         del settings
-        alike = source.family and source.family == target.family
-        if target.adapts_source or (alike and source.same_layouts(target)):
+        same_family = source.family and source.family == target.family
+        if target.adapts_source or (same_family and source.same_layouts(target)):
             return
         raise self._lacks(
             "two bodies of one family with the same spaces, or a target that can adapt the source "
@@ -84,6 +84,6 @@ class Identified(AdaptedSource):
             raise self._lacks("a target that can adapt the source to itself, such as a finger")
 
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
-        """Move the target, and return what was identified."""
+        """Move the target, and return the identified parameters."""
         del source
         return cast("SourceAdaptation", target).identified_source(seed)

@@ -75,7 +75,7 @@ def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
 
 
 def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
-    """The study's map where the layouts change as from source to target, else one by name."""
+    """The study's map if the layouts change as from source to target, else a map by names."""
     with closing(one.make()) as before, closing(other.make()) as after:
         (seen, acted), (sees, acts) = layouts_of(before), layouts_of(after)
     planned = run.body_map

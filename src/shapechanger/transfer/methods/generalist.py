@@ -17,7 +17,7 @@ BODIES: Final = 32
 class Generalist(Method):
     """Learn in bodies drawn from the source's family, then in the target with the same weights.
 
-    The evaluation before the first target step is that of the generalist in a body that it has
+    The evaluation before the first target step shows the generalist in a body that it has
     never had.
     """
 

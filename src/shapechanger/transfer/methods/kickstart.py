@@ -28,8 +28,8 @@ class Kickstart(Method):
 
     After each update of PPO, one pass over the same observations minimises the divergence from the
     source policy's actions through the body map. Its weight falls linearly to 0 over the first half
-    of the steps. The paper adds the two losses; here their steps alternate, so that PPO is that of
-    Stable-Baselines3. Actions that the map leaves to be learned are not distilled.
+    of the steps. The paper adds the two losses; here their steps alternate, so that PPO is the one
+    of Stable-Baselines3. Actions that the map leaves to be learned are not distilled.
     """
 
     name = "kickstart"

@@ -61,7 +61,7 @@ class PrefilledReplay(Method):
 
     The source policy acts in the source with its exploration noise for half as many steps as there
     are target steps. Observations are mapped by the names of the two bodies, actions by the study's
-    body map, rewards stay. They are not marked as those of another body.
+    body map, rewards stay. They are not marked as observations of another body.
     """
 
     name = "prefilled-replay"
@@ -104,7 +104,7 @@ class OffDynamics(Method):
             raise self._lacks("a learner with normalise=false")
 
     def learn(self, run: MethodRun) -> Any:
-        """Train in the source, beside acting on the target."""
+        """Train in the source while acting on the target."""
         correction = _Correction(run)
         try:
             return run.train(run.source, run.source_steps, callback=correction)
@@ -247,7 +247,7 @@ class _CorrectedReplay(ReplayBuffer):
 
 
 class _Correction(BaseCallback):
-    """Acts on the target beside the training in the source, and corrects the rewards."""
+    """Acts on the target during the training in the source, and corrects the rewards."""
 
     def __init__(self, run: MethodRun) -> None:
         super().__init__()

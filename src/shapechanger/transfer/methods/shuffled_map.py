@@ -53,8 +53,8 @@ def _shuffled(
         if isinstance(entry.rule, Copy):
             places.setdefault(layout[entry.feature].shape, []).append(i)
     result = list(entries)
-    for alike in places.values():
-        order: list[int] = rng.permutation(alike).tolist()
-        for place, taken in zip(alike, order, strict=True):
+    for exchangeable in places.values():
+        order: list[int] = rng.permutation(exchangeable).tolist()
+        for place, taken in zip(exchangeable, order, strict=True):
             result[place] = MapEntry(entries[place].feature, entries[taken].rule, _WHY)
     return tuple(result)

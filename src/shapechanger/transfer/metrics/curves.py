@@ -188,14 +188,14 @@ class Reference(msgspec.Struct, frozen=True):
 
     score = (J - zero) / (one - zero)
 
-    The formula is that of D4RL (arXiv 2004.07219). Zero is what takes no skill: an ant that stands
-    still earns 1,000, so the random policy alone would be too low a floor. Both ends belong to the
-    target, because an expert on the source says nothing about another body. The reference is taken
-    as given: intervals of scores do not include its uncertainty.
+    The formula is that of D4RL (arXiv 2004.07219). Zero is the score without skill: an ant that
+    stands still earns 1,000, so the random policy alone would be too low a floor. Both ends belong
+    to the target, because an expert on the source says nothing about another body. The reference is
+    taken as given: intervals of scores do not include its uncertainty.
 
     Attributes:
         zero: Value without skill.
-        one: Value of the target's reference, or at the end of the best arm where it has none.
+        one: Value of the target's reference, or at the end of the best arm if it has no reference.
         zero_of: What earned zero, such as "random actions".
         one_of: What earned one: the reference, or the name of an arm.
         shipped: Whether one is the value of a reference that ships.
@@ -225,12 +225,12 @@ class Reference(msgspec.Struct, frozen=True):
         """Measure the reference of a target.
 
         Args:
-            floors: Mean values of what takes no skill, by name; at least one.
-            ends: Mean values at the end of each arm, by name; at least one.
+            floors: Mean values of the policies without skill, keyed by name; at least one.
+            ends: Mean values at the end of each arm, keyed by name; at least one.
             shipped: Name and value of the target's own reference; None if it has none.
 
         Raises:
-            StudyError: If there are none.
+            StudyError: If `floors` or `ends` is empty.
         """
         if not floors or not ends:
             raise StudyError("A reference needs a floor and the end of an arm.")

@@ -36,8 +36,8 @@ class Estimate(msgspec.Struct, frozen=True):
     """An estimate with a confidence interval.
 
     Attributes:
-        value: The estimate; None where the measure is undefined, with the reason in `note`.
-        low: Lower end of the interval; None where there is none, with the reason in `note`.
+        value: The estimate; None if the measure is undefined, with the reason in `note`.
+        low: Lower end of the interval; None if there is no interval, with the reason in `note`.
         high: Upper end of the interval.
         method: Kind of interval.
         note: A remark; may be empty.
@@ -96,7 +96,7 @@ def estimate_ratio(
     The seeds of each arm are resampled apart, with replacement. Each resample b gives
     t_b = (ratio_b - ratio) / error_b, with the standard error of a ratio by the delta method, and
     the interval is from ratio - t(high) · error to ratio - t(low) · error, with the quantiles of
-    all t_b in place of Student's (B. Efron and R. J. Tibshirani, "An Introduction to the
+    all t_b instead of Student's (B. Efron and R. J. Tibshirani, "An Introduction to the
     Bootstrap", 1993, section 12.5).
 
     A resample may have no t_b: because it drew equal seeds only, so that its error is zero, or a

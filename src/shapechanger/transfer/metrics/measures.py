@@ -60,7 +60,7 @@ def jumpstart(arm: LearningCurves, scratch: LearningCurves) -> Estimate:
 def asymptotic_gain(arm: LearningCurves, scratch: LearningCurves, *, last_k: int) -> Estimate:
     """Final advantage of the arm, in units of the curves.
 
-    Mean of p_arm over the last k evaluations minus that of p_scratch. In total steps the arm is
+    Mean of p_arm over the last k evaluations minus the mean of p_scratch. In total steps the arm is
     read at the same k steps, which include its source steps. The one evaluation of an arm that is
     not trained on the target counts as its end, because the policy does not change.
 
@@ -107,7 +107,7 @@ def auc_ratio(
     rng: np.random.Generator,
     n_resamples: int = 10_000,
 ) -> Estimate:
-    """Area under the arm's curve over that of scratch, a pure number; 1 if they are equal.
+    """Ratio of the areas under the curves of arm and scratch, a pure number; 1 if they are equal.
 
     ∫ p_arm / ∫ p_scratch, the transfer ratio of Taylor & Stone's list. It depends on constants
     added to the reward, so it is meaningful for scores only, where 0 takes no skill.
@@ -219,9 +219,9 @@ class TimeToThreshold(msgspec.Struct, frozen=True):
 
     Attributes:
         threshold: The threshold, in units of the curves.
-        arm: Times of the arm; None where they are undefined.
-        scratch: Times of scratch; None where they are undefined.
-        steps_saved: Restricted mean of scratch minus that of the arm, in steps; positive if the arm
+        arm: Times of the arm; None if undefined.
+        scratch: Times of scratch; None if undefined.
+        steps_saved: Restricted mean of scratch minus the arm's, in steps; positive if the arm
             is faster.
     """
 
@@ -286,7 +286,7 @@ def time_to_threshold(
 
 
 def _first_step(steps: NDArray[np.float64], row: NDArray[np.float64], threshold: float) -> float:
-    """First crossing of one curve in its own steps; infinity if there is none."""
+    """First crossing of one curve in its own steps; infinity if the curve never crosses."""
     above = np.flatnonzero(row >= threshold)
     if above.size == 0:
         return math.inf

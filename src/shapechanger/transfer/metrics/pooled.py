@@ -1,9 +1,9 @@
 """Statistics over the runs of several studies: interquartile mean, probability of improvement.
 
-Both are those of R. Agarwal and others, "Deep Reinforcement Learning at the Edge of the Statistical
+Both follow R. Agarwal and others, "Deep Reinforcement Learning at the Edge of the Statistical
 Precipice", NeurIPS 2021. Their intervals are percentiles of a bootstrap that is stratified: it
-draws runs anew within each study, because runs are independent and studies are not a sample of
-anything. With few studies of few seeds they are too narrow, see docs/statistics.md.
+draws runs with replacement within each study, because runs are independent and studies are not a
+sample of anything. With few studies of few seeds they are too narrow, see docs/statistics.md.
 """
 
 from __future__ import annotations

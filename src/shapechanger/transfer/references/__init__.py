@@ -1,6 +1,6 @@
 """References of each env: its floor, the result of learning from scratch, and a policy with it.
 
-`references.json` and the policies beside it are written by `python -m benchmarks.run references`;
+`references.json` and the policies next to it are written by `python -m benchmarks.run references`;
 `README.md` is their card.
 """
 
@@ -22,7 +22,7 @@ FOLDER: Final = Path(__file__).parent
 
 
 class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
-    """Measured values of an env, with where they come from.
+    """Measured values of an env, with their sources.
 
     Attributes:
         learner: Name of the learner's settings.
@@ -30,7 +30,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
         seeds: Seeds of the trainings.
         version: Version of Shapechanger.
         command: The command that measured it.
-        floor: Values of each measure, by what takes no skill: random actions and the action zero.
+        floor: Values of each measure without skill: for random actions and for the action zero.
         ends: Values of each measure at the end of each training, the mean of its last evaluations.
         policy_seed: Seed of the policy that ships.
     """
@@ -67,7 +67,7 @@ def load_references() -> dict[str, EnvReference]:
 
 
 def reference_of(env: EnvRef) -> EnvReference | None:
-    """Return the reference of an env; None if there is none for this env with these arguments."""
+    """Return the reference of an env; None if the env with these arguments has no reference."""
     return None if env.kwargs else load_references().get(env.id)
 
 

@@ -66,7 +66,7 @@ _LINE_STYLES: Final[dict[str, _LineStyle]] = {
 }
 
 
-# Those of methods that are not shipped, in their order in the study.
+# Colours of methods that are not shipped, in their order in the study.
 _OTHER_STYLES: Final = (
     _LineStyle(YELLOW, (0, (1, 1)), "D"),
     _LineStyle(BLACK, (0, (4, 1, 1, 1)), "P"),

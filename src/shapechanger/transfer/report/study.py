@@ -120,7 +120,7 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 
 
 def _short_name(env: EnvRef) -> str:
-    """The env's name without its namespace, and its arguments, truncated where they are long."""
+    """The env's name without its namespace, and its arguments, truncated if they are long."""
     arguments = ", ".join(f"{name}={_truncate(str(value))}" for name, value in env.kwargs.items())
     name = env.id.rpartition("/")[2]
     return f"{name} ({arguments})" if arguments else name
@@ -200,7 +200,7 @@ def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
 
 
 def _scale(summary: Summary) -> str:
-    """Describe the score, or why there is none."""
+    """Describe the score, or why it is missing."""
     reference = summary.reference
     zero, one = number(reference.zero), number(reference.one)
     why = "which ships with its policy" if reference.shipped else "the best arm"

@@ -115,7 +115,7 @@ def _verdict(studies: Mapping[str, Study]) -> str:
 def gain_over_scratch(study: Study) -> Estimate:
     """Advantage of the headline arm over scratch, averaged over the budget, in the measure's unit.
 
-    That of an arm that is not trained on the target is its advantage at the start.
+    The gain of an arm that is not trained on the target is its advantage at the start.
     """
     arm = study.curves(study.headline_arm)
     if arm.n_evals > 1:
@@ -203,8 +203,8 @@ def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
 def _score_ends(studies: Sequence[Study]) -> dict[str, list[NDArray[np.float64]]]:
     """Final scores of each arm in studies of one target, whose scale they share.
 
-    0 is what takes no skill, as in each study, and 1 the target's reference, or the end of the best
-    arm of all where it has none.
+    0 is the score without skill, as in each study, and 1 the target's reference, or the end of the
+    best arm of all if it has no reference.
     """
     values = {
         arm: [finals(study, arm) for study in studies if arm in study.plan.arms]

@@ -42,13 +42,13 @@ _TAYLOR_STONE: Final = "Taylor & Stone, JMLR 10, 2009"
 
 EXPLANATIONS: Final[dict[str, str]] = {
     JUMPSTART: "The arm minus scratch at the first evaluation on the target; in "
-    "total steps, minus that of scratch after as many steps as the source used. Above 0: transfer "
+    "total steps, minus scratch after as many steps as the source used. Above 0: transfer "
     f"helped. ({_TAYLOR_STONE})",
-    TOTAL_REWARD_GAIN: "Height of the arm's learning curve above that of scratch, averaged over "
+    TOTAL_REWARD_GAIN: "Height of the arm's learning curve above scratch's, averaged over "
     f"the whole budget. Above 0: transfer helped. ({_TAYLOR_STONE}, divided by the budget)",
     ASYMPTOTIC_GAIN: "The arm minus scratch at the end of the budget. Above 0: "
     f"transfer helped. ({_TAYLOR_STONE})",
-    AUC_RATIO: "Area under the arm's learning curve over that of scratch, both in scores. Above 1: "
+    AUC_RATIO: "Area under the arm's learning curve over scratch's, both in scores. Above 1: "
     f"transfer helped. ({_TAYLOR_STONE}, as the transfer ratio)",
     FORWARD_TRANSFER: "The share of the area between scratch's curve and the score 1 that the arm "
     "wins, with scores cut off at 0 and 1. At most 1; above 0: transfer helped. (Wołczyk et al., "
@@ -137,7 +137,7 @@ def _rows_of(arm: str, summary: Summary) -> list[MeasureRow]:
 
 
 def _named(measures: Measures) -> dict[str, Estimate]:
-    """The measures that are not times, by name."""
+    """The measures that are not times, keyed by name."""
     return {
         JUMPSTART: measures.jumpstart,
         TOTAL_REWARD_GAIN: measures.total_reward_gain,
@@ -189,7 +189,7 @@ def _seeds(reach: ReachTimes, n_seeds: int) -> str:
 
 
 GOOD: Final = 0.9
-"""Share of the way from what takes no skill to the best run that counts as having learnt."""
+"""Share of the way from the score without skill to the best run that counts as having learnt."""
 
 STRONG: Final = 0.8
 """Share of success from which an arm counts as good on one individual, such as a finger."""
@@ -201,8 +201,8 @@ class ArmRow(NamedTuple):
     Attributes:
         success: Share of successful episodes at the end, with its t-interval over seeds; empty
             where the env does not report success.
-        good: Number of runs that covered 90 % of the way from what takes no skill to the best run
-            on the target; empty for source policies, and where no run learned.
+        good: Number of runs that covered 90 % of the way from the score without skill to the best
+            run on the target; empty for source policies, and where no run learned.
     """
 
     kind: str
@@ -218,7 +218,7 @@ class ArmRow(NamedTuple):
 
 
 def arm_rows(study: Study) -> tuple[ArmRow, ...]:
-    """Summarise each kind of run, those of the source and those without skill first.
+    """Summarise each kind of run, first the runs of the source and the policies without skill.
 
     The end of a run is the mean of its last evaluations, as many as the plan says; for a source
     policy it is the last one, because that is the policy that is transferred.
@@ -341,7 +341,7 @@ def direction(estimate: Estimate) -> Direction:
 
 
 def _outcome(estimate: Estimate) -> str:
-    """Return what transfer did, as the verb of a sentence."""
+    """Return the verdict's verb phrase."""
     if estimate.value is not None and estimate.low is None:
         return _NO_INTERVAL
     return _TRANSFER[direction(estimate)]
@@ -383,7 +383,7 @@ def other_arms(study: Study) -> str:
     """State in one sentence which of the arms that the verdict leaves out helped; may be empty.
 
     Each is judged by its total reward gain in target steps, or by its jumpstart if it does not
-    learn on the target. In brackets is its measure, averaged over the budget.
+    learn on the target. The brackets give its measure, averaged over the budget.
     """
     others: dict[str, list[str]] = {found: [] for found in (*_TRANSFER.values(), _NO_INTERVAL)}
     for arm, summary in study.summaries.items():

@@ -70,8 +70,8 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 
         z_s = diag(1 / sigma_s) M diag(sigma_t) z_t + (M mean_t + c - mean_s) / sigma_s
 
-    The clipping of z_t replaces that of z_s, which is the same where a number keeps its statistics.
-    A constant number is clipped here.
+    The clipping of z_t replaces the clipping of z_s, which is the same if a number keeps its
+    statistics. A constant number is clipped here.
     """
     matrix = body_map.observation_matrix * target.sigma / source.sigma[:, np.newaxis]
     seen = body_map.observation_matrix @ target.mean + body_map.observation_offset
@@ -86,7 +86,7 @@ def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> Runni
 
     A target number that a source number copies gets its mean and variance, through the scale; of
     several copies, the one of the same name counts, or else the first. A new number is assumed
-    uniform in its range, or to have the mean nearest to 0 and the variance 1 where it has no range.
+    uniform in its range, or to have the mean nearest to 0 and the variance 1 if it has no range.
     The count is kept, so the source's experience keeps its weight.
 
     Args:
@@ -117,7 +117,7 @@ def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> Runni
 
 
 def _guessed_variance(feature: Feature) -> float:
-    """Variance of a uniform distribution over the range, or 1 where there is none."""
+    """Variance of a uniform distribution over the range, or 1 without a range."""
     width = feature.high - feature.low
     return width**2 / 12.0 if 0.0 < width < math.inf else 1.0
 
@@ -154,7 +154,7 @@ class PolicyOutputs:
 def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
     """Outputs of a policy whose actions are not squashed, as PPO's.
 
-    The map is in the units of the layouts, a_t = N a_s + d, and the outputs are in those of the
+    The map is in the units of the layouts, a_t = N a_s + d, and the outputs are in the units of the
     models, a = middle + half y.
     """
     ours = ActionScale.between(source, body_map.source_action)
@@ -194,7 +194,7 @@ def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
         if abs(abs(ratio) - 1.0) > _SAME or abs(shift) > _SAME:
             raise TransplantError(
                 f"SAC squashes its actions with tanh, which cannot be scaled or shifted: for "
-                f"{name!r} the source's range would become {ratio:+.3g} times that of the target, "
+                f"{name!r} the source's range would become {ratio:+.3g} times the target's, "
                 f"shifted by {shift:+.3g}, and must become +1 or -1 times, shifted by 0. "
                 "Map it with units='same', hold it, learn it, or use PPO."
             )
@@ -298,7 +298,7 @@ def move_parameters(
 
 
 def _biases(trained: Array, output: OutputMap, new: Mapping[str, torch.Tensor], name: str) -> Array:
-    """N b + d, or those of a new network."""
+    """N b + d, or the biases of a new network."""
     return np.where(output.fresh, _array(new, name), output.matrix @ trained + output.offset)
 
 

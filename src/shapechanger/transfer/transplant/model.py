@@ -127,7 +127,7 @@ def _problem(model: object) -> str:
         )
     for part, expected in parts:
         if type(part) is not expected:
-            return f"This policy has a {type(part).__name__} in place of a {expected.__name__}."
+            return f"This policy has a {type(part).__name__} instead of a {expected.__name__}."
     return ""
 
 
@@ -149,12 +149,12 @@ def transplant(
     untrained policy. A constant action gets the mean log standard deviation of the source, so that
     it is explored.
 
-    Observations: where the target env normalises them with `VecNormalize`, its statistics become
-    those of the source, see `transplant_normalisation`. Where it does not, the source's statistics
+    Observations: if the target env normalises them with `VecNormalize`, its statistics become
+    the source's, see `transplant_normalisation`. Where it does not, the source's statistics
     go into the first layer, which is exact up to the clipping of `VecNormalize`.
 
     Actions: the map is in the units of the layouts, to whose ranges the action space of each model
-    is scaled where it has another, see `shapechanger.transfer.actions`. PPO's are moved before they
+    is scaled if it differs, see `shapechanger.transfer.actions`. PPO's are moved before they
     are clipped to the bounds. Critics stay in the units of the
     rewards that they learned from, so return statistics are moved with them if
     `VecNormalize` is on both sides.
@@ -164,11 +164,11 @@ def transplant(
             the source.
         body_map: Map between the bodies.
         target_env: The env to continue training in; flat spaces of the map's target sizes.
-        normalisation: Normalisation of the source's observations; by default that of the model's
-            own env. Needed for a model that was loaded without its env.
+        normalisation: Normalisation of the source's observations; by default the normalisation of
+            the model's own env. Needed for a model that was loaded without its env.
         seed: Seed of the new model, and so of the weights to be learned. As any model of
             Stable-Baselines3, it seeds Python, NumPy and PyTorch.
-        device: Device of the new model; by default that of the source model.
+        device: Device of the new model; by default the source model's.
         **settings: Arguments of the model's class that differ from the source model's.
 
     Returns:
