@@ -15,7 +15,7 @@ _SIZE: Final = (120, 160, 3)
 
 
 def find_clone(vehicle: str) -> CameraPolicy | None:
-    """Return the shipped policy of a vehicle; None if there is none."""
+    """Return the shipped policy of a vehicle; None if none ships."""
     path = CLONES.get(vehicle)
     return None if path is None or not path.exists() else CameraPolicy.load(path)
 

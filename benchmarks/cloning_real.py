@@ -9,7 +9,7 @@ frames; our clone takes its held-out steps for early stopping from them. Its set
 (`shapechanger.demos.cloning.settings.DEMOS`) were chosen on these splits, so the rows are slightly
 optimistic. They were chosen by accuracy, with one to three seeds each:
 
-- Inputs, with kernel ridge regression in place of a network: pixels (grey or coloured, 8 to 32
+- Inputs, with kernel ridge regression instead of a network: pixels (grey or coloured, 8 to 32
   rows), histograms of edges, and the features of the shipped clones of car and tank. Edges were
   best for all cells and directions tried (9 variants): 0.73 to 0.78, against at most 0.70 for
   pixels and 0.72 for the clones' features.

@@ -86,7 +86,7 @@ def console(seconds: float = SECONDS) -> list[Row]:
         alone = _commands_ms(robot, seconds / 2)
         with _page(browser, robot) as page:
             page.evaluate(_HANG)
-            beside = _commands_ms(robot, seconds / 2)
+            stalled = _commands_ms(robot, seconds / 2)
         # On this machine any browser page takes CPU time from the robot. This is the control.
         with browser.new_context() as context:
             context.new_page().evaluate(_HANG)
@@ -104,14 +104,14 @@ def console(seconds: float = SECONDS) -> list[Row]:
         )
     ]
     (a50, a99, a_max), (b50, b99, b_max), (s50, s99, s_max) = (
-        (*np.percentile(each, [50, 99]), max(each)) for each in (alone, beside, stranger)
+        (*np.percentile(each, [50, 99]), max(each)) for each in (alone, stalled, stranger)
     )
     rows.append(
         Row(
             "time between two commands at the guard, with a page that hangs 80 % of the time",
             f"p50 {b50:.1f}, p99 {b99:.1f}, max {b_max:.1f} ms",
             f"without any page p50 {a50:.1f}, p99 {a99:.1f}, max {a_max:.1f} ms; "
-            f"{len(beside)} and {len(alone)} commands at 20 Hz",
+            f"{len(stalled)} and {len(alone)} commands at 20 Hz",
             "none delayed: p99 within 10 ms of that without",
             bool(b99 - a99 < 10.0),
         )
@@ -167,7 +167,7 @@ def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[lis
         page.wait_for_timeout(1e3 * seconds)
         seen: list[tuple[int, float, str]] = page.evaluate("globalThis.seen")
     if len(seen) < 10.0 * seconds:
-        # The robot restarted, as on a machine that is too busy for its guard.
+        # The robot restarted, because the machine was too busy for its guard.
         raise RuntimeError(f"Only {len(seen)} pictures came in {seconds:.0f} s: {robot.log_text()}")
     ages: list[float] = []
     for number, at_ms, bits in seen[1:]:
@@ -179,7 +179,7 @@ def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[lis
 
 
 def _crc_matches(bits: str) -> bool:
-    """Return whether the CRC of a time code matches, as in `read_barcode`."""
+    """Return whether the CRC of a time code matches like `read_barcode`."""
     data = int(bits, 2).to_bytes(8, "big")
     return binascii.crc_hqx(data[:6], 0xFFFF) == int.from_bytes(data[6:], "big")
 

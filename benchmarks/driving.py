@@ -133,7 +133,7 @@ class DriveScore:
         """Summarise drives.
 
         Raises:
-            WorldError: If there are none.
+            WorldError: If no course is left.
         """
         if not drives:
             raise WorldError("There is no drive to score: give at least one.")

@@ -1,7 +1,7 @@
 """Daemon with a fake guard and camera of negligible cost, to measure the link alone.
 
 A new picture is always available, so each command is answered at once with an observation that
-carries one, as on a robot whose camera is faster than its client.
+carries one, like on a robot whose camera is faster than its client.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ _STRONG: Final = 0.8
 _FOLLOWED: Final = 2.0
 # Time that the whole command may take for a finger, min.
 _LIMIT_MIN: Final = 30.0
-# Distance within which a target counts as reached, m, as in `Finger-v1`.
+# Distance within which a target counts as reached, m, like in `Finger-v1`.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
@@ -81,7 +81,7 @@ def gap() -> list[Row]:
 
     The shipped policy in the nominal finger with a delay shows what a delay alone costs, and a
     policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
-    `ONLY` names arms, beside scratch and zero-shot, or "rig" for that policy. With `ENDED=1` no run
+    `ONLY` names arms besides scratch and zero-shot, or "rig" for that policy. With `ENDED=1` no run
     is started, and the rows are those of the runs that have ended.
     """
     target = _FINGER.having({"gap": "real-like"})
@@ -204,7 +204,7 @@ def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
 def _row(name: str, shares: Mapping[int, float]) -> Row:
     """Return a row of shares of the targets by the seed of the finger.
 
-    A row of some fingers names their seeds, so that it does not replace that of the first ones.
+    A row of some fingers names their seeds, so that it does not replace the row of the first ones.
     """
     values = np.array([*shares.values()])
     seeds = [*shares]

@@ -29,7 +29,7 @@ _EPISODES = 5
 _FIRST_SEED = 3_000_000
 # The first steps are left out, so that the replay starts in motion.
 _BEGINS = 10
-# Lag of the motors that is found where no path is assumed.
+# Lag of the motors that is found if no path is assumed.
 _LAG_S = 0.002
 
 

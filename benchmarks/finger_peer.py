@@ -1,4 +1,4 @@
-"""Finger env in a process of its own, stepped on demand: `finger_peer.py KIND`.
+"""Finger env in a separate process, stepped on demand: `finger_peer.py KIND`.
 
 KIND is `ours` or `myosuite`. The process prints `ready`, its version and the duration of a step, s.
 For each number of steps that it reads, it prints the CPU seconds they took, resets included. It
@@ -19,7 +19,7 @@ WARM_UP = 300
 
 def _make(kind: str) -> Any:
     if kind == "myosuite":
-        from myosuite.utils import gym  # pyright: ignore[reportMissingImports]  # In a venv of its own.
+        from myosuite.utils import gym  # pyright: ignore[reportMissingImports]  # In a separate venv.
 
         return gym.make("myoFingerReachRandom-v0")
     import gymnasium

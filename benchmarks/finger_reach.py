@@ -30,7 +30,8 @@ _GAIN: Final = 12.0
 # Units in which the solver's numbers are near 1: errors of 1 cm, tensions of 10 N, torques of
 # 10 mN·m.
 _ERROR_M, _TENSION_N, _TORQUE_NM = 0.01, 10.0, 0.01
-# Largest torque that an equilibrium may lack, N·m: a thousandth of that of the finger's weight.
+# Largest torque that an equilibrium may lack, N·m: a thousandth of the torque of the finger's
+# weight.
 _BALANCED_NM: Final = 1e-5
 # Searches for an equilibrium, and the spread of their starts, rad.
 _STARTS: Final = 4
@@ -89,7 +90,7 @@ class Statics:
     def distance_coming_from_rest(self, target: NDArray[np.float64]) -> float:
         """Return the distance of the nearest place that a motion from the rest posture ends at, m.
 
-        Friction takes its share of what a shortening tendon pulls, and adds to what a lengthening
+        Friction reduces the pull of a shortening tendon, and increases the pull of a lengthening
         one holds.
 
         Args:
@@ -159,14 +160,14 @@ def causes() -> list[Row]:
     fingers = [_RIG.draw(np.random.default_rng(seed)) for seed in range(many)]
     first = [evaluation_seed(_GAP_FINGER.having({"finger_seed": i}), TARGETS) for i in range(many)]
     rows: list[Row] = []
-    for what, changes in _REPLACED.items():
+    for label, changes in _REPLACED.items():
         shares = [
             float(np.mean(held_by_controller(finger.replace(**changes), first[seed], TARGETS)))
             for seed, finger in enumerate(fingers)
         ]
         rows.append(
             Row(
-                f"controller that knows the finger, fingers of the gap real-like{what}: targets "
+                f"controller that knows the finger, fingers of the gap real-like{label}: targets "
                 "reached within 5 mm",
                 f"{np.mean(shares):.0%}",
                 f"{', '.join(f'{share:.0%}' for share in shares)} of {TARGETS} targets each",

@@ -1,4 +1,4 @@
-"""One policy for bodies that nobody has built, against a padded network with the same data.
+"""One policy for bodies outside the training, against a padded network with the same data.
 
 Each policy learns in 32 drawn ants and is judged, without learning, in those and in 32 others of
 each split, one episode each, and in the extended ant, whose legs have more joints. Policies are
@@ -45,7 +45,7 @@ SCRATCH_BODIES: Final = 8
 ANT: Final = EnvRef("shapechanger/Ant-v1")
 EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1")
 SPLITS: Final = ("train", "interpolation", "extrapolation", "composition")
-# Other ants of that split: those of the first draw were looked at when the rows were designed.
+# Other ants of that split: the first draw was known when the rows were designed.
 AGAIN: Final = "extrapolation, second draw"
 _RESAMPLES: Final = 4000
 
@@ -249,7 +249,7 @@ def _scratch(split: str) -> list[float]:
 
 
 def _scratch_row(found: list[Scores], split: str, alone: list[float]) -> Row:
-    """Return what some bodies learn by themselves in one body's share of the steps."""
+    """Return what some bodies learn alone in one body's share of the steps."""
     limbs = np.array(
         [one.splits[split][:SCRATCH_BODIES] for one in found if one.network == "limbs"]
     )

@@ -74,7 +74,7 @@ TASKS: Final = ("Ant", "HalfCheetah", "InvertedDoublePendulum", "Humanoid", "Fin
 
 
 def gpu() -> Iterator[Row]:
-    """Measure all parts, in the order of what must be known first."""
+    """Measure all parts, the most important first."""
     if _there():
         yield from _all(
             parity, speed, waiting, graphs, construction, differing, batches, training, humanoid
@@ -150,7 +150,7 @@ def _seconds(work: Callable[[], object], repeats: int) -> float:
 
 
 def _ratio(one: Callable[[], object], other: Callable[[], object], repeats: int) -> list[float]:
-    """Return the times of `one` over those of `other`, sorted, in rounds of alternating order."""
+    """Return the sorted ratios of the times of `one` and `other`, in alternating rounds."""
     ratios: list[float] = []
     for i in range(ROUNDS):
         order = (one, other) if i % 2 else (other, one)

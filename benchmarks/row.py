@@ -29,14 +29,14 @@ class Row:
 
 
 def asked(kind: str, names: Iterable[str]) -> list[str]:
-    """Return the names in `ONLY`, which are separated by spaces, or all where it is not set.
+    """Return the names in `ONLY`, which are separated by spaces, or all if it is not set.
 
     Args:
         kind: What they are names of, for the message.
         names: All names.
 
     Raises:
-        UnknownName: If there is none of this name.
+        UnknownName: If no row has this name.
     """
     known = list(names)
     found = os.environ.get("ONLY", "").split() or known

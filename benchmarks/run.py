@@ -146,7 +146,7 @@ def _write(suite: str, rows: list[Row], former: dict[str, Any] | None) -> None:
 
 
 def kept(former: dict[str, Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the rows of a former result, with new ones instead of those of the same name.
+    """Return the rows of a former result, replaced by new ones of the same name.
 
     A row that is kept from a former run has its command as `measured_by`.
 

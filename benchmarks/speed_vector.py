@@ -102,7 +102,7 @@ def _missing(name: str, why: str, target: float) -> Row:
 
 
 def against_physics(num_envs: int, *, fast: bool = False) -> Row:
-    """Compare the CPU time of `mj_step(nstep=5)`, called from Python, with that of our step.
+    """Compare the CPU time of `mj_step(nstep=5)`, called from Python, with our step's.
 
     With `fast` the loop also steps the fast model, and the ratio shows the overhead beyond the
     physics.
@@ -198,7 +198,7 @@ def against_envpool() -> Row:
 
 def against_processes() -> Row:
     """Compare two processes of 64 envs with one process of 128 envs and two threads."""
-    # Both sides run in processes of their own, so that neither is disturbed.
+    # Both sides run in separate processes, so that neither is disturbed.
     peers = [_peer("ours", 64, 1) for _ in range(2)]
     threads = _peer("ours", 128, 2)
     for peer in (*peers, threads):

@@ -1,4 +1,4 @@
-"""How often a car's teacher stands for good at starts beside the lane.
+"""How often a car's teacher stands for good at starts off the lane.
 
 `SEEDS` teachers are trained with the preset of `CarRanges` and kept in `results/standing`.
 All starts are on held-out courses.
@@ -63,7 +63,7 @@ class Starts(NamedTuple):
 
 
 def teachers() -> list[Row]:
-    """Judge teachers at starts beside the lane and turned from it, as after a mistake."""
+    """Judge teachers at starts off the lane and turned from it, as after a mistake."""
     seeds = range(int(os.environ.get("SEEDS", SEEDS)))
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         found = list(pool.map(_judged, seeds))

@@ -1,4 +1,4 @@
-"""Vector env in a process of its own, stepped on demand: `vector_peer.py KIND N THREADS`.
+"""Vector env in a separate process, stepped on demand: `vector_peer.py KIND N THREADS`.
 
 KIND is `ours`, `envpool` or `memory`. The process prints `ready` and its version; for each number
 of steps that it reads, it prints the seconds they took. `memory` prints the resident memory per
@@ -29,7 +29,7 @@ def _resident() -> int:
 
 def _make(kind: str, num_envs: int, threads: int) -> Any:
     if kind == "envpool":
-        import envpool  # pyright: ignore[reportMissingImports]  # In a venv of its own.
+        import envpool  # pyright: ignore[reportMissingImports]  # In a separate venv.
 
         return envpool.make_gymnasium(
             "Ant-v5", num_envs=num_envs, batch_size=num_envs, num_threads=threads, seed=0

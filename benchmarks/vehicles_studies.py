@@ -64,7 +64,7 @@ def waypoints() -> list[Row]:
 
 
 def waypoint_rows(folder: Path) -> list[Row]:
-    """Return what the studies of a suite have found so far, at 15 and at 30 s of driving.
+    """Return the results of a suite's studies so far, at 15 and at 30 s of driving.
 
     Args:
         folder: Folder of the suite.
@@ -106,7 +106,7 @@ def waypoint_rows(folder: Path) -> list[Row]:
 
 
 def keep_runs(pairs: Sequence[Path]) -> None:
-    """Write what every run drove at each evaluation beside the rows; other pairs are kept.
+    """Write the driving of every run at each evaluation next to the rows; other pairs are kept.
 
     Args:
         pairs: Folders of the studies.

@@ -163,7 +163,7 @@ def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult
     """Return a drive of a policy on board, and the times between its commands, ms."""
     profile = find_profile(f"lab-{vehicle}")
     arguments = ("--policy", str(file))
-    seen_at: dict[int, int] = {}  # Arrival of each command that was seen, ns, by its number.
+    seen_at: dict[int, int] = {}  # Arrival of each command that was seen, ns, keyed by its number.
     with (
         run_robot(profile, clock="real", seed=course, arguments=arguments) as robot,
         robot.operator() as operator,
@@ -195,7 +195,7 @@ def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult
 
 def _compared(name: str, here: DriveScore, there: DriveScore) -> list[Row]:
     ratio = there.speed / here.speed
-    alike = here.low <= there.per_100_m <= here.high or there.low <= here.per_100_m <= there.high
+    agree = here.low <= there.per_100_m <= here.high or there.low <= here.per_100_m <= there.high
     return [
         Row(
             f"{name}: mean speed over that in process",
@@ -210,7 +210,7 @@ def _compared(name: str, here: DriveScore, there: DriveScore) -> list[Row]:
             f"{there.per_100_m:.2f}",
             counted(there),
             "one rate inside the other's interval",
-            alike,
+            agree,
         ),
     ]
 

@@ -226,8 +226,8 @@ def whole_robot() -> list[Row]:
         without, whole = (
             _score(drives[at : at + len(seeds)]) for at in (first, first + len(seeds))
         )
-        alike = without.low <= whole.per_100_m <= without.high
-        alike |= whole.low <= without.per_100_m <= whole.high
+        agree = without.low <= whole.per_100_m <= without.high
+        agree |= whole.low <= without.per_100_m <= whole.high
         rows.append(
             Row(
                 f"waypoints, {name} in the whole robot: collisions per 100 m",
@@ -235,7 +235,7 @@ def whole_robot() -> list[Row]:
                 f"{counted(whole)}; {whole.speed:.2f} m/s; without the robot "
                 f"{without.per_100_m:.1f}, {counted(without)}; {without.speed:.2f} m/s",
                 "one rate inside the other's interval",
-                alike,
+                agree,
             )
         )
     return rows
@@ -400,7 +400,7 @@ def taught_source(name: str, seed: int) -> CameraPolicy:
 
 
 class _Watched(ExpertPilot):
-    """Expert that drives by steering, and the waypoints on the path beside it.
+    """Expert that drives by steering, and the waypoints on its path.
 
     Args:
         env: The env of the vehicle.
@@ -425,7 +425,7 @@ class _Watched(ExpertPilot):
 
 
 def _record(seed: int) -> Path:
-    """Record six minutes of a car by steering and throttle, with the path's waypoints beside."""
+    """Record six minutes of a car by steering and throttle, and the path's waypoints."""
     folder = OUT / f"car-by-steering-{seed}"
     waypoints = folder.with_suffix(".npy")
     if waypoints.exists():

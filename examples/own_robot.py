@@ -1,7 +1,7 @@
 # /// script
 # dependencies = ["shapechanger[sim,learn]", "tyro"]
 # ///
-"""Train a robot and a task of your own, and see what its policy does in other bodies."""
+"""Train your own robot on your own task, and watch its policy in other bodies."""
 
 from __future__ import annotations
 

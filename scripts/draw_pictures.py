@@ -112,7 +112,7 @@ def _film_finger(stem: Path) -> None:
     follow = EnvRef("shapechanger/FingerTrack-v1", {"path": "figure-eight"})
     films = [_filmed(reach, "reach", (1, 4)), _filmed(follow, "track", (1,))]
     frames = [Image.fromarray(np.concatenate(pair, axis=1)) for pair in zip(*films, strict=True)]
-    # One palette for all frames, so that colours do not flicker, with those of thin tendons.
+    # One palette for all frames, so that colours do not flicker, with the colours of thin tendons.
     palette = frames[-1].quantize(_FILM_COLOURS, Image.Quantize.MAXCOVERAGE)
     drawn = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     drawn[0].save(
@@ -165,7 +165,7 @@ def _seen(name: str) -> tuple[Picture, Picture]:
     return outside, np.asarray(seen)
 
 
-# Starts that differ more than those of the policies' training, so that there is something to see.
+# Starts that vary more than the policies' training, so that there is something to see.
 _LEANING: Final = {"reset_noise_scale": 0.08}
 
 
@@ -184,7 +184,7 @@ def film_bodies(
     farther: float = 1.0,
     **arguments: Any,
 ) -> Film:
-    """Return what films the reference policies of bodies, each group at one scale.
+    """Return a function that films the reference policies of bodies, each group at one scale.
 
     Args:
         groups: Names of bodies.
@@ -324,7 +324,7 @@ STILLS: Final[Mapping[str, Callable[[], Picture]]] = {
     "vehicles": _vehicles,
     "finger": _finger,
 }
-"""Pictures by name."""
+"""Pictures, keyed by name."""
 
 CLIPS: Final[Mapping[str, Film]] = {
     "walking": film_bodies((ANTS,), 8.0),
@@ -336,7 +336,7 @@ CLIPS: Final[Mapping[str, Film]] = {
     "car-to-tank": _film_tank,
     "ant-to-bigant": _film_transfer,
 }
-"""Clips by name; each gets the path that it writes to, without a suffix."""
+"""Clips, keyed by name; each gets the path that it writes to, without a suffix."""
 
 if __name__ == "__main__":
     main()

@@ -2,7 +2,7 @@
 
 `make check` runs it after each installation. pybind11-stubgen reads the signatures out of the
 compiled modules, and this script corrects what it cannot know; the modules of MuJoCo that are
-Python have stubs written by hand beside the generated ones. The stubs promise no more than the
+Python have stubs written by hand next to the generated ones. The stubs promise no more than the
 bindings keep, with one exception. A result that is None only where nothing fits, such as the parent
 of the world or a body looked up by a wrong name, is `X | Any`: both `body.parent.name` and
 `body.parent is None` pass, and the caller decides which one is due.
@@ -60,7 +60,7 @@ _PLURALS: Final = {
     "textures": "MjsTexture",
     "tuples": "MjsTuple",
 }
-# Where the name of a model's or data's accessor is not that of the view it gives.
+# Where the name of a model's or data's accessor differs from its view's.
 _VIEWS: Final = {
     "cam": "Camera",
     "eq": "Equality",
@@ -78,7 +78,7 @@ _RETURNS: Final = {
     "MjByteVec.__iter__": "collections.abc.Iterator[int]",
     "MjsSkin.vertid": "list[list[int]]",
     "MjsSkin.vertweight": "list[list[float]]",
-    "MjModel.bind": "typing.Any",  # What it gives has the attributes of what it was given.
+    "MjModel.bind": "typing.Any",  # The result has the attributes of the argument.
     "MjData.bind": "typing.Any",
     "MjvScene.camera": "builtins.tuple[MjvGLCamera, ...]",
     "MjvScene.geoms": "builtins.tuple[MjvGeom, ...]",
@@ -308,7 +308,7 @@ def _keyword_only_after_default(line: str) -> str:
 
 
 def _short(default: ast.expr) -> ast.expr:
-    """A default as it is, or `...` where it is more than a plain value."""
+    """A default as it is, or `...` for more than a plain value."""
     return default if isinstance(default, ast.Constant | ast.UnaryOp) else ast.Constant(...)
 
 

@@ -99,7 +99,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Rewrite the links of a page to files outside `docs`, and those of such files."""
+    """Rewrite the links of a page to files outside `docs`, and the links of such files."""
     origin = origin_of(page.file.src_uri)
     markdown = _ONLY_HERE.sub(lambda match: _to_made_pages(match[1], origin), markdown)
     return _CLIP.sub(_player, rewritten(_MERMAID.sub(_graph_as_table, markdown), origin))
@@ -174,7 +174,7 @@ def rewritten(markdown: str, origin: str) -> str:
 
     def link(match: re.Match[str]) -> str:
         path, anchor = _target(match[2], origin)
-        if not path or not (ROOT / path).is_file():  # MkDocs warns of what does not exist.
+        if not path or not (ROOT / path).is_file():  # MkDocs warns of missing files.
             return match[0]
         return f"{match[1]}{posixpath.relpath(in_site(path), here or '.')}{anchor}{match[3]}"
 

@@ -44,7 +44,7 @@ class SitePage:
         path: Its path in the site's sources, such as `environments/Ant.md`.
         title: Its title in the navigation.
         content: Its Markdown.
-        pictures: Files beside it, by their paths in the site's sources.
+        pictures: Its other files, keyed by their paths in the site's sources.
         notes: What is missing on it, in sentences.
     """
 
@@ -86,7 +86,7 @@ def environment_pages() -> list[SitePage]:
 
 
 def _odrl_page() -> SitePage:
-    """Return the page of the bodies of ODRL, with what each changes."""
+    """Return the page of the bodies of ODRL, with each body's changes."""
     rows: list[tuple[str, ...]] = []
     for env_id, entry in ODRL_ENVS.items():
         edits = _loaded(entry.entry_point).family.body(entry.body)
@@ -94,7 +94,7 @@ def _odrl_page() -> SitePage:
     parts = [
         "# ODRL",
         "The sources and the targets of ODRL's locomotion tasks, as ids. Their models equal the "
-        "published ones; [rewards and observations](../own-bodies.md) are those of our runners.",
+        "published ones; [rewards and observations](../own-bodies.md) are our runners'.",
         _table(("id", "edits of its family"), rows),
     ]
     return SitePage("environments/ODRL.md", "ODRL", "\n\n".join(parts))
@@ -118,7 +118,7 @@ def environment_page(env_id: str) -> SitePage:
     parts = [f"# {short}", f"`{env_id}`: {_summary(env_id)}."]
     pictures: dict[str, bytes] = {}
     notes: list[str] = []
-    # Their layouts are those of a robot, or of a file.
+    # Their layouts come from a robot or a file.
     has_layouts = not short.startswith("Remote") and env_id != OWN_ROBOT
     env = EnvRef(env_id).make() if has_layouts else None
     if env is not None and hasattr(env.unwrapped, "picture"):
@@ -237,7 +237,7 @@ def _class_link(entry_point: str) -> str:
 
 
 def _layout_table(layout: Layout) -> str:
-    """Return a table of a layout, folded where it is long."""
+    """Return a table of a layout, folded if it is long."""
     rows: list[tuple[str, ...]] = []
     place = 0
     for feature in layout.features:
@@ -273,7 +273,7 @@ def _bound(value: float) -> str:
 
 
 def _certificate(env_id: str, env: gym.Env[Any, Any]) -> str:
-    """Return the section on what distinguishes an env from the first of its kind, proven.
+    """Return the section on the differences of an env from the first of its kind.
 
     Raises:
         RenderError: If an env needs its camera, and nothing renders here.
@@ -308,9 +308,9 @@ def _compared(env_id: str) -> tuple[EnvRef | None, str]:
     for suffix in ("Ranges", "Waypoint"):
         if name.endswith(suffix):
             vehicle = name.removesuffix(suffix)
-            return None, f"Its body is that of [{vehicle}]({vehicle}.md), which has a certificate."
+            return None, f"It has the body of [{vehicle}]({vehicle}.md), which has a certificate."
     if name == "FingerTrack":
-        return None, "Its body is that of [Finger](Finger.md); only the task differs."
+        return None, "It has the body of [Finger](Finger.md); only the task differs."
     others = "" if name != "Car" else " [Tank](Tank.md), [Truck](Truck.md) and [Boat](Boat.md)"
     if others:
         return None, f"The certificates of{others} compare them with it."

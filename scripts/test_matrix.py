@@ -5,9 +5,9 @@ Each lane has its own virtual environment under `build/matrix`:
 - oldest: the lowest allowed version of every direct dependency;
 - newest: the newest allowed versions, without constraints.txt;
 - 3.11 to 3.14: the wheel without the sources, on each of these Pythons that this machine has;
-- robot: the `[robot]` extra alone, as on a Raspberry Pi.
+- robot: the `[robot]` extra alone, like on a Raspberry Pi.
 
-`python scripts/test_matrix.py oldest 3.12` runs two of them. The exit status is that of the worst
+`python scripts/test_matrix.py oldest 3.12` runs two of them. The exit status is the worst's
 lane. With `--release`, as in `make release`, the version must be the same everywhere, the changelog
 complete, and `dist` holds the source distribution and the wheel that were tested.
 """
@@ -126,7 +126,7 @@ def run_lane(lane: str, wheel: Path) -> int:
     done = subprocess.run([*install, *options, *what], check=False)
     if done.returncode:
         return done.returncode
-    # The tests run in a copy, so that the wheel cannot find the sources beside them.
+    # The tests run in a copy, so that the wheel cannot find the sources next to them.
     place, chosen = ROOT, FAST
     if is_wheel:
         chosen += " and not sources"

@@ -1,6 +1,6 @@
 """Wiring diagrams, pins and parts of a robot, from its profile.
 
-`python scripts/wiring_diagrams.py my-car.toml --out my-car.svg` draws one of your own.
+`python scripts/wiring_diagrams.py my-car.toml --out my-car.svg` draws your own.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Terminal:
     """One terminal of a device.
 
     Attributes:
-        label: What is printed beside it.
+        label: Its printed label.
         source: The BCM pin that a wire leads to, or the flag of a net.
         pull: Net that a resistor of 10 kOhm leads to; "" for none.
         divider: Whether 1 kOhm lies in the wire and 2 kOhm lead from the pin to ground.
@@ -64,7 +64,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Device:
-    """A board, sensor or switch beside the Pi.
+    """A board, sensor or switch outside the Pi.
 
     Attributes:
         title: Its name.
@@ -82,7 +82,7 @@ class Device:
 
 
 def devices_of(profile: Profile) -> list[Device]:
-    """Return what is wired to the Pi, in the order of the diagram."""
+    """Return the parts that are wired to the Pi, in the order of the diagram."""
     found: list[Device] = []
     bridges = [one for one in profile.outputs if one.driver in ("hbridge", "phase_enable")]
     for first in range(0, len(bridges), 2):
@@ -313,7 +313,7 @@ def _as5600(sensor: SensorPlan) -> Device:
     return Device("TCA9548A", f"address {settings['mux']:#x}", wires, loads, parts)
 
 
-# K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md says where it comes from.
+# K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md gives its source.
 _HOLD_OF_KOHM_MS: Final = 0.45
 
 _SENSORS: Final[dict[str, Callable[[SensorPlan], Device]]] = {
@@ -462,7 +462,7 @@ class _Drawing:
 def draw_wiring(profile: Profile, name: str) -> str:
     """Return the wiring of a robot as an SVG element.
 
-    Wires have the colours of their positions on the header; text and boxes have that of the page.
+    Wires have the colours of their positions on the header; text and boxes have the page's.
 
     Args:
         profile: The profile.
@@ -492,7 +492,7 @@ def draw_wiring(profile: Profile, name: str) -> str:
 
 
 def _draw_device(drawing: _Drawing, device: Device, top: float) -> float:
-    """Draw a device, and return where it ends."""
+    """Draw a device, and return its lower end."""
     y = top + _TITLE if device.note else top + _TITLE - 18
     first = y
     for wire in device.terminals:

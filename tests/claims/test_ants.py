@@ -264,7 +264,7 @@ def test_healthy_z_range_can_be_set() -> None:
 
 
 def test_termination_can_be_disabled() -> None:
-    """With `terminate_when_unhealthy=False`, as in Ant-v5."""
+    """With `terminate_when_unhealthy=False`, like in Ant-v5."""
     with gym.make("shapechanger/Ant-v1", terminate_when_unhealthy=False) as made:
         env: Any = made.unwrapped
         made.reset(seed=0)
@@ -306,7 +306,7 @@ def test_the_extended_ant_of_2017_has_passive_feet() -> None:
 
 
 def test_the_extended_ant_starts_at_1_25_m() -> None:
-    """The start height equals that of the 2017 release."""
+    """The start height equals the original release's (2017)."""
     for arguments in ({}, {"actuated_extension": False}):
         with gym.make("shapechanger/ExtendedAnt-v1", **arguments) as env:
             assert env.unwrapped.init_qpos[2] == 1.25

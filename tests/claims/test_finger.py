@@ -77,7 +77,7 @@ def test_the_shipped_policy_reaches() -> None:
 
 
 def test_the_shipped_policy_follows() -> None:
-    """Its RMS error on a circle at 0.5 Hz is at most twice that of the controller."""
+    """Its RMS error on a circle at 0.5 Hz is at most twice the controller's."""
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
     infos = _ends(_Policy(policy), TRACK, 1, path=_CIRCLE)

@@ -318,7 +318,7 @@ def test_ten_seconds_identify_the_finger() -> None:
 
 
 def test_a_path_is_followed_on_its_own_twin() -> None:
-    """Layouts, start and point are those of `FingerTrack-v1`, and the truth judges."""
+    """Layouts, start and point equal `FingerTrack-v1`'s, and the truth judges."""
     path = {"kind": "circle", "radius": 0.012, "hz": 0.5}
     policy = load_policy(POLICIES["track"])
     errors: list[float] = []

@@ -46,7 +46,7 @@ def _lab_car() -> Profile:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve, tmp_path: Path) -> None:
-    """Its response is that of the same car in simulation; frames and actions are those of all."""
+    """Its response equals the simulated car's; frames and actions equal all others'."""
     with closing(WaypointEnv("car")) as simulated:
         expected = simulated.response
         stated = find_profile("lab-car").read_text(encoding="utf-8")
@@ -68,7 +68,7 @@ def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve, tmp_p
 
 
 def test_a_profile_may_state_how_the_robot_turns(serve: Serve) -> None:
-    """The shipped one is that of the simulated car, and the robot need not measure it."""
+    """The shipped one is the simulated car's, and the robot need not measure it."""
     stated = _lab_car().turning
     assert stated is not None
     with closing(WaypointEnv("car")) as simulated:

@@ -179,7 +179,7 @@ def test_a_low_battery_stops_the_robot_until_rearmed(car: Served) -> None:
 
 
 def test_the_distance_ahead(car: Served) -> None:
-    """The reported distance is that of the echo."""
+    """The reported distance is the echo's."""
     car.operator.set_distance(1.2)
     car.drive_until(lambda _: abs(car.state("distance") - 1.2) < 0.02, 0.0, 0.0)
     car.operator.set_distance(None)

@@ -133,7 +133,7 @@ def test_four_keys(car: RunningRobot) -> None:
 
 
 def test_a_lost_link_truncates(tmp_path: Path, serve: Callable[[Profile], RunningRobot]) -> None:
-    """The info gives the reason, and the next reset raises an error that says what to check."""
+    """The info gives the reason, and the next reset raises an error that names the checks."""
     robot = serve(write_profile(tmp_path))
     env = env_of(robot, reset_timeout_s=1.0)
     env.reset(seed=0)

@@ -136,5 +136,5 @@ def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
     assert result.drove
     assert levels[22] in {0.0, 1.0}
     assert levels[27] == 0.0
-    # Software PWM freezes at its present level: high is full power for ever.
+    # Software PWM freezes at its present level: high is full power without end.
     assert math.isinf(result.stopped_ms) == (levels[22] == 1.0)

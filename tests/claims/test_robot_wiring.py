@@ -14,11 +14,11 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
 def driven(folder: Path, text: str) -> tuple[Whereabouts, Whereabouts, float]:
-    """Return where a car is before and after full throttle, and the speed by its encoder.
+    """Return a car's place before and after full throttle, and the speed by its encoder.
 
     Args:
         folder: An empty folder.
-        text: The profile served; the wiring is that of the correct profile.
+        text: The profile served; the wiring is the correct profile's.
     """
     (folder / "wired").mkdir()
     wired = write_profile(folder / "wired")

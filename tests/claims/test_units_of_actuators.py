@@ -1,4 +1,4 @@
-"""A robot learns alike whatever the units of its actuators are."""
+"""A robot learns the same with any units of its actuators."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def test_compare_prints_the_certificate(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_compare_refuses_a_shift_that_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    """A foot's friction below that of the floor has no effect."""
+    """A foot's friction below the floor's has no effect."""
     body = '[{"edit":"friction","element":"*ankle_geom","scale":0.2}]'
     message = refused(capsys, "envs", "compare", "Ant", "Ant", "--target-body", body)
     assert "nothing to transfer across" in message
@@ -170,7 +170,7 @@ def test_bodies_of_odrl_have_short_names(capsys: pytest.CaptureFixture[str]) -> 
 def test_a_file_is_an_env(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the built-in task, one of a module beside it, a body, and options."""
+    """With the built-in task, a task of a module in its folder, a body, and options."""
     (tmp_path / "dog.xml").write_text(DOG)
     (tmp_path / "tricks.py").write_text(
         "class Sit:\n    observe = ['back/angle']\n"

@@ -112,7 +112,7 @@ def refused(answer: tuple[int, str, str]) -> str:
 
 @pytest.mark.parametrize("file", [POLICY, CLONES["car"]])
 def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, file: Path) -> None:
-    """The file comes back byte by byte; the card says what it is and how to get it."""
+    """The file comes back byte by byte; the card describes it and how to get it."""
     code, output, errors = run("policies", "push", file, "ada/reach")
     assert (code, errors) == (0, "")
     assert f"{hub.address}/ada/reach/commit/" in output
@@ -123,7 +123,7 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
     listed = json.loads(repository.files["shapechanger.json"])["files"]["policy.safetensors"]
     for part in ("library_name: shapechanger", "**Action**", listed["sha256"], "policies pull"):
         assert part in card
-    # What lies beside is neither read nor fetched.
+    # Other files are neither read nor fetched.
     first = next(iter(repository.commits))
     repository.commit(repository.files | {"evil.pkl": pickle.dumps(print)})
     out = tmp_path / "pulled.safetensors"
@@ -140,7 +140,7 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
 
 
 def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    """Episodes come back as they were, with what was dropped; a second push replaces the first."""
+    """Episodes come back unchanged, including dropped steps; a second push replaces the first."""
     drop(drive(tmp_path / "data", 5), 1, 2, "bad")
     second = drive(tmp_path / "data", 3)
     assert run("demos", "push", tmp_path / "data", "ada/drive", "--public")[0] == 0

@@ -29,7 +29,7 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_it_is_trained_in_drawn_bodies(policy: Path) -> None:
-    """The card says in which bodies, and is that of a policy of limbs."""
+    """The card names the bodies, and belongs to a policy of limbs."""
     card = load_policy(policy).card
     assert card.env.kwargs == {"bodies": {"split": "train", "count": 3, "seed": 0}}
     assert card.learner == "limbs"
@@ -85,8 +85,8 @@ def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
             "train Ant --bodies 3 --learner rsl-ppo --tensorboard logs",
             "rsl-limbs has no TensorBoard logs",
         ),
-        ("policies evaluate POLICY --env HalfCheetah", "another family than that of"),
-        ("policies export POLICY --env Walker2d --out a.onnx", "another family than that of"),
+        ("policies evaluate POLICY --env HalfCheetah", "another family than"),
+        ("policies export POLICY --env Walker2d --out a.onnx", "another family than"),
         (
             "transfer Ant BigAnt --arms scratch generalist",
             "generalist needs a policy that fits many bodies: give --learner limbs",
@@ -116,7 +116,7 @@ def test_mistakes_give_one_sentence(
 def test_other_policies_are_exported_for_their_own_body(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A body beside a policy that fits only one is refused."""
+    """A body with a policy that fits only one is refused."""
     from shapechanger.finger.policies import POLICIES
 
     out = str(tmp_path / "finger.onnx")

@@ -89,7 +89,7 @@ def test_a_suite_finds_one_too(folder: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_names_of_ours_leave_the_path_alone(folder: Path) -> None:
-    """A module beside a policy's file cannot be imported by naming one of our learners."""
+    """A module next to a policy cannot be imported by naming one of our learners."""
     with pytest.raises(SystemExit):
         main(["train", "Ant", "--learner", "ppo-run", "--steps", "10"])
     assert str(folder) not in sys.path

@@ -1,4 +1,4 @@
-"""`shapechanger suite` with small lane envs in place of vehicles."""
+"""`shapechanger suite` with small lane envs instead of vehicles."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class _Counting(Serial):
 
 @pytest.fixture(scope="module", autouse=True)
 def lanes() -> Iterator[None]:
-    """Three lane envs in place of four vehicles, and fast clones."""
+    """Three lane envs instead of four vehicles, and fast clones."""
     with pytest.MonkeyPatch.context() as patch:
         suite = SuiteFile(envs=(DRY.id, WET.id, ICY.id), learner="cloning")
         patch.setattr(suite_command, "load_suite", lambda name: suite)

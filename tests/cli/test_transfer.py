@@ -120,7 +120,7 @@ def test_a_killed_study_resumes_to_the_same_numbers(
 
 @pytest.mark.slow
 def test_a_full_disk_gives_one_sentence(tmp_path: Path) -> None:
-    """With files limited to 20 kB, the error says what is kept."""
+    """With files limited to 20 kB, the error lists the kept files."""
     done = run(
         *QUICK,
         "--out",

@@ -53,7 +53,7 @@ _POLICY = "suite/a-to-b/runs/scratch-0/policy.safetensors"
 def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The task is found as `train` finds it; an edited robot or task is refused by name."""
+    """The task is found as `train` finds it; an edited robot or task is refused and named."""
     main(["policies", "evaluate", _POLICY, "--episodes", "1"])
     assert "return" in capsys.readouterr().out
     main(["policies", "show", _POLICY])

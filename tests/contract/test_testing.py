@@ -164,7 +164,7 @@ class Changed(Walk):
 
 
 class Richer(Changed):
-    """Env whose copies move alike and pay twice the reward."""
+    """Env whose copies move the same and pay twice the reward."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
         """Scale the reward by the power."""

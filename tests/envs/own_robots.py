@@ -54,7 +54,7 @@ class Rear:
 
 
 class Nonsense:
-    """Return what is no number."""
+    """Return the names of non-numbers."""
 
     def reward(self, robot: RobotState) -> dict[str, float]:
         """Return the reward of nonsense."""

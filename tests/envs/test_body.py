@@ -465,7 +465,7 @@ def test_every_env_accepts_fast_model(name: str) -> None:
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True, "3", [3]])
 def test_what_is_no_seed_is_refused(seed: Any) -> None:
-    """A seed is refused before anything changes; NumPy's integers are those of Python."""
+    """A seed is refused before anything changes; NumPy's integers equal Python's."""
     with contextlib.closing(gym.make("shapechanger/Ant-v1", disable_env_checker=True)) as env:
         with pytest.raises(EnvArgumentError, match="A seed is a whole number from 0, got "):
             env.reset(seed=seed)

@@ -51,7 +51,7 @@ def test_an_unknown_name_is_refused() -> None:
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_thresholds_and_limits_are_gymnasiums(env_id: str) -> None:
-    """Reward thresholds and time limits equal those of Gymnasium's v5."""
+    """Reward thresholds and time limits equal Gymnasium's v5."""
     entry, spec = CATALOGUE[env_id], gym.spec(env_id)
     theirs = gym.spec(f"{entry.family}-v5")
     assert spec.reward_threshold == entry.reward_threshold == theirs.reward_threshold

@@ -186,7 +186,7 @@ def test_the_rail_limits_give_a_force(poles: Any) -> None:
 
 @pytest.mark.parametrize("name", ["Hopper", "Walker2d"])
 def test_planar_velocities_are_clipped(name: str) -> None:
-    """Observed velocities are clipped to 10, those of the simulation are not."""
+    """Observed velocities are clipped to 10, the simulation's are not."""
     with gym.make(f"shapechanger/{name}-v1") as made:
         env: Any = made.unwrapped
         made.reset(seed=0)

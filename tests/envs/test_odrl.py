@@ -1,6 +1,6 @@
 """The bodies of ODRL have the published numbers.
 
-The numbers are those of ODRL's files; `shapechanger.envs.odrl` names where they were read. All
+The numbers come from ODRL's files; `shapechanger.envs.odrl` names their source. All
 places are in the world's frame at the start pose, as ODRL writes the hopper and the walker.
 """
 
@@ -325,7 +325,7 @@ def test_friction_is_scaled(robot: str, factor: float) -> None:
 
 
 def test_two_published_tasks_are_one() -> None:
-    """Issue 8 of ODRL: below the floor's friction of 1, that of the foot does nothing.
+    """Issue 8 of ODRL: below the floor's friction of 1, the foot's has no effect.
 
     No other two of the 84 are the same.
     """

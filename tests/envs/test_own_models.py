@@ -45,7 +45,7 @@ def test_a_file_is_a_family(tmp_path: Path) -> None:
 
 
 def test_families_are_those_of_a_file_and_a_rig(tmp_path: Path) -> None:
-    """Between bodies of one file and rig others lie; between those of two files none do."""
+    """Between bodies of one file and rig others lie; between those of two files have none."""
     leg, arm = _written(tmp_path, "leg.xml", LEG), _written(tmp_path, "arm.urdf", URDF)
     assert own_family(leg).key == own_family(str(leg)).key
     keys = {own_family(leg).key, own_family(arm).key, own_family(arm, (AddFloor(),)).key}

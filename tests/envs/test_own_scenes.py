@@ -1,4 +1,4 @@
-"""Robots of a user's own in scenes of their own: objects, floors, couplings and packages."""
+"""A user's robots in their scenes: objects, floors, couplings and packages."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ def test_a_task_names_what_it_observes() -> None:
 
 
 def test_a_robot_tells_its_numbers() -> None:
-    """Height, and any number by name."""
+    """Height, and the number of any name."""
     assert robot().height == 0.5
     assert robot()["knee/angle"] == 0.3
 

@@ -1,4 +1,4 @@
-"""Robot files of other projects: each does all that an own robot can do, or is refused by name.
+"""Robot files of other projects: each does all that an own robot can do, or is refused.
 
 `make test-robots` installs the packages of `tests/robot_files.txt` for it, of which only models are
 read.
@@ -47,7 +47,7 @@ _MYO: Final = "myo_sim/models/legacy"
 _SUITE: Final = "robosuite/models/assets"
 _URDF: Final = "cmeel.prefix/share/example-robot-data/robots"
 _BIG: Final = 1.5
-# A pose counts as closed below this gap, m or rad, or at that of the file.
+# A pose counts as closed below this gap, m or rad, or at the file's.
 _CLOSED: Final = 1e-3
 
 _INERTIA: Final = r"'.+' has its inertia written out, so it would not follow a new shape"

@@ -195,7 +195,7 @@ def test_a_given_lookat_is_fixed() -> None:
 
 
 def test_frames_follow_the_body(ant: Any) -> None:
-    """After a reset with a new body, frames equal those of an env made with it."""
+    """After a reset with a new body, frames equal an env's that was made with it."""
     before = ant.render()
     ant.reset(seed=0, options={"body": "BigAnt"})
     after = ant.render()

@@ -116,7 +116,7 @@ def test_pole_rewards_are_relative_to_the_length(factor: float) -> None:
         env: Any = made.unwrapped
         made.reset(seed=0)
         for part, fallen in ((1.01, False), (0.99, True)):
-            # Both poles lean alike; on the original model the tip is at about 1 m.
+            # Both poles lean equally; on the original model the tip is at about 1 m.
             lean = math.acos(part / 1.2)
             env.set_state(np.array([0.0, lean, 0.0]), np.zeros(3))
             y = env.data.site_xpos[0, 2]

@@ -20,7 +20,7 @@ def _model(**arguments: Any) -> Any:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_only_textures_differ_without_rendering() -> None:
-    """All other arrays equal those of an env with rendering."""
+    """All other arrays equal an env's with rendering."""
     plain, drawn = _model(), _model(render_mode="rgb_array")
     assert plain.ntexdata < 0.3 * drawn.ntexdata
     for name in dir(drawn):

@@ -55,7 +55,7 @@ def test_copies_draw_the_same_bodies() -> None:
 
 
 def test_vector_envs_draw_one_body_per_env() -> None:
-    """Bodies equal those of single envs with the same seeds."""
+    """Bodies equal single envs' with the same seeds."""
     envs = shapechanger.make_vec("shapechanger/Ant-v1", 3, towards="BigAnt", fast_model=False)
     envs.reset(seed=5)
     drawn = [env.unwrapped.standing_height for env in envs.envs]

@@ -41,7 +41,7 @@ def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mu
 
 
 def harsh_commands(rng: np.random.Generator) -> Iterator[tuple[str, np.ndarray]]:
-    """Return extreme commands by name, each (n, 7) for steps of 20 ms."""
+    """Return extreme commands keyed by name, each (n, 7) for steps of 20 ms."""
     yield "random", rng.uniform(-1.0, 1.0, (50, 7))
     yield "bang-bang", rng.choice([-1.0, 1.0], (50, 7))
     yield "bang-bang, slower", np.repeat(rng.choice([-1.0, 1.0], (5, 7)), 10, axis=0)

@@ -42,14 +42,14 @@ def test_the_file_moves_as_the_finger_of_the_env(name: str) -> None:
 
 
 def numbers(parameters: FingerParameters) -> dict[str, list[float]]:
-    """Return the numbers in the file, by name."""
+    """Return the numbers in the file, keyed by name."""
     model = mujoco.MjModel.from_xml_string(finger_mjcf(parameters, DRIVE))
     names = [model.numeric(i).name for i in range(model.nnumeric)]
     return {name: model.numeric(name).data.tolist() for name in names}
 
 
 def test_the_file_holds_the_parameters_with_units() -> None:
-    """Numbers are exact, each has a unit, and a comment says what is not simulated."""
+    """Numbers are exact, each has a unit, and a comment lists everything that is not simulated."""
     parameters = FINGERS["real-like"]
     found = numbers(parameters)
     assert found["moment_arms"] == parameters.arms.ravel().tolist()

@@ -157,7 +157,7 @@ def test_invalid_gaps_are_refused() -> None:
 
 
 def test_arms_that_cannot_balance_name_the_joint() -> None:
-    """No arm of one sign, and a torque that always comes with another, are refused by name."""
+    """No arm of one sign, and a torque that always comes with another, are refused and named."""
     one_way = NOMINAL.arms
     one_way[:, 2] = abs(one_way[:, 2])
     with pytest.raises(FingerError, match=r"balance PIP_flexion: no moment arm there is negative"):

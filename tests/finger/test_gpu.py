@@ -89,7 +89,7 @@ def many(kind: str) -> tuple[WarpVectorEnv, list[Any]]:
 
 
 def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]:
-    """Start episodes of worlds, and those of CPU envs with the same postures and targets.
+    """Start episodes of worlds, and of CPU envs with the same postures and targets.
 
     Returns:
         Observation and info of each CPU env.
@@ -163,7 +163,7 @@ def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[A
 def test_a_step_from_the_same_state_has_the_same_results(
     pair: tuple[WarpVectorEnv, list[Any]],
 ) -> None:
-    """Observation, reward, each term of it, and success are those of the CPU env."""
+    """Observation, reward, each term of it, and success equal the CPU env's."""
     worlds, alone = pair
     rng = np.random.default_rng(0)
     shape = (len(alone), 7)
@@ -417,7 +417,7 @@ def test_what_is_refused(arguments: dict[str, Any], sentence: str) -> None:
 
 
 def test_fingers_are_checked() -> None:
-    """Errors are those of the CPU env."""
+    """Errors equal the CPU env's."""
     worlds = shapechanger.make_vec(
         "Finger", 1, backend="warp", device="cpu", gap="wide", finger_seed=1
     )

@@ -56,7 +56,7 @@ def test_points_of_any_posture_are_reached() -> None:
 def test_the_error_of_unreachable_points_is_correct(
     place: tuple[float, float, float], least_mm: float
 ) -> None:
-    """The reported distance is that of the angles, and at least the true minimum."""
+    """The reported distance is the angles', and at least the true minimum."""
     angles, off = angles_for(np.array(place))
     assert _is_within(angles)
     assert off == pytest.approx(np.linalg.norm(fingertip(angles) - place), abs=1e-12)

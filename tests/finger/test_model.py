@@ -235,7 +235,7 @@ def test_a_finger_that_is_let_go_gains_no_energy() -> None:
             x = data.qpos - JOINT_REST
             quartic = 0.25 * model.jnt_stiffnesspoly[:, 1] @ x**4
             pulled = np.abs(data.actuator_force) @ (-MOMENT_ARMS @ data.qpos)
-            # MuJoCo's energy is that of the state before the step.
+            # MuJoCo's energy belongs to the state before the step.
             energies.append(float(data.energy.sum() + pulled + quartic))
         assert np.diff(energies).max() < 2e-5 * np.ptp(energies)
         assert energies[-1] < energies[0]

@@ -47,7 +47,7 @@ def test_a_geared_finger_is_within_its_gap() -> None:
 
 
 def test_the_shipped_rig_has_the_tensions_and_the_path_of_its_profile() -> None:
-    """What `finger identify --geared` assumes is what a log of that rig says."""
+    """`finger identify --geared` assumes the values in a log of that rig."""
     rig = shipped_rig()
     layout = load_profile(find_profile("finger")).action_layout()
     spans = [(layout[name].gain, layout[name].gain_unit) for name in TENDONS]
@@ -57,7 +57,7 @@ def test_the_shipped_rig_has_the_tensions_and_the_path_of_its_profile() -> None:
 
 
 def test_geared_fingers_have_the_path_of_the_shipped_rig() -> None:
-    """Rates and slew are those of its profile, so its tensions fall as fast as they rise."""
+    """Rates and slew are its profile's, so its tensions fall as fast as they rise."""
     profile = load_profile(find_profile("finger"))
     path = GAPS["real-like"].around.path
     assert path is not None

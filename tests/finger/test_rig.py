@@ -124,7 +124,7 @@ def test_encoders_give_the_fingertip_for_any_arms() -> None:
 
 
 def test_velocities_are_smoothed_differences_of_the_encoders() -> None:
-    """Velocities equal those of the simulation with joint noise, and start at zero."""
+    """Velocities equal the simulation's with joint noise, and start at zero."""
     senses, differences = _encoders(), JointVelocities()
     fastest = 0.0
     for i in range(5):

@@ -165,7 +165,7 @@ def test_the_identity_is_neutral(built: BodyMap) -> None:
 @law
 @given(links=chains(2), seed=st.integers(0, 2**32 - 1))
 def test_a_composed_map_adapts_as_its_links_do(links: list[BodyMap], seed: int) -> None:
-    """Matrices of a chain are products of those of its links."""
+    """Matrices of a chain are products of its links'."""
     a, b = links
     both = a.then(b)
     rng = np.random.default_rng(seed)

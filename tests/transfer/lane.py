@@ -55,7 +55,7 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-        """Start at a random position beside the middle."""
+        """Start at a random position near the middle."""
         super().reset(seed=seed)
         self.course = int(self.np_random.integers(HELD_OUT)) + HELD_OUT * self.held_out
         self.place = float(self.np_random.uniform(-0.8, 0.8))

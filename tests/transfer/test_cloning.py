@@ -156,7 +156,7 @@ def test_rehearsal_starts_from_the_source_and_learns_from_both(
 
 
 def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file is reused, and recorded anew if it has too few steps."""
+    """A file is reused, and recorded again if it has too few steps."""
     _cloned(tmp_path, 30)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["shown.npz"]
     _, found = _cloned(tmp_path, 120)

@@ -40,7 +40,7 @@ def test_each_finger_of_a_gap_is_judged_on_targets_of_its_own(pair: set[int], ma
 @pytest.mark.parametrize("seed", [0, 99_999, 100_000, 2**32 - 1])
 @pytest.mark.parametrize("kwargs", [{}, {"finger_seed": None}])
 def test_every_seed_of_a_finger_gives_seeds_that_exist(seed: int, kwargs: dict[str, Any]) -> None:
-    """Seeds of episodes stay below 2^32; without individuals they are those of any env."""
+    """Seeds of episodes stay below 2^32; without individuals they equal any env's."""
     env = EnvRef("shapechanger/Finger-v1", kwargs)
     assert evaluation_seed(env, 60) == EVALUATION_SEED
     assert 0 <= evaluation_seed(env.having({"finger_seed": seed}), 10**9) < 2**32

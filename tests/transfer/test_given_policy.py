@@ -138,7 +138,7 @@ def test_invalid_policy_files_are_refused(clone_file: Path, tmp_path: Path) -> N
 def test_source_steps_are_those_of_arms_that_train_their_own(
     ppo_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beside a given policy they count where another policy learns in the source."""
+    """With a given policy they count if another policy learns in the source."""
     counted: list[int] = []
 
     def summarised(*arguments: Any, source_steps: int, **more: Any) -> Summary:
@@ -154,6 +154,6 @@ def test_source_steps_are_those_of_arms_that_train_their_own(
     run_study(plan, tmp_path / "study", source_policy=ppo_file, executor=Serial())
     trained = load_policy(Run("randomised", 0).policy_file(tmp_path / "study"))
     assert trained.card.steps == 64
-    assert counted == [32, 64]  # In total steps an arm is behind scratch by its own.
+    assert counted == [32, 64]  # In total steps an arm is behind scratch by its source steps.
     with pytest.raises(StudyError, match="no arm trains a policy of its own"):
         tiny_plan(source_policy=ppo_file, source_steps=64)

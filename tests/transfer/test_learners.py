@@ -1,4 +1,4 @@
-"""Learners of Stable-Baselines3 besides PPO: SAC, TQC, classes by name, and functions."""
+"""Learners of Stable-Baselines3 besides PPO: SAC, TQC, named classes, and functions."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
 
 
 def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file may not name a module that nobody has imported, unless the caller names it too."""
+    """A file may not name a module that is not imported yet, unless the caller names it too."""
     (tmp_path / "own_a2c.py").write_text(
         "from stable_baselines3 import A2C\nclass Own(A2C): pass\n"
     )

@@ -23,7 +23,7 @@ from shapechanger.transfer.learners import Learner, LearnerSettings, PolicyOrigi
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 
 class Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True, tag="constant"):
-    """Settings of a learner that always pushes alike."""
+    """Settings of a learner that always pushes the same."""
     push: float = 0.0
     steps: int = 4
     source_steps: int = 2

@@ -48,7 +48,7 @@ def test_a_policy_round_trips(settings: PpoSettings, tmp_path: Path) -> None:
 
 
 def test_actions_are_those_of_the_model() -> None:
-    """PPO's mean actions equal those of `predict`."""
+    """PPO's mean actions equal `predict`'s."""
     policy, _ = trained(TINY)
     network: Any = policy.model.policy
     observations = np.random.default_rng(0).normal(size=(50, 4))

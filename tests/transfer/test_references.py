@@ -30,14 +30,14 @@ def test_the_policies_are_small() -> None:
 
 @pytest.mark.parametrize("env_id", REFERENCES)
 def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
-    """The card is that of the reference, and an episode is far above the floor."""
+    """The card is the reference's, and an episode is far above the floor."""
     env, reference = EnvRef(env_id), REFERENCES[env_id]
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env
     assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
     assert policy.card.learner == reference.learner
     assert policy.card.identity == known({ENV: identify(env).identity})
-    # Those of the pendulums were trained when learners acted in N.
+    # The pendulums' were trained when learners acted in N.
     in_newtons = "Pendulum" in env_id and "Double" not in env_id
     assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)
     made = env.make()

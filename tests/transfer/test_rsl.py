@@ -1,4 +1,4 @@
-"""PPO of rsl-rl on worlds of a device, with policies as those of Stable-Baselines3."""
+"""PPO of rsl-rl on worlds of a device, with the policies of Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_a_short_training_balances_longer(tmp_path: Path) -> None:
 
 
 def test_a_study_records_what_steps_its_worlds() -> None:
-    """Versions of the packages on the device count, as those of the CPU do."""
+    """Versions of the packages on the device count, like the CPU's."""
     task = TransferTask(PENDULUM, PENDULUM)
     plan = make_plan(task, "rsl-ppo", SETTINGS, seeds=2, steps=2048, source_steps=2048)
     assert {"mujoco-warp", "warp-lang", "rsl-rl-lib"} < plan.versions.keys()

@@ -123,14 +123,14 @@ def test_runs_of_a_source_are_shared(out: Path) -> None:
 def test_runs_of_a_target_are_shared(out: Path) -> None:
     """Studies of one target share its runs, with the numbers of a study alone."""
     plan, executor = _plan(ICY, WET), _Recording()
-    beside = _run(plan, out, executor=executor)
+    parallel = _run(plan, out, executor=executor)
     assert set(executor.names) == _names("source", "zero-shot", "fine-tune")
     for name in _names("random", "zero-action", "scratch"):
         there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
         assert files_of(here) == files_of(there)
     alone = run_study(plan, out.parent / "alone", executor=Serial())
-    assert _curves(beside) == _curves(alone)
-    assert beside.summaries == alone.summaries
+    assert _curves(parallel) == _curves(alone)
+    assert parallel.summaries == alone.summaries
 
 
 def test_nothing_is_shared_by_studies_of_other_bodies(out: Path) -> None:
@@ -146,8 +146,8 @@ def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
     assert _requested(_plan(DRY, WET, seeds=3), out) == {
         f"{kind}-2" for kind in _KINDS if kind != "zero-action"
     }
-    beside = _requested(_plan(DRY, ICY, seeds=3), out)
-    assert not beside & _names("source")
+    other = _requested(_plan(DRY, ICY, seeds=3), out)
+    assert not other & _names("source")
     with pytest.raises(ForeignStudy, match="differs in seeds"):
         _requested(_plan(DRY, WET), out)
 

@@ -401,7 +401,7 @@ def test_sac_cannot_scale_or_shift_its_actions(low: float, high: float) -> None:
 
 
 def test_sac_follows_the_range() -> None:
-    """A scale equal to that of the ranges keeps SAC's weights."""
+    """A scale equal to the ranges' keeps SAC's weights."""
     narrow = Layout((Feature("slide/motor", "1", -0.5, 0.5, gain=200.0, gain_unit="N"),))
     sensing = pendulum_observation(), pendulum_observation()
     body_map = BodyMap.between(*sensing, pendulum_action(), narrow, units="torque")
@@ -694,7 +694,7 @@ def _discrete(body_map: BodyMap) -> Any:
     [
         (_gsde, "explores with gSDE"),
         (_sac_gsde, "explores with gSDE"),
-        (_custom_mlp, "has a Sequential in place of a MlpExtractor"),
+        (_custom_mlp, "has a Sequential instead of a MlpExtractor"),
         (_own_extractor, "extracts features with Own"),
         (_discrete, "has a CategoricalDistribution in place"),
         (lambda body_map: nn.Linear(1, 1), "This model is Linear"),

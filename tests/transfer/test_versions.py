@@ -152,7 +152,7 @@ def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
     with pytest.raises(ForeignStudy, match=r"b\.xml.*: its model has changed from \w+ to \w+"):
         perform_run(plan, run, "study", None, lambda steps: None)
     assert files_of(copied / "study") == before
-    require_planned(plan, Run("source", 0))  # That of the source is as it was.
+    require_planned(plan, Run("source", 0))  # The source's has not changed.
     with pytest.raises(ForeignStudy, match="What this study was planned with has changed"):
         study_of(plan, Path("new"))
 
@@ -189,7 +189,7 @@ def test_a_suite_has_one_version_of_each_robot(copied: Path) -> None:
 
 
 def test_a_given_policy_of_an_edited_robot_is_refused(copied: Path) -> None:
-    """A zero-shot transfer would be that of another robot."""
+    """A zero-shot transfer would run another robot."""
     policy = Run("source", 0).policy_file(Path("study"))
     arms = ("scratch", "zero-shot")
     plan_of("shared", source_policy=policy, source_steps=None, arms=arms)

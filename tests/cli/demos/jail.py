@@ -1,4 +1,4 @@
-"""Run commands with little memory, processor time and disk, each in a process of its own.
+"""Run commands with little memory, processor time and disk, each in a separate process.
 
 Reads lists of arguments as lines of JSON, and answers each with its exit code and output. The
 modules are imported once, before the limits are set.
@@ -58,7 +58,7 @@ def limited(arguments: list[str]) -> int:
 
 
 def run(arguments: list[str]) -> tuple[int, str]:
-    """Run a command in a process of its own, and return its exit code and output."""
+    """Run a command in a separate process, and return its exit code and output."""
     ours, theirs = os.pipe()
     pid = os.fork()
     if pid == 0:

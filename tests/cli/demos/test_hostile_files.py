@@ -64,7 +64,7 @@ def sparse(path: Path, size: int) -> None:
 
 
 def pipe(path: Path) -> None:
-    """Replace a file by a pipe that nobody writes to."""
+    """Replace a file by a pipe without a writer."""
     path.unlink()
     os.mkfifo(path)
 

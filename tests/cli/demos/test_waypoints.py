@@ -89,7 +89,7 @@ def _loaded(data: Path, view: CanonicalView | None = None) -> Dataset:
 def test_a_drive_becomes_a_policy_of_waypoints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The command says what it did, and the policy's card says what its actions mean."""
+    """The command reports its result, and the policy's card the meaning of its actions."""
     out = tmp_path / "policy.safetensors"
     TrainClone(_record(tmp_path / "drive"), out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
     card = CameraPolicy.load(out).card
@@ -139,7 +139,7 @@ def test_waypoints_are_those_of_the_circle_that_was_driven(tmp_path: Path) -> No
 
 
 def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path) -> None:
-    """The note names all of them; a given camera replaces those of the recording."""
+    """The note names all of them; a given camera replaces the recording's."""
     _record(tmp_path)
     _record(tmp_path, camera_pitch_deg=8.0, camera_fovy_deg=60.0)
     view = CanonicalView()
@@ -188,7 +188,7 @@ def test_a_motion_that_does_not_tell_the_response_is_refused(tmp_path: Path) -> 
 def test_unsuitable_recordings_are_refused(
     tmp_path: Path, changes: dict[str, Any], why: str
 ) -> None:
-    """One sentence says what is missing, and nothing is written."""
+    """One sentence names everything missing, and nothing is written."""
     data, out = _record(tmp_path / "drive", **changes), tmp_path / "policy.safetensors"
     with pytest.raises(DemosError, match=why):
         TrainClone(data, out, waypoints=True).run()

@@ -36,7 +36,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
 
 
 def test_a_finger_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The log equals that of the Python API with the same seeds."""
+    """The log equals the Python API's with the same seeds."""
     out = tmp_path / "new" / "log.npz"
     words = ("--seconds", 2.4, "--seed", 4, "--gap", "real-like", "--finger-seed", 3)
     printed = output_of(capsys, "record", "Finger", "--out", out, *words, "--actions", "tension")

@@ -61,7 +61,7 @@ def test_lenses_apply_to_the_default_world() -> None:
 
 
 def test_the_room_takes_any_robot() -> None:
-    """`--world room` applies to vehicles with a world of their own too."""
+    """`--world room` applies to vehicles with their own world too."""
     assert place_of(_shipped("lab-car"), "room", ()) == Place()
 
 

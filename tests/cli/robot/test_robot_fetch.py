@@ -63,7 +63,7 @@ def record(folder: Path, count: int = 40) -> Path:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return all files below a folder, by name."""
+    """Return all files below a folder, keyed by name."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in folder.rglob("*")
@@ -224,7 +224,7 @@ def test_damaged_episodes_are_not_fetched(
 def test_mistakes_give_one_sentence(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Unknown episodes, no recordings, and a file in place of the folder."""
+    """Unknown episodes, no recordings, and a file instead of the folder."""
     out = ["--out", str(tmp_path / "here")]
     main(["robot", "fetch", "car", *out])
     assert "has recorded nothing yet" in capsys.readouterr().out

@@ -72,7 +72,7 @@ def test_answers_are_checked_one_by_one(
 def test_the_start_of_an_answer_is_enough(
     asked: tuple[list[str], list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In any case, where it is clear; each kind is explained, and the next steps follow."""
+    """In any letter case, if it is clear; each kind is explained, and the next steps follow."""
     _, answers = asked
     answers += ["Ca", "Lab-T", "lab-tan", "rover", "N", "Any"]
     Init().run()

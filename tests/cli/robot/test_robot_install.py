@@ -43,7 +43,7 @@ def test_it_says_what_it_did(pi: FakePi, car: Profile, capsys: pytest.CaptureFix
     said = _said(pi, car, capsys, command)
     unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
     assert "did      group gpio: pi is in the group gpio." in said
-    assert f"did      service: {unit} is the unit beside the profile." in said
+    assert f"did      service: {unit} is the unit next to the profile." in said
     assert any(line.startswith("Restart the computer") for line in said)
     # Which logs in again, too.
     assert not any(line.startswith("Log out and in") for line in said)
@@ -105,7 +105,7 @@ def test_a_path_with_blanks_is_one_word(
 def test_the_profile_of_this_folder_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A shipped name is meant for the file of that name, where there is one."""
+    """A shipped name is meant for the file of that name, if it exists."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RobotError, match="`shapechanger robot init car` writes one"):
         Install("car").run()

@@ -10,7 +10,7 @@ import segno
 from shapechanger.cli import main
 from shapechanger.robot.daemon.credentials import credentials_folder, make_credentials
 
-# The upper and the lower half of a character, light where there is ink.
+# The upper and the lower half of a character, light for ink.
 _HALVES = {"█": (0, 0), "▀": (0, 1), "▄": (1, 0), " ": (1, 1)}
 
 

@@ -156,15 +156,15 @@ def test_help(run: Run, command: str) -> None:
         ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
         ("serve finger --twin --port 0 --gap wide --world room", "give only one of them"),
         ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
-        ("install car", "`shapechanger robot init car` writes one of your own"),
-        ("home finger", "`shapechanger robot init finger` writes one of your own"),
+        ("install car", "`shapechanger robot init car` writes your own"),
+        ("home finger", "`shapechanger robot init finger` writes your own"),
         ("home test-car.toml --straight", "no tendons on a servo bus"),
         ("serve test-car.toml --seed 4", "--seed needs --twin"),
         ("serve test-car.toml --twin --seed -1", "A seed is a whole number from 0 to"),
         (f"serve test-car.toml --twin --seed {2**63}", "A seed is a whole number from 0 to"),
         (f"serve finger --twin --gap wide --finger-seed {2**32}", "A seed is a whole number"),
         ("calibrate test-car.toml", "lift its wheels"),
-        ("calibrate car", "`shapechanger robot init car` writes one of your own"),
+        ("calibrate car", "`shapechanger robot init car` writes your own"),
         ("calibrate test-car.toml --cap 2", "The cap is above 0"),
         ("calibrate test-car.toml --twin", "needs a terminal"),
         ("drive nobody", "No known robot matches 'nobody'"),
@@ -272,7 +272,7 @@ def test_init_never_overwrites(run: Run, home: Path) -> None:
 
 
 def test_the_key_can_be_shown_again(run: Run, home: Path) -> None:
-    """The output matches that of `init`, with the full fingerprint."""
+    """The output matches `init`'s, with the full fingerprint."""
     _, made, _ = run("init", "car", "--name", "rover")
     code, output, _ = run("key", "rover")
     assert code == 0

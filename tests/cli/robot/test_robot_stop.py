@@ -41,7 +41,7 @@ def test_a_second_person_stops_a_robot(
 def test_a_robot_that_is_served_on_its_twin_is_known_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The twin can then be driven by its name."""
+    """The twin can then be driven: its name is known."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     profile = write_profile(tmp_path, BLIND_CAR)
     with socket.create_server(("127.0.0.1", 0)) as free:

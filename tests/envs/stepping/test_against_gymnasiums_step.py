@@ -41,7 +41,7 @@ def _steps_fast(env: Any) -> bool:
 
 @pytest.mark.parametrize("name", _ANTS)
 def test_named_ants(name: str) -> None:
-    """All named ants step alike through falls and resets."""
+    """All named ants take Gymnasium's steps through falls and resets."""
     ours, theirs = _ants(name)
     ends, touches = step_together(ours, theirs, 250, seed=1)
     assert _steps_fast(ours)
@@ -51,7 +51,7 @@ def test_named_ants(name: str) -> None:
 
 @pytest.mark.parametrize("name", _POLES)
 def test_named_pendulums(name: str) -> None:
-    """All named pendulums step alike through falls and resets."""
+    """All named pendulums take Gymnasium's steps through falls and resets."""
     ours, theirs = InvertedPendulumEnv(name), _GymnasiumsPendulum(name)
     ends, _ = step_together(ours, theirs, 400, seed=1)
     assert _steps_fast(ours)
@@ -100,7 +100,7 @@ def test_a_few_random_ants(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_many_random_ants(seed: int) -> None:
-    """Random ants step alike for 1,000 steps with falls, resets and contacts."""
+    """Random ants take Gymnasium's 1,000 steps with falls, resets and contacts."""
     ours, theirs = _ants(random_ant(seed), healthy_z_range=(0.1, 3.0) if seed % 2 else None)
     ends, touches = step_together(ours, theirs, 1000, seed=seed)
     assert _steps_fast(ours)
@@ -119,7 +119,7 @@ def test_a_few_random_pendulums(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_many_random_pendulums(seed: int) -> None:
-    """Random pendulums step alike for 1,000 steps, at the ends of the rail too."""
+    """Random pendulums take Gymnasium's 1,000 steps, at the ends of the rail too."""
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 1000, seed=seed, reach=1.0 if seed % 2 else 0.1)

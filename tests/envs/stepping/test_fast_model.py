@@ -187,7 +187,7 @@ def _sensing(spec: Any) -> None:
     [(_stiff, _SPRING), (_stiffening, _SPRING), (_rough, _FRICTION), (_sensing, _SENSOR)],
 )
 def test_only_unused_features_are_disabled(add: Any, flag: int) -> None:
-    """Springs, friction and sensors are disabled only where there are none."""
+    """Springs, friction and sensors are disabled only in models without them."""
     _, plain = _fast_model_of(_scene())
     spec = _scene()
     add(spec)
@@ -302,7 +302,7 @@ def test_the_cache_of_fast_models_is_bounded(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
-    """Assert that both models move alike, bitwise, under random controls."""
+    """Assert that both models move equally, bitwise, under random controls."""
     rng = np.random.default_rng(1)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
     contacts = 0

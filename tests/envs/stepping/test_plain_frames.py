@@ -26,7 +26,7 @@ _SHADOW = mujoco.mjtRndFlag.mjRND_SHADOW
     ],
 )
 def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:
-    """Frames of up to 256 pixels have no shadows by default; copies of the env render alike."""
+    """Frames of up to 256 pixels have no shadows by default; copies of the env render the same."""
     more = {"render_mode": "rgb_array", "width": size, "height": size, **arguments}
     with gym.make("shapechanger/Ant-v1", **more) as env:
         quality = env.unwrapped.model.vis.quality

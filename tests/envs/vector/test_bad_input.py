@@ -59,7 +59,7 @@ def test_each_env_has_one_body() -> None:
         ),
         (
             [[Remove("aux_1")], [Remove("aux_2")]],
-            "observation space of env 1 .* has '.*_1.*' where that of env 0 .* has '.*_2.*'",
+            "observation space of env 1 .* has '.*_1.*', not '.*_2.*' like env 0",
         ),
     ],
     ids=["size", "same", "meaning"],

@@ -1,4 +1,4 @@
-"""Results equal those of Gymnasium's `SyncVectorEnv`, bitwise."""
+"""Results equal Gymnasium's `SyncVectorEnv`'s, bitwise."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_seeds_are_distributed_as_in_gymnasium(seed: Any) -> None:
 
 
 def test_options_reach_every_env() -> None:
-    """A new body for all envs, or for those of a mask, gives Gymnasium's results."""
+    """A new body for all envs, or for the envs of a mask, gives Gymnasium's results."""
     ours, theirs = _pair("shapechanger/Ant-v1", ["Ant"] * 3, 2, "Disabled")
     mask = np.array([True, False, True])
     for options in ({"body": "BigAnt"}, {"body": "AmputatedAnt", "reset_mask": mask}):

@@ -55,7 +55,7 @@ def test_threads_are_an_argument_of_gymnasiums_make_vec() -> None:
 
 
 def test_a_backend_of_worlds_on_a_device() -> None:
-    """Its arguments and those of threads exclude each other; the spec makes the same again."""
+    """Its arguments and the threads' exclude each other; the spec makes an equal env."""
     bodies = ["InvertedPendulum", "BigInvertedPendulum"]
     envs = shapechanger.make_vec(
         "InvertedPendulum", 2, backend="warp", device="cpu", bodies=bodies, max_episode_steps=7
@@ -74,7 +74,7 @@ def test_a_backend_of_worlds_on_a_device() -> None:
 
 
 def test_a_vector_env_of_one_env() -> None:
-    """Results equal those of the single env, with a batch axis."""
+    """Results equal the single env's, with a batch axis."""
     envs, alone = shapechanger.make_vec("Ant"), gym.make("shapechanger/Ant-v1")
     assert envs.num_envs == envs.threads == 1
     observations, _ = envs.reset(seed=3)
@@ -98,7 +98,7 @@ def test_gymnasiums_vector_envs_are_available() -> None:
 
 
 def test_spaces_equal_gymnasiums() -> None:
-    """Single and batched spaces equal those of SyncVectorEnv."""
+    """Single and batched spaces equal SyncVectorEnv's."""
     ours = shapechanger.make_vec("Ant", 3)
     theirs = gym.make_vec("shapechanger/Ant-v1", num_envs=3, vectorization_mode="sync")
     for name in ("observation_space", "action_space"):
@@ -164,7 +164,7 @@ def test_external_ids_are_accepted() -> None:
 
 @pytest.mark.parametrize("copy", [True, False])
 def test_observations_are_copies_if_asked_for(copy: bool) -> None:
-    """`copy=False` reuses the memory of observations, as in Gymnasium."""
+    """`copy=False` reuses the memory of observations, like Gymnasium."""
     envs = shapechanger.make_vec("InvertedPendulum", 2, copy=copy)
     first, _ = envs.reset(seed=0)
     before = first.copy()

@@ -1,4 +1,4 @@
-"""Batched conclusion of ant steps equals that of single envs."""
+"""Batched conclusion of ant steps equals single envs'."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def test_overridden_steps_are_called() -> None:
 def test_one_diverging_ant(
     concluded: list[int], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is terminated, and its info equals that of its own step."""
+    """It is terminated, and its info equals its own step's."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log file.
     ours, alone = shapechanger.make_vec("Ant", 3, threads=1), gym.make(_ANT)
     ours.reset(seed=[5, 6, 7])

@@ -15,7 +15,7 @@ import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.morphology import Mass, Stretch
 
-# One edited body beside the plain one of each family; ants and pendulums have names.
+# One edited body besides the plain one of each family; ants and pendulums have names.
 BODIES: dict[str, list[Any]] = {
     "Ant": ["Ant", "BigAnt", "AmputatedAnt", [Stretch("shank_1", 1.5), Mass("torso", 1.3)]],
     "ExtendedAnt": ["ExtendedAnt", "ExtendedAnt"],
@@ -34,7 +34,7 @@ BODIES: dict[str, list[Any]] = {
 WORLDS = 8
 # Where the exam runs, such as cuda:0.
 DEVICE = os.environ.get("SHAPECHANGER_TEST_DEVICE", "cpu")
-# Infos that a device has after each step besides those of the CPU env.
+# Infos that a device has after each step besides the CPU env's.
 ALWAYS = {"final_obs", "final_info", "diverged"}
 
 # The device computes in single precision. Over the five or fewer physics steps of an action, the

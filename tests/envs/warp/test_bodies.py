@@ -141,7 +141,7 @@ def test_what_may_share_a_batch_is_what_mujoco_warp_shares(edit: Edit) -> None:
 
 
 def test_what_a_zero_leaves_out_is_not_shared() -> None:
-    """A fluid, or a friction in joints, needs a batch of its own where others have none."""
+    """A fluid, or a friction in joints, needs a separate batch if others have none."""
     plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
     bodies = []
     for change in ("opt.density", "dof_frictionloss"):
@@ -203,7 +203,7 @@ def test_bodies_of_other_shapes_and_equal_spaces_share_tensors() -> None:
 
 
 def test_a_pool_gives_each_episode_one_of_its_bodies() -> None:
-    """A world's body follows from its seed and episode, and is that of its simulation."""
+    """A world's body follows from its seed and episode, and is its simulation's."""
     pool: list[Any] = ["Ant", LONG, "BigAnt"]
     made = [
         shapechanger.make_vec(

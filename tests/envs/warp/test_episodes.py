@@ -41,7 +41,7 @@ def until_a_fall(envs: WarpVectorEnv) -> Any:
 
 
 def test_same_step_returns_the_start_and_keeps_the_end() -> None:
-    """The last observation and info of an episode are in the infos, as in Gymnasium."""
+    """The last observation and info of an episode are in the infos, like in Gymnasium."""
     envs = pendulums()
     observations, rewards, terminated, _, infos = until_a_fall(envs)
     assert terminated.tolist() == infos["_final_obs"].tolist() == [True, False, False]
@@ -113,7 +113,7 @@ def test_worlds_without_seeds_differ() -> None:
 
 
 def test_the_noise_is_uniform_and_normal() -> None:
-    """Means and variances are those of the distributions, and streams are independent."""
+    """Means and variances are the distributions', and streams are independent."""
     seeds, episodes = torch.arange(200), torch.zeros(200, dtype=torch.int64)
     flat = uniforms(seeds, episodes, 0, 500)
     assert flat.min() >= 0.0
@@ -180,7 +180,7 @@ def test_huge_numbers_diverge_too() -> None:
 
 
 def test_a_closed_or_new_vector_env_does_not_step() -> None:
-    """The error says what to call."""
+    """The error names the way out."""
     envs = shapechanger.make_vec("InvertedPendulum", 2, backend="warp", device="cpu")
     with pytest.raises(gym.error.ResetNeeded, match=re.escape("call `reset` first")):
         envs.step(torch.zeros(2, 1))

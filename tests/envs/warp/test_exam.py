@@ -42,7 +42,7 @@ def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[A
 def test_a_step_from_the_same_state_has_the_same_results(
     pair: tuple[WarpVectorEnv, list[Any]],
 ) -> None:
-    """Observation, reward, each term of it, and the end are those of the CPU env, for each body."""
+    """Observation, reward, each term of it, and the end equal the CPU env's, for each body."""
     worlds, alone = pair
     assert len(worlds.batches) == 1
     rng = np.random.default_rng(0)

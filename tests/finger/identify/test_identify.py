@@ -79,7 +79,7 @@ def test_a_finger_is_identified() -> None:
 
 
 def test_intervals_contain_the_truth() -> None:
-    """Intervals contain the true values; those of arms exclude the nominal ones."""
+    """Intervals contain the true values; the arms' exclude the nominal ones."""
     _, truth, found, _ = quick()
     by_name = {e.name: e for e in found.estimates}
     for j, joint in enumerate(JOINTS):
@@ -122,7 +122,7 @@ def estimates(
     motors: Motors = MOTORS,
     rig: FingerParameters | None = None,
 ) -> dict[str, ParameterEstimate]:
-    """Return the estimates of a synthetic fit over a log of 300 rows, by name."""
+    """Return the estimates of a synthetic fit over a log of 300 rows, keyed by name."""
     log = dataclasses.replace(made_up(), motors=rig)
     found = result._estimates(kinematics(compliance, compliance_sd), motors, DYNAMICS, log)
     return {e.name: e for e in found}

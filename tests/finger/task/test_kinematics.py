@@ -34,7 +34,7 @@ def test_fingertip_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_fingertip_matches_the_simulator() -> None:
-    """The position equals that of the site in MuJoCo, one by one and batched."""
+    """The position equals the site's in MuJoCo, one by one and batched."""
     model = made()
     data = mujoco.MjData(model)
     angles = np.random.default_rng(0).uniform(*JOINT_RANGE.T, (200, 4))

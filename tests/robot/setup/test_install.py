@@ -181,7 +181,7 @@ def test_without_groups_and_config(tmp_path: Path) -> None:
 
 
 def test_an_older_unit_is_replaced(pi: FakePi) -> None:
-    """The unit beside the profile, which a person may edit, is the one that counts."""
+    """The unit next to the profile, which a person may edit, is the one that counts."""
     pi.write(_UNIT, "old")
     assert _install(pi, _plan("car"))["service"][0] == "did"
     assert "safe-pins" in (pi.root / _UNIT).read_text()

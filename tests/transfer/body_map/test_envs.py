@@ -64,7 +64,7 @@ def test_an_env_without_layouts_is_refused() -> None:
 
 
 def test_a_mapped_env_adapts_observations_and_actions() -> None:
-    """Observations are those of the source, and actions move the target's motors."""
+    """Observations are the source's, and actions move the target's motors."""
     source, target = Recorder(), Recorder(feet=True)
     built = body_map(source, target, rules={"foot_*/motor": "copy ankle_*/motor"})
     env = MappedEnv(target, built)

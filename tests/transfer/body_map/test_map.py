@@ -38,7 +38,7 @@ def small() -> BodyMap:
 
 
 def test_values_are_reordered_by_name() -> None:
-    """Observations are in the order of the source, actions in that of the target."""
+    """Observations are in the order of the source, actions in the target's."""
     np.testing.assert_array_equal(small().adapt_observation([7.0, 3.0]), [3.0, 0.0, 0.25])
     np.testing.assert_array_equal(small().adapt_action([0.4, 0.3]), [0.3, -0.6, 0.0, 0.2])
 

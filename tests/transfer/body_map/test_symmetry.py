@@ -90,7 +90,7 @@ def test_a_rotated_policy_is_equivariant() -> None:
 
 
 def test_the_symmetry_of_either_body_is_accepted() -> None:
-    """The symmetry of the source and that of the target give the same map."""
+    """The symmetries of the source and of the target give the same map."""
     there = BodyMap.between(
         ant_observation(),
         ant_observation(feet=True),
@@ -107,7 +107,7 @@ def test_the_symmetry_of_either_body_is_accepted() -> None:
 
 
 def test_the_symmetry_of_a_third_body_is_refused() -> None:
-    """The message says where it differs from the source."""
+    """The message names the difference from the source."""
     built = BodyMap.identity(pendulum_observation(), pendulum_action())
     with pytest.raises(
         MapError, match=r"belongs neither to the source nor to the target: .* torso/z"

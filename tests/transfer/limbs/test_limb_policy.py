@@ -163,7 +163,7 @@ def test_a_training_keeps_the_scale_of_its_rewards(policy: TrainedPolicy) -> Non
         FEW, 32, 1, start=policy, body_map=_NO_MAP, on_evaluation=lambda _: None
     )
     assert tuned.normalisation is not None
-    # Its own 32 steps are added to those of the source.
+    # Its own 32 steps are added to the source's.
     assert tuned.normalisation.reward.count == pytest.approx(scale.count + 32)
 
 
@@ -177,9 +177,9 @@ def test_training_and_acting_see_the_same_rows(policy: TrainedPolicy) -> None:
 def test_other_families_are_refused(policy: TrainedPolicy) -> None:
     """A policy of ants neither acts in a cheetah nor starts one's training."""
     cheetah = EnvRef("shapechanger/HalfCheetah-v1")
-    with pytest.raises(TransplantError, match=r"of another family than that of .*HalfCheetah-v1"):
+    with pytest.raises(TransplantError, match=r"of another family than .*HalfCheetah-v1"):
         _learner().evaluate(cheetah, policy, _NO_MAP)
-    with pytest.raises(TransplantError, match=r"of another family than that of .*HalfCheetah-v1"):
+    with pytest.raises(TransplantError, match=r"of another family than .*HalfCheetah-v1"):
         _learner().train(
             cheetah, 32, 0, start=policy, body_map=_NO_MAP, on_evaluation=lambda _: None
         )
@@ -268,4 +268,4 @@ def test_onnx_of_a_body_equals_pytorch(network: Any, tmp_path: Path) -> None:
         seen = observation + np.random.default_rng(0).normal(0.0, 0.5, (20, observation.size))
         expected = acting.rows.actions(trained.act(acting.rows.of(seen)))
         np.testing.assert_allclose(exported.act(seen), expected, atol=1e-5)
-        assert np.ptp(expected, axis=0).max() > 1e-3  # It does not act alike everywhere.
+        assert np.ptp(expected, axis=0).max() > 1e-3  # It does not act the same everywhere.

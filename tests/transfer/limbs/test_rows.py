@@ -75,7 +75,7 @@ def test_actions_reach_their_motors() -> None:
 
 
 def test_envs_of_many_bodies_equal_single_ones() -> None:
-    """Rows, rewards, ends and infos of each env are those of the env by itself."""
+    """Rows, rewards, ends and infos of each env equal the single env's."""
     envs = LimbVecEnv(ANT.having(SOME), 12)
     single = limb_envs(ANT.having(SOME), 12)
     envs.seed(5)
@@ -150,7 +150,7 @@ def test_what_does_not_fit_is_refused() -> None:
         _limb_env().reset(options={"body": "BigAnt"})
     with pytest.raises(StudyError, match="These bodies sense different things"):
         rows_of_each([ANT, EnvRef("shapechanger/HalfCheetah-v1")])
-    with pytest.raises(TransplantError, match="another family than that of shapechanger/HalfChe"):
+    with pytest.raises(TransplantError, match="another family than shapechanger/HalfChe"):
         fitted(gym.make("shapechanger/HalfCheetah-v1"), _limb_env().observation_layout)
     require_same_columns(
         _limb_env().observation_layout,

@@ -1,4 +1,4 @@
-"""Loading methods by name: shipped, installed and registered ones."""
+"""Loading named methods: shipped, installed and registered ones."""
 
 from __future__ import annotations
 

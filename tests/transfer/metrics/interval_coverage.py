@@ -118,7 +118,7 @@ def bca(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array,
 
 
 def studentised(arms: Array, scratches: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """The package's interval; NaN where there is none."""
+    """The package's interval; NaN without one."""
     estimates = [
         estimate_ratio(a, b, least=1e-9, too_small="-", rng=rng, n_resamples=N_RESAMPLES)
         for a, b in zip(arms, scratches, strict=True)

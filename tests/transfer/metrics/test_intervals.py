@@ -105,7 +105,7 @@ def test_studentised_bootstrap_by_the_book(confidence: float, scratch: NDArray[n
 
 
 def test_many_seeds_make_the_ratio_normal() -> None:
-    """With 200 seeds the interval is that of a normal distribution, ± 1.96 errors."""
+    """With 200 seeds the interval is a normal distribution's, ± 1.96 errors."""
     rng = np.random.default_rng(1)
     arm, scratch = rng.normal(2.0, 0.2, 200), rng.normal(1.0, 0.1, 200)
     estimate = ratio(arm, scratch, n_resamples=10_000)

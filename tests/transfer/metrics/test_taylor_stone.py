@@ -62,7 +62,7 @@ def test_asymptotic_gain(last_k: int, gain: float) -> None:
 @pytest.mark.parametrize(
     ("source_steps", "gain"),
     [
-        # The arm at 20 and 40 is what it was at 15 and 35: 0.7 and 0.95.
+        # The arm at 20 and 40 equals its values at 15 and 35: 0.7 and 0.95.
         (5, (0.7 + 0.95) / 2 - 0.6),
         # The floor at 20, and at 40 what it was at 10.
         (30, (0.0 + 0.6) / 2 - 0.6),
@@ -73,7 +73,7 @@ def test_asymptotic_gain(last_k: int, gain: float) -> None:
     ],
 )
 def test_asymptotic_gain_in_total_steps(source_steps: int, gain: float) -> None:
-    """The end is that of the budget, which includes source steps."""
+    """The end is the budget's, which includes source steps."""
     total = in_total_steps(ARM, source_steps, floor=0.0)
     assert asymptotic_gain(total, SCRATCH, last_k=2).value == pytest.approx(gain)
 

@@ -68,7 +68,7 @@ def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
 
 
 def test_the_other_arms_have_a_sentence() -> None:
-    """Arms that do not learn on the target are judged by where they start."""
+    """Arms that do not learn on the target are judged by their start."""
     assert other_arms(make_study(arms=("scratch", "fine-tune"))) == ""
     assert other_arms(make_study()) == "Of the other arms, zero-shot (400) helped."
     same = other_arms(make_study(zero_shot=SCRATCH[:, :1]))
