@@ -47,7 +47,7 @@ def shell_commands(page: Path) -> list[str]:
     text = page.read_text()
     blocks = [body for _, language, body in _FENCE.findall(text) if language not in _PYTHON]
     outside = _FENCE.sub("", text).splitlines()
-    # Blocks that are indented in place of fenced, and the comments of scripts.
+    # Blocks that are indented instead of fenced, and the comments of scripts.
     lines = [line for line in outside if line.startswith(("    ", "#")) and "`" not in line]
     return [command for part in (*blocks, *lines) for command in _commands_in(part)]
 

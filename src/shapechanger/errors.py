@@ -250,7 +250,7 @@ def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") ->
 
     Args:
         path: The file, which does not exist.
-        words: What could be given in place of a file, such as "reference".
+        words: Alternatives to a file, such as "reference".
         what: What it could have been: "file", or "file or folder".
     """
     siblings = (str(each) for each in path.parent.glob(f"*{glob.escape(path.suffix)}"))

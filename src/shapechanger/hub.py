@@ -74,12 +74,12 @@ def sha256_of(path: Path) -> str:
 
 
 def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False) -> str:
-    """Upload a folder in place of an earlier push.
+    """Upload a folder, replacing an earlier push.
 
     Args:
         folder: The files, by their names in the repository; card and list are added to it.
         card: What they are, in Markdown.
-        repo: Name of the repository, such as "ada/ant"; it is made if there is none.
+        repo: Name of the repository, such as "ada/ant"; it is made if it does not exist.
         kind: Kind of the files.
         public: Whether a new repository can be read by everybody.
 
@@ -215,7 +215,7 @@ def _library() -> Any:
         hub = import_module("huggingface_hub")
     except ImportError as error:
         raise MissingExtra("huggingface_hub", "hub") from error
-    # Our errors are one sentence, and its warnings would stand beside it.
+    # Our errors are one sentence; its warnings would clutter them.
     utilities = import_module("huggingface_hub.utils")
     utilities.logging.set_verbosity_error()
     utilities.disable_progress_bars()

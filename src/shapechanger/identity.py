@@ -122,7 +122,7 @@ def identify_code(names: Iterable[str], *objects: Any) -> Identity:
     """Return the identity of what has no model, such as a method.
 
     Args:
-        names: Names such as `my_methods:warm-start`, and texts that are none.
+        names: Names such as `my_methods:warm-start`, and other texts, which are skipped.
         *objects: Objects whose modules count, too.
     """
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))

@@ -139,7 +139,7 @@ class Layout(msgspec.Struct, frozen=True):
         """Return the feature of a name, or of a place in the order.
 
         Raises:
-            UnknownName: If there is none of this name.
+            UnknownName: If no feature has this name.
             IndexError: If there are fewer features.
         """
         if not isinstance(name, str):
@@ -185,7 +185,7 @@ class Layout(msgspec.Struct, frozen=True):
         The exact name of a feature is not a glob, even if it has brackets, as in `wheel[0]`.
 
         Raises:
-            UnknownName: If there is none.
+            UnknownName: If no such feature exists.
         """
         if pattern in self:
             return (self[pattern],)

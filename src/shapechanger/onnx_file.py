@@ -53,7 +53,7 @@ def export_network(
         return operators.Sqrt(operators.Add(operators.Mul(x, x), operators.Mul(y, y)))
 
     class Positional(torch.nn.Module):
-        """The network with any number of inputs, which are then named alike."""
+        """The network with any number of inputs, which then share one name."""
 
         def __init__(self) -> None:
             super().__init__()

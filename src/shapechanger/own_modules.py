@@ -110,7 +110,7 @@ def _is_own(path: Path) -> bool:
 
 
 def _file_of(name: str, folders: Iterable[Path]) -> Path | None:
-    """Return the file of a module, which need not have been imported; None if there is none."""
+    """Return the file of a module, which need not have been imported; None without a file."""
     loaded = sys.modules.get(name)
     if loaded is not None:
         file = getattr(loaded, "__file__", None)

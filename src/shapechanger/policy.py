@@ -60,7 +60,7 @@ def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
 
     Args:
         path: A file that a training, a study, a cloning or `shapechanger policies export` wrote.
-        algorithm: An algorithm of yours, a class or function as `module:name`, that the file may
+        algorithm: Your algorithm, a class or function as `module:name`, that the file may
             name. A file alone may only name classes of models, of Stable-Baselines3, sb3-contrib
             or a module that is already imported.
 
@@ -159,7 +159,7 @@ def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[A
         The card in JSON, and the arrays by name.
 
     Raises:
-        FileNotFoundError: If there is none.
+        FileNotFoundError: If the file does not exist.
         OSError, LookupError, ValueError, msgspec.MsgspecError: If it cannot be read, is of another
             kind, or has been changed.
     """
@@ -207,7 +207,7 @@ def read_limited(path: Path) -> bytes:
         path: The file.
 
     Raises:
-        FileNotFoundError: If there is none.
+        FileNotFoundError: If the file does not exist.
         ValueError: If it is no file, or larger than 256 MiB.
     """
     _require_file(path)

@@ -92,7 +92,7 @@ def test_meshes_lie_beside_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_files_that_do_not_exist_are_named(tmp_path: Path) -> None:
-    """With the models beside them."""
+    """With the models in the same folder."""
     _written(tmp_path, "robot.xml", LEG)
     _written(tmp_path, "notes.txt", "")
     with pytest.raises(

@@ -204,7 +204,7 @@ def test_it_grows_alike_or_refuses(robot: _Robot) -> None:
 
 @each_robot
 def test_its_shift_is_certified(robot: _Robot) -> None:
-    """A change of all masses is one, and no edit is none."""
+    """A change of all masses counts, no edit does not."""
     source, target = robot.make(), robot.make((Mass("*", scale=1.3),))
     certificate = source.unwrapped.certify_shift(source, target)
     assert "mass" in str(certificate)

@@ -51,7 +51,7 @@ def test_points_of_any_posture_are_reached() -> None:
         ((-0.08, 0.0, 0.0), 5.0),
         ((0.0, 0.0, 0.09), 100.0),
     ],
-    ids=["just beyond", "far beyond", "beside", "behind", "above"],
+    ids=["just beyond", "far beyond", "to the side", "behind", "above"],
 )
 def test_the_error_of_unreachable_points_is_correct(
     place: tuple[float, float, float], least_mm: float

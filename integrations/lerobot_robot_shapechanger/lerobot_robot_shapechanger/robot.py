@@ -153,7 +153,7 @@ class Shapechanger(Robot):
         """Wait for an armed robot that we or a person drive, and its first picture.
 
         Raises:
-            RobotRefused: If there is none in time.
+            RobotRefused: If none arrives in time.
         """
         robot, spaces = client.welcome.robot, self._link.spaces
         since, told = time.monotonic(), ""

@@ -31,7 +31,7 @@ class PushPolicy:
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, or a clone."""
     repo: _Repo
-    """Name of the repository, such as ada/ant; it is made if there is none."""
+    """Name of the repository, such as ada/ant; it is made if it does not exist."""
     public: bool = False
     """Let everybody read a new repository; it is private, if not given."""
 
@@ -90,7 +90,7 @@ class PushDemonstrations:
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
     """A recording, or one episode of it."""
     repo: _Repo
-    """Name of the repository, such as ada/drive; it is made if there is none."""
+    """Name of the repository, such as ada/drive; it is made if it does not exist."""
     public: bool = False
     """Let everybody read a new repository; it is private, if not given."""
 

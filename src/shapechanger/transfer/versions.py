@@ -111,7 +111,7 @@ def _model_file(folder: Path, identity: Identity) -> Path:
 
 
 def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
-    """Write the numbers of models beside a study, so that a later change can be named."""
+    """Write the numbers of models into a study's folder, so that a later change can be named."""
     for each in envs:
         file = _model_file(folder, each.identity)
         if each.numbers and not file.exists():

@@ -183,7 +183,7 @@ def test_a_page_reconnects_after_a_restart_and_moves_nothing(
 
 
 def test_a_displaced_page_waits_for_its_person(car: RunningRobot, visit: Visit) -> None:
-    """With more people than places, pages that reconnect would displace one another for ever."""
+    """With more people than places, pages that reconnect would displace one another endlessly."""
     console = visit(car)
     console.await_state(link="open")
     with contextlib.ExitStack() as stack:

@@ -117,7 +117,7 @@ export class Link extends EventTarget {
       const was = this.welcome;
       this.#drop();
       if (refused && !was && /key/i.test(refused)) this.#report("refused", refused);
-      // Pages that reconnect at once would displace one another for ever.
+      // Pages that reconnect at once would displace one another endlessly.
       else if (was && /are the limit/.test(refused)) this.#report("displaced", refused);
       else this.#wait(refused || (was ? "The connection is lost." : "The robot does not answer."));
     };

@@ -38,7 +38,7 @@ export class Policies {
     const button = find("policy-run");
     label(button, state.running ? "End policy" : "Start policy");
     button.disabled = !state.running && !state.names.length;
-    const none = state.names.length ? "None runs." : "There is none in the robot's folder.";
+    const none = state.names.length ? "None runs." : "The robot's folder has no policy.";
     setText(find("policy-state"), state.running ? `${state.running}: ${state.text}` : state.text || none);
     if (!state.running && state.text && state.text !== before.text) this.#log.add(state.text, "trouble");
   }

@@ -46,7 +46,7 @@ class Interval(NamedTuple):
 def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:
     """Return when each propelling output was not at rest.
 
-    A pin with PWM counts by its duty. The last levels last for ever, unless the one-shot of the
+    A pin with PWM counts by its duty. The last levels stay, unless the one-shot of the
     enable line ends them.
     """
     found: list[Interval] = []
