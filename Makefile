@@ -50,10 +50,10 @@ help:  ## list the targets
 setup: $(INSTALLED_DEV)  ## create .venv with all dependencies
 	@echo "Ready: source $(BIN)/activate"
 
-demo: $(INSTALLED_ALL)  ## transfer a policy to a pole twice as long; see results/demo
-	$(BIN)/shapechanger transfer shapechanger/InvertedPendulum-v1 \
-		shapechanger/BigInvertedPendulum-v1 --seeds 5 --source-steps 16384 --steps 16384 \
-		--out results/demo
+demo: $(INSTALLED_ALL)  ## transfer a policy to a pole three times as long; see results/demo
+	$(BIN)/shapechanger transfer InvertedPendulum InvertedPendulum \
+		--target-body '[{"edit": "stretch", "body": "pole", "factor": 3}]' \
+		--seeds 5 --source-steps 16384 --steps 16384 --out results/demo
 
 test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
 	$(PYTEST) -m "not slow and not system" --cov
@@ -77,9 +77,10 @@ test-lerobot: $(INSTALLED_LEROBOT) $(STUBS)  ## test our robots in LeRobot; inst
 test-robots: $(INSTALLED_ROBOTS)  ## test robot files of other projects' packages for 20 minutes; installs 1 GB
 	$(RUN) -m pytest tests/envs/test_real_robots.py
 
-check: $(STUBS)  ## check format, lint, imports and types
+check: $(STUBS)  ## check format, lint, words, imports and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/codespell
 	$(BIN)/lint-imports --no-cache
 	$(RUN) -m pyright --threads $(JOBS)
 

@@ -118,7 +118,7 @@ def console(seconds: float = SECONDS) -> list[Row]:
     )
     rows.append(
         Row(
-            "the same beside a page that hangs as much and knows no robot",
+            "the same next to a page that hangs as much and knows no robot",
             f"p99 {b99:.1f} ms with, {s99:.1f} ms without a connection",
             f"without a connection p50 {s50:.1f}, max {s_max:.1f} ms; {len(stranger)} commands",
             "the connection delays none: p99 within 10 ms",

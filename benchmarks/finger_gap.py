@@ -82,7 +82,7 @@ def gap() -> list[Row]:
     The shipped policy in the nominal finger with a delay shows what a delay alone costs, and a
     policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
     `ONLY` names arms besides scratch and zero-shot, or "rig" for that policy. With `ENDED=1` no run
-    is started, and the rows are those of the runs that have ended.
+    is started, and the rows cover the runs that have ended.
     """
     target = _FINGER.having({"gap": "real-like"})
     out = Path("results", "finger-gap")

@@ -142,7 +142,7 @@ def _without_one_shot(fault: Fault, found: list[_Tried]) -> Row:
     drove = [one for one in found if one.drove]
     never = sum(one.stopped_ms is None for one in drove)
     return Row(
-        f"{fault.name}, no one-shot fitted: motors that run on for ever",
+        f"{fault.name}, no one-shot fitted: motors that never stop",
         f"{never} of {len(drove)}",
         "throttle at a duty of 0.6, 50 Hz",
         "none: it shows what the one-shot is for",

@@ -43,7 +43,7 @@ def single() -> list[Row]:
         _ratio_row("one InvertedPendulum-v1 step against InvertedPendulum-v5, CPU time", pole, 1.3),
         _ratio_row("the same with fast_model=False", plain_pole, None),
         _ratio_row("one Ant-v1 reset against Ant-v5, CPU time", ant_reset, None),
-        _ratio_row("one InvertedPendulum-v1 reset, likewise", pole_reset, None),
+        _ratio_row("one InvertedPendulum-v1 reset, for comparison", pole_reset, None),
         _search_row(),
         *_frame_rows(),
     ]

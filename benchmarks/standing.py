@@ -73,7 +73,7 @@ def teachers() -> list[Row]:
 def _row(seed: int, found: Starts) -> Row:
     interval = binomtest(found.stood, STARTS).proportion_ci()
     return Row(
-        f"teacher of the car, seed {seed}: starts beside the lane at which it stands for good",
+        f"teacher of the car, seed {seed}: starts off the lane at which it stands for good",
         f"{found.stood} of {STARTS}",
         f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %, 95 % (Clopper-Pearson); it "
         f"stood in {100 * found.share:.1f} % of the steps, and came less than {PROGRESS_M} m far "

@@ -60,13 +60,13 @@ class Source(NamedTuple):
         worlds: Its worlds; each gives an equal share of the six minutes.
         randomise: Whether light, textures and the camera's pose are drawn for each episode.
         labels: "path" for points on the path of the expert that drives by waypoints. Where it
-            drives by steering and throttle: "steering" for what these lead to, or "path beside it".
+            drives by steering and throttle: "steering" for what these lead to, or "path nearby".
     """
 
     vehicle: str
     worlds: tuple[str, ...] = ("corridor",)
     randomise: bool = False
-    labels: Literal["path", "steering", "path beside it"] = "path"
+    labels: Literal["path", "steering", "path nearby"] = "path"
 
 
 SOURCES: Final = {
@@ -85,7 +85,7 @@ ACROSS: Final = tuple(list(SOURCES)[4:])
 # Two clones of the same pictures, whose labels differ.
 BY_STEERING: Final = {
     "car-by-its-steering": Source("car", labels="steering"),
-    "car-by-the-path": Source("car", labels="path beside it"),
+    "car-by-the-path": Source("car", labels="path nearby"),
 }
 # Keys of a profile's camera. The car's own looks level and sees 48.8 degrees, in 160 x 120 pixels.
 CAMERAS: Final[dict[str, dict[str, Any]]] = {

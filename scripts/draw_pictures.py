@@ -8,13 +8,13 @@ results/gallery; where that study has ended, it is only filmed.
 from __future__ import annotations
 
 import argparse
-import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, cast
 
 import imageio.v3 as iio
+import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -23,12 +23,14 @@ from PIL import Image
 from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.study_films import film_study, view_distance
+from shapechanger.envs.study_films import film_study, median_index, view_distance
 from shapechanger.files import read_json
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.reports.films import write_film
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
+from shapechanger.transfer.plan import Run
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study
 from shapechanger.vehicles.courses.course import FLOODED
@@ -299,22 +301,80 @@ def _film_transfer(stem: Path) -> None:
     )
     study.run()
     clip = stem.with_suffix(".webm")
-    strips = film_study(
-        read_json(STUDY / STUDY_FILE, Study, f"delete {STUDY}"),
+    made = read_json(STUDY / STUDY_FILE, Study, f"delete {STUDY}")
+    film_study(
+        made,
         STUDY,
         clip,
         source_policy=reference_policy("shapechanger/Ant-v1"),
         shadows=True,
     )
-    figure = Figure(figsize=(9.0, 1.35 * len(strips)), layout="constrained")
-    for axes, strip in zip(figure.subplots(len(strips), 1), strips, strict=True):
-        axes.imshow(np.asarray(iio.imread(io.BytesIO(strip.jpeg))), aspect="equal")
-        arm, _, measured = strip.caption.partition(": ")
-        axes.set_title(f"{_CAPTIONS[arm]}: {measured}", fontsize=9, loc="left", pad=2)
-        axes.axis("off")
-    figure.savefig(stem.with_name("ants-strip.jpg"), dpi=130, pil_kwargs={"quality": 80})
+    _photograph_transfer(made, stem.with_name("ants-strip.jpg"))
     frames = np.asarray(iio.imread(clip))
     iio.imwrite(stem.with_suffix(".jpg"), frames[len(frames) // 3], quality=80)
+
+
+# The view of the strip: 22 m of the floor from the side, once a second.
+_STRIP: Final = 1170, 110
+_STRIP_M: Final = 22.0
+_STRIP_S: Final = 5
+_AWAY_M: Final = 40.0
+_VISIBLE: Final = 12  # Smallest difference of a pixel from the empty floor, of 255.
+
+
+def _photograph_transfer(study: Study, path: Path) -> None:
+    """Draw one photograph per policy: a fixed camera, exposed once a second for five seconds."""
+    source = load_policy(reference_policy("shapechanger/Ant-v1"))
+    shown: dict[str, tuple[EnvRef, Any]] = {
+        "source, in the source": (study.plan.task.source, source),
+        "zero-shot": (study.plan.task.target, source),
+    }
+    for arm in ("fine-tune", "scratch"):
+        policy = load_policy(Run(arm, median_index(study, arm)).policy_file(STUDY))
+        shown[arm] = (study.plan.task.target, policy)
+    figure = Figure(figsize=(9.0, 1.1 * len(shown)), layout="constrained")
+    for axes, (arm, (ref, policy)) in zip(
+        figure.subplots(len(shown), 1), shown.items(), strict=True
+    ):
+        picture, distance_m = _photographed(ref, policy)
+        axes.imshow(picture, aspect="equal")
+        title = f"{_CAPTIONS[arm]}: {distance_m:.1f} m in {_STRIP_S} s"
+        axes.set_title(title, fontsize=9, loc="left", pad=2)
+        axes.axis("off")
+    figure.savefig(path, dpi=130, pil_kwargs={"quality": 80})
+
+
+def _photographed(ref: EnvRef, policy: Any) -> tuple[Picture, float]:
+    """Return a multiple exposure of an ant that walks past a fixed camera, and its way, m."""
+    wide, high = _STRIP
+    view = {
+        "lookat": np.array([_STRIP_M / 2 - 2.0, 0.0, 0.4]),
+        "distance": _AWAY_M,
+        "azimuth": 90.0,
+        "elevation": -6.0,
+    }
+    size = {"render_mode": "rgb_array", "width": 2 * wide, "height": 2 * high}
+    env = cast("Any", ref.make(**size, shadows=True, default_camera_config=view))
+    data, model = env.unwrapped.data, env.unwrapped.model
+    model.vis.global_.fovy = math.degrees(2.0 * math.atan(_STRIP_M * high / wide / 2.0 / _AWAY_M))
+    observation, _ = env.reset(seed=EVALUATION_SEED)
+    start = float(data.qpos[0])
+    exposures: list[Picture] = [env.render()]
+    for _ in range(_STRIP_S):
+        for _ in range(round(env.metadata["render_fps"])):
+            observation, *_ = env.step(policy.act(np.asarray(observation)[None])[0])
+        exposures.append(env.render())
+    way = float(data.qpos[0]) - start
+    data.qpos[2] = -100.0  # Below the floor, where it is not in view.
+    mujoco.mj_forward(model, data)
+    empty = env.render().astype(int)
+    env.close()
+    picture = empty.copy()
+    for exposure in exposures:
+        ant = np.abs(exposure.astype(int) - empty).max(axis=2) > _VISIBLE
+        picture[ant] = exposure[ant]
+    averaged = picture.reshape(high, 2, wide, 2, 3).mean(axis=(1, 3))
+    return averaged.astype(np.uint8), way
 
 
 STILLS: Final[Mapping[str, Callable[[], Picture]]] = {

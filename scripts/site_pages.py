@@ -190,7 +190,7 @@ def _facts(env_id: str, spec: Any, entry_point: str) -> list[tuple[str, str]]:
 
 
 def _missing(what: str, error: RenderError) -> str:
-    """Return a note of what cannot be drawn; on CI, where nothing may be missing, raise."""
+    """Return a note of undrawable pictures; on CI, where nothing may be missing, raise."""
     if os.environ.get("CI") == "true":
         raise error
     return f"{what}: {error}"

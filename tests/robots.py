@@ -97,7 +97,7 @@ A guard that is silent for the deadline is killed, and a busy machine can delay 
 
 
 def write_profile(folder: Path, text: str = CAR) -> Profile:
-    """Write a profile to a file of its own and load it."""
+    """Write a profile to a new file and load it."""
     name = next(line for line in text.splitlines() if line.startswith("name = "))
     path = folder / f"{name.split(chr(34))[1]}.toml"
     path.write_text(text)

@@ -1,4 +1,4 @@
-"""docs/formats.md names every field of what it describes; its examples run in test_docs.py."""
+"""docs/formats.md names every field of the formats; its examples run in test_docs.py."""
 
 from __future__ import annotations
 

@@ -15,8 +15,8 @@ The names below are the public interface; each is imported on first use and may 
   `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity`,
   `StartHeight`, `PlaceBody`, `PlaceGeom`, `TotalMass`, `AddMotor`, `AddFreeJoint` and `AddFloor`
   are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body to another,
-  `certify` proves what a shift changes, and `register_edit` adds an edit of your own.
-- Envs: `from_mjcf` makes one of a robot and a task of your own, `make_vec` many at once; `examine`
+  `certify` proves what a shift changes, and `register_edit` adds your own edit.
+- Envs: `from_mjcf` makes one of your own robot and task, `make_vec` many at once; `examine`
   runs the exam that every env passes.
 - Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,
   `TransferTask`, `make_plan` and `run_study` measure what a transfer is worth, `load_policy` and

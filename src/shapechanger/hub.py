@@ -5,7 +5,7 @@ with the size and the SHA-256 of each file. A pull takes only files that this li
 kind that was asked for, and checks them; whatever else lies in the repository is left there. Files
 of the kind "policy" are models on the Hub, "demonstrations" datasets.
 
-The login is that of `huggingface_hub`: `hf auth login`, or the variable HF_TOKEN. No message of
+Log in with `hf auth login`, or set the variable HF_TOKEN. No message of
 this module repeats one of another package, which might hold the token.
 """
 

@@ -40,8 +40,8 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     Attributes:
         model: Fingerprint of its compiled model, see `shapechanger.morphology.certificate`; empty
             without one.
-        sensed: The same of what decides no motion and may be observed: sensors, keyframes, sites
-            and, where frames are observed, all that is drawn.
+        sensed: The same for parts that decide no motion and may be observed: sensors, keyframes,
+            sites and, where frames are observed, all that is drawn.
         files: The first 16 hex digits of the SHA-256 of each own file that it needs, by its place
             below the folder that it is imported from, or its name.
     """
@@ -119,7 +119,7 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
 
 
 def identify_code(names: Iterable[str], *objects: Any) -> Identity:
-    """Return the identity of what has no model, such as a method.
+    """Return the identity of a part without a model, such as a method.
 
     Args:
         names: Names such as `my_methods:warm-start`, and other texts, which are skipped.

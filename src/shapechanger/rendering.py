@@ -97,7 +97,7 @@ def require_context() -> None:
 def open_context(width: int, height: int) -> Any:
     """Open a context for drawing without a window, and make it current.
 
-    `mujoco.GLContext` is that of `MUJOCO_GL` when MuJoCo was imported; this is that of its present
+    `mujoco.GLContext` follows `MUJOCO_GL` when MuJoCo was imported; this follows its present
     value.
 
     Args:

@@ -7,12 +7,10 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
-from shapechanger.finger.tensions import DRIVES
 from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
@@ -51,21 +49,6 @@ def _controller(env: str, mode: str, **arguments: Any) -> FingerController:
     with contextlib.closing(gym.make(env, actions=mode, **arguments)) as made:
         layout: Any = made.get_wrapper_attr("observation_layout")
         return FingerController(layout, mode)
-
-
-@pytest.mark.parametrize("mode", DRIVES)
-def test_the_controller_reaches_every_target(mode: str) -> None:
-    """In each action mode, the median error is below 0.1 mm."""
-    infos = _ends(_controller(FINGER, mode), FINGER, 6, actions=mode)
-    assert all(info["is_success"] for info in infos)
-    assert np.median([info["distance"] for info in infos]) < 1e-4
-
-
-def test_the_controller_follows_a_circle() -> None:
-    """A circle of 12 mm at 1 Hz is followed within 3 mm RMS."""
-    path = {**_CIRCLE, "hz": 1.0}
-    infos = _ends(_controller(TRACK, "impedance"), TRACK, 2, path=path)
-    assert max(info["rms"] for info in infos) < 3e-3
 
 
 def test_the_shipped_policy_reaches() -> None:

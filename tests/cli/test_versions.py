@@ -71,7 +71,9 @@ def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(
             told = " ".join(capsys.readouterr().err.split())
             assert words in told
             assert "give the present one with --env" in told
-        main(["policies", "evaluate", _POLICY, "--env", "b.xml@cliown_task:Hold"])
+        main(
+            ["policies", "evaluate", _POLICY, "--episodes", "1", "--env", "b.xml@cliown_task:Hold"]
+        )
         (folder / file).write_text(was)
     main(["policies", "evaluate", _POLICY, "--episodes", "1"])
 

@@ -222,7 +222,7 @@ def _tetrahedron() -> bytes:
 
 @pytest.mark.parametrize("scheme", ["package", "model"])
 def test_packages_are_the_folders_around_a_urdf(tmp_path: Path, scheme: str) -> None:
-    """Or the folders in these; elsewhere an error says what to do."""
+    """Or the folders in these; elsewhere an error names the way out."""
     text = f"""
     <robot name="r"><link name="base">{_INERTIA}</link>
       <link name="arm">{_INERTIA}<collision><geometry>

@@ -155,5 +155,5 @@ def test_source_steps_are_those_of_arms_that_train_their_own(
     trained = load_policy(Run("randomised", 0).policy_file(tmp_path / "study"))
     assert trained.card.steps == 64
     assert counted == [32, 64]  # In total steps an arm is behind scratch by its source steps.
-    with pytest.raises(StudyError, match="no arm trains a policy of its own"):
+    with pytest.raises(StudyError, match="no arm trains its own policy"):
         tiny_plan(source_policy=ppo_file, source_steps=64)

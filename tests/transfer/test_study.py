@@ -142,7 +142,11 @@ def test_normalised_learners_carry_their_statistics(tmp_path: Path) -> None:
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
     task = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
     plan = tiny_plan(
-        TINY_NORMALISED, task=task, rules={"foot_*/motor": "copy ankle_*/motor"}, steps=32
+        msgspec.structs.replace(TINY_NORMALISED, eval_episodes=1),
+        task=task,
+        rules={"foot_*/motor": "copy ankle_*/motor"},
+        steps=32,
+        source_steps=32,
     )
     study = run_study(plan, tmp_path / "study", executor=Serial())
     for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):

@@ -1,4 +1,4 @@
-"""A robot on its twin, a person who drives it, and folders of their own for all programs."""
+"""A robot on its twin, a person who drives it, and separate folders for all programs."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ That every half cheetah weighs 14 kg is the setting `settotalmass` of Gym's file
 MuJoCo has written lacks; `envs/mujoco/assets/halfcheetah_morph_easy.xml` of
 github.com/shivambhagat79/off-dynamics-rl, commit 995bf26, a changed thigh of ODRL, has kept it.
 
-`odrl.json` keys them by their full names, such as `odrl-ant-friction-0.1`. Frictions are those of
+`odrl.json` keys them by their full names, such as `odrl-ant-friction-0.1`. Frictions apply to
 all geoms, except that the hopper's floor keeps its own; gravity is a factor of 9.81 m/s²; easy,
 medium and hard leave 0.8, 0.5 and 0.2 of the range of a joint. A walker has one foot of less
 friction than the other, as Gym's, which Gymnasium's v5 has made equal.

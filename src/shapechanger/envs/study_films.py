@@ -109,11 +109,11 @@ def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
     trained = bool(study.of(SOURCE))
     has_source = trained or given is not None
     if has_source:
-        middle = Run(SOURCE, _median(study, SOURCE) if trained else 0)
+        middle = Run(SOURCE, median_index(study, SOURCE) if trained else 0)
         acting = policy(middle)
         scenes.append(_Scene("source, in the source", plan.task.source, acting, None, drives))
     for arm in sorted(plan.arms, key=lambda arm: arm == "scratch"):  # The baseline comes last.
-        run = Run(arm, _median(study, arm))
+        run = Run(arm, median_index(study, arm))
         target = plan.target_of(run)
         if plan.trains(arm):
             scenes.append(_Scene(arm, target, policy(run), None, drives))
@@ -123,8 +123,8 @@ def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
     return scenes
 
 
-def _median(study: Study, kind: str) -> int:
-    """Index of the run in the middle."""
+def median_index(study: Study, kind: str) -> int:
+    """Return the index of the run with the median measure at its end."""
     values = finals(study, kind)
     if np.isnan(values).any():
         return 0

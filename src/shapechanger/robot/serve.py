@@ -62,7 +62,7 @@ class Service:
     clock: Literal["real", "twin"] = "real"
     """With --twin: whether time passes by itself, or only when a program takes a step."""
     wired_as: str = ""
-    """With --twin: the profile of what is really attached to the pins, if not the one served."""
+    """With --twin: the profile of the parts that are really attached, if not the one served."""
     seed: int = 0
     """With --twin: seed of the world."""
     twin_folder: Path | None = None

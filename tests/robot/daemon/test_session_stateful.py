@@ -263,7 +263,7 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def the_newest_suggestion_is_shown_until_it_expires(self) -> None:
-        """Values and sender are those of the model."""
+        """Values and sender equal the model's."""
         shown, expected = self.hub.suggested(), self.suggestion
         if expected is None or self.now_ns > expected[2]:
             assert shown is None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import permutations
+from types import MappingProxyType
 
 import msgspec
 import numpy as np
@@ -18,22 +20,27 @@ from tests.transfer.report.test_report_page import EVIL, Reader
 ANTS = [EnvRef(f"shapechanger/{name}-v1") for name in ("Ant", "BigAnt", "ExtendedAnt")]
 
 
-def _pairs(**more: tuple[int, ...]) -> dict[str, Study]:
-    """Return six pairs of three ants; transfer hurts from BigAnt to Ant and helps elsewhere."""
+@pytest.fixture(scope="module")
+def pairs() -> Mapping[str, Study]:
+    """Six pairs of three ants; transfer hurts from BigAnt to Ant and helps elsewhere."""
     studies: dict[str, Study] = {}
     for source, target in permutations(ANTS, 2):
         worse = rising(-200.0, 100.0, 3000.0, seed=3)
         study = make_study(source=source, target=target)
         if (source, target) == (ANTS[1], ANTS[0]):
             study = make_study(source=source, target=target, fine_tune=worse)
-        name = f"{source.id[13:-3]}-to-{target.id[13:-3]}"
-        studies[name] = msgspec.structs.replace(study, **more)
-    return studies
+        studies[f"{source.id[13:-3]}-to-{target.id[13:-3]}"] = study
+    return MappingProxyType(studies)
 
 
-def test_every_pair_has_a_cell() -> None:
+@pytest.fixture(scope="module")
+def page(pairs: Mapping[str, Study]) -> str:
+    """The page of all six pairs."""
+    return suite_html("ants", pairs, seeds=5)
+
+
+def test_every_pair_has_a_cell(page: str) -> None:
     """Rows are sources and columns targets; each cell links to the report of its study."""
-    page = suite_html("ants", _pairs(), seeds=5)
     reader = Reader(page)
     links = [value for name, value in reader.attributes if name == "href"]
     for source, target in permutations(("Ant", "BigAnt", "ExtendedAnt"), 2):
@@ -43,9 +50,8 @@ def test_every_pair_has_a_cell() -> None:
     assert reader.headings[1] == "Fine-tune against scratch"
 
 
-def test_colours_follow_the_gain() -> None:
+def test_colours_follow_the_gain(page: str) -> None:
     """Gains are blue and losses orange, both light enough for text."""
-    page = suite_html("ants", _pairs(), seeds=5)
     colours = [part.partition('"')[0] for part in page.split('style="background: #')[1:]]
     assert len(colours) == 6
     parts = [tuple(int(colour[i : i + 2], 16) for i in (0, 2, 4)) for colour in colours]
@@ -53,9 +59,9 @@ def test_colours_follow_the_gain() -> None:
     assert all(sum(part) > 300 for part in parts)
 
 
-def test_methods_are_compared_by_target_and_over_all() -> None:
+def test_methods_are_compared_by_target_and_over_all(page: str) -> None:
     """The page has interquartile means and probabilities of improvement, with intervals."""
-    words = Reader(suite_html("ants", _pairs(), seeds=5)).words
+    words = Reader(page).words
     assert words.count("all targets") == 3
     assert words.count("baseline") == 4
     assert "ExtendedAnt fine-tune 10" in words
@@ -73,17 +79,22 @@ def test_no_interval_that_is_none(seeds: int) -> None:
     assert (words.count("(no interval)") > 2) == (seeds == 2)
 
 
-def test_declared_seeds_are_stated() -> None:
-    """The page states whether all declared seeds ran, and earlier looks at the results."""
-    assert "declares 5 seeds, and every study has them." in suite_html("a", _pairs(), seeds=5)
-    interim = suite_html("a", _pairs(), seeds=8)
-    assert "the studies have 5, so these are interim results" in interim
-    more = suite_html("a", _pairs(), seeds=3)
-    assert "The suite declares 3 seeds; the studies have 5." in more
-    assert "interim" not in more
-    grown = suite_html("a", _pairs(looks=(3, 5)), seeds=5)
-    assert "Results were also computed on the way, with 3 seeds" in grown
-    assert "Results were also" not in suite_html("a", _pairs(looks=(5,)), seeds=5)
+@pytest.mark.parametrize(
+    ("declared", "looks", "said", "unsaid"),
+    [
+        (5, (5,), "declares 5 seeds, and every study has them.", "Results were also"),
+        (8, (5,), "the studies have 5, so these are interim results", "Results were also"),
+        (3, (5,), "The suite declares 3 seeds; the studies have 5.", "interim"),
+        (5, (3, 5), "Results were also computed on the way, with 3 seeds", "interim"),
+    ],
+)
+def test_declared_seeds_and_earlier_looks_are_stated(
+    declared: int, looks: tuple[int, ...], said: str, unsaid: str
+) -> None:
+    study = msgspec.structs.replace(make_study(), looks=looks)
+    page = suite_html("a", {"a": study}, seeds=declared)
+    assert said in page
+    assert unsaid not in page
 
 
 def test_a_sweep_has_a_chart() -> None:
@@ -97,15 +108,15 @@ def test_a_sweep_has_a_chart() -> None:
     assert "Fine-tune against scratch" not in reader.headings
 
 
-def test_strips_are_embedded_and_films_linked() -> None:
+def test_strips_are_embedded_and_films_linked(pairs: Mapping[str, Study], page: str) -> None:
     strips = {"Ant-to-BigAnt": [FilmStrip("zero-shot: 0.1 m/s", b"\xff\xd8jpeg")]}
     films = {"Ant-to-BigAnt": "a/film.mp4"}
-    reader = Reader(suite_html("ants", _pairs(), seeds=5, strips=strips, films=films))
+    reader = Reader(suite_html("ants", pairs, seeds=5, strips=strips, films=films))
     assert ("href", "a/film.mp4") in reader.attributes
     assert any(value.startswith("data:image/jpeg") for _, value in reader.attributes)
     assert "zero-shot: 0.1 m/s" in reader.words
     assert "Films" in reader.headings
-    assert "Films" not in Reader(suite_html("ants", _pairs(), seeds=5)).headings
+    assert "Films" not in Reader(page).headings
 
 
 def test_names_are_escaped() -> None:
@@ -113,11 +124,9 @@ def test_names_are_escaped() -> None:
     assert "<script" not in page
 
 
-def test_arms_of_some_studies_are_listed() -> None:
-    studies = _pairs()
-    studies["Ant-to-BigAnt"] = make_study(
-        source=ANTS[0], target=ANTS[1], arms=("scratch", "fine-tune")
-    )
+def test_arms_of_some_studies_are_listed(pairs: Mapping[str, Study]) -> None:
+    fewer = make_study(source=ANTS[0], target=ANTS[1], arms=("scratch", "fine-tune"))
+    studies = {**pairs, "Ant-to-BigAnt": fewer}
     assert "only in 5 of 6 studies" in Reader(suite_html("ants", studies, seeds=5)).words
 
 
@@ -139,9 +148,8 @@ def test_a_page_needs_a_study() -> None:
         suite_html("none", {}, seeds=5)
 
 
-def test_missing_pairs_are_marked() -> None:
-    studies = _pairs()
-    del studies["Ant-to-BigAnt"]
+def test_missing_pairs_are_marked(pairs: Mapping[str, Study]) -> None:
+    studies = {name: study for name, study in pairs.items() if name != "Ant-to-BigAnt"}
     words = Reader(suite_html("ants", studies, seeds=5)).words
     assert words.count("not run") == 1
     assert words.count("same body") == 3

@@ -410,7 +410,7 @@ class Inbox:
         last = self.newest
         if last is not None and message.seq <= last.message.seq:
             raise LinkError(
-                f"Observation {message.seq} arrived after {last.message.seq} as if replayed."
+                f"Observation {message.seq} arrived after {last.message.seq}, as in a replay."
             )
         jpeg = message.frame
         if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:

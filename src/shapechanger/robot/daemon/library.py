@@ -55,7 +55,7 @@ _LINES: Final = msgspec.json.Decoder(_Line)
 
 
 class RecordingLibrary:
-    """Answers questions about recordings, one after another, in a thread of its own."""
+    """Answers questions about recordings, one after another, in its own thread."""
 
     def __init__(self, folder: Path | None, call: Callable[[Callable[[], None]], None]) -> None:
         self._recordings = None if folder is None else RecordingFolder(folder)

@@ -1,7 +1,8 @@
 """PCA9685: sixteen servo channels over I2C with hardware timing.
 
 Registers and formulas: NXP, PCA9685 product data sheet, rev. 4 (2015-04-16), sections 7.3.1 to
-7.3.5. A PCA9685 repeats its last pulses for ever without commands; hence the pin for its OE input.
+7.3.5. A PCA9685 repeats its last pulses indefinitely without commands; hence the pin for its OE
+input.
 """
 
 from __future__ import annotations

@@ -188,7 +188,7 @@ class Reference(msgspec.Struct, frozen=True):
 
     score = (J - zero) / (one - zero)
 
-    The formula is that of D4RL (arXiv 2004.07219). Zero is the score without skill: an ant that
+    The formula follows D4RL (arXiv 2004.07219). Zero is the score without skill: an ant that
     stands still earns 1,000, so the random policy alone would be too low a floor. Both ends belong
     to the target, because an expert on the source says nothing about another body. The reference is
     taken as given: intervals of scores do not include its uncertainty.

@@ -490,6 +490,6 @@ def caveats(study: Study) -> tuple[str, ...]:
     if study.plan.seeds < _FEW_SEEDS:
         sentences.append(
             f"With {study.plan.seeds} seeds the intervals are wide: no clear difference does not "
-            "mean that there is none."
+            "mean that there is no difference."
         )
     return tuple(sentences)

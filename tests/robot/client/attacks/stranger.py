@@ -158,7 +158,7 @@ class Stranger:
         return self.answer().partition("\r\n")[0]
 
     def answer(self) -> str:
-        """Return the status line and the headers of an answer; "" if there is none."""
+        """Return the status line and the headers of an answer; "" without an answer."""
         answer = b""
         while not answer.endswith(b"\r\n\r\n") and (byte := self.read(1)):
             answer += byte

@@ -155,7 +155,7 @@ def old_tls(scene: Scene) -> str:
 
 @refused("closed")
 def garbage_for_tls(scene: Scene) -> str:
-    """Send random bytes in place of a handshake."""
+    """Send random bytes instead of a handshake."""
     stranger = scene.stranger(version=None)
     stranger.write(os.urandom(4096))
     stranger.read(2**16)
