@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,7 +16,8 @@ from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles import world as world_module
 from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
 from shapechanger.vehicles.bodies.parts import CameraJitter
-from shapechanger.vehicles.courses.course import HOME, Course, Look
+from shapechanger.vehicles.courses import WORLDS
+from shapechanger.vehicles.courses.course import FLOODED, HOME, Look
 from shapechanger.vehicles.world import MujocoWorld
 
 _AHEAD: Mapping[str, Mapping[str, float]] = {
@@ -77,16 +79,6 @@ def test_wheels_that_meet_only_the_ground_change_no_drive(
     assert poses[: len(poses) // 2] == poses[len(poses) // 2 :]
 
 
-def test_only_the_tank_needs_the_short_step() -> None:
-    """Coarse worlds have a longer step, but for a vehicle that skids when it turns."""
-    steps = {
-        vehicle: MujocoWorld(vehicle, size=None, coarse=True).model.opt.timestep
-        for vehicle in VEHICLES
-    }
-    assert steps.pop("tank") == SIM_DT
-    assert set(steps.values()) == {2.0 * SIM_DT}
-
-
 def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
     """Return a pose that faces the middle of the longest wall at this distance."""
     ends = [np.array((wall.start, wall.end)) for wall in world.course.walls]
@@ -96,8 +88,13 @@ def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
     return Pose(float(x), float(y), math.atan2(-along[0], along[1]))
 
 
+def test_every_vehicle_is_at_home_somewhere() -> None:
+    assert set(HOME) == set(VEHICLES)
+    assert set(HOME.values()) == set(WORLDS) - {FLOODED}
+
+
 @_EACH
-def test_a_vehicle_starts_in_its_default_world_at_rest(vehicle: str) -> None:
+def test_a_vehicle_starts_in_its_default_world_at_rest_and_drives(vehicle: str) -> None:
     world = _world(vehicle)
     seen = world.inputs()
     assert world.course.world == HOME[vehicle]
@@ -105,26 +102,10 @@ def test_a_vehicle_starts_in_its_default_world_at_rest(vehicle: str) -> None:
     assert seen.speed == pytest.approx(0.0, abs=1e-6)
     assert not world.touches
     assert world.truth() == {"progress_m": 0.0, "collisions": 0.0}
-
-
-@_EACH
-def test_driving_ahead_is_progress(vehicle: str) -> None:
-    """Half throttle for two seconds makes progress."""
-    world = _world(vehicle)
     _drive(world, _AHEAD[vehicle], 2.0)
     assert world.truth()["progress_m"] > 0.3
     assert world.inputs().speed > 0.2
     assert world.inputs().travelled_m > 0.2
-
-
-def test_simulation_is_deterministic() -> None:
-    """Equal seeds and outputs give equal poses."""
-    poses = []
-    for _ in range(2):
-        world = _world()
-        _drive(world, _AHEAD["car"], 1.0)
-        poses.append(world.pose)
-    assert poses[0] == poses[1]
 
 
 def test_the_time_step_of_calls_does_not_matter() -> None:
@@ -142,16 +123,19 @@ def test_the_time_step_of_calls_does_not_matter() -> None:
     assert cut.data.time == pytest.approx(100 * SIM_DT)
 
 
-def test_place_restarts_at_a_seeded_pose() -> None:
-    """`place` resets motion and progress, and its seed gives the pose."""
+def test_place_restarts_at_a_seeded_pose_and_repeats_its_drive() -> None:
     world = _world()
     world.place(5)
     first = world.pose
     _drive(world, _AHEAD["car"], 1.0)
+    driven = world.pose
     world.place(6)
     assert world.pose != first
     world.place(5)
     assert world.pose == first
+    _drive(world, _AHEAD["car"], 1.0)
+    assert world.pose == driven
+    world.place(5)
     assert world.progress_m == 0.0
     assert world.inputs().speed == 0.0
 
@@ -177,7 +161,6 @@ def test_lay_out_changes_the_course() -> None:
 
 
 def test_the_battery_sags_under_load() -> None:
-    """The battery's voltage drops with current and with `resting_v`."""
     world = _world()
     idle = world.inputs()
     assert RESTING_V - 0.2 < idle.battery_v < RESTING_V
@@ -189,34 +172,20 @@ def test_the_battery_sags_under_load() -> None:
     assert world.inputs().battery_v < 6.0
 
 
-def test_the_distance_to_a_wall() -> None:
-    """`distance_m` is measured from the front bumper."""
-    world = _world()
-    world.put(_before_a_wall(world, 0.9))
-    assert world.distance_m() == pytest.approx(0.9 - world.vehicle.nose_m, abs=0.005)
-
-
-def test_running_into_a_wall_is_one_collision() -> None:
-    """A crash stops the car, presses the bumper and counts once."""
+def test_running_into_a_wall_is_one_collision_and_put_back_frees_the_vehicle() -> None:
+    """A crash stops the car and presses the bumper; then collisions and progress are kept."""
     world = _world()
     world.put(_before_a_wall(world, 0.7))
+    assert world.distance_m() == pytest.approx(0.7 - world.vehicle.nose_m, abs=0.005)
     _drive(world, _AHEAD["car"], 2.0)
     assert world.collisions == 1
     assert world.touches
     assert world.inputs().bumped
     assert world.inputs().speed == pytest.approx(0.0, abs=0.1)
     assert world.distance_m() == pytest.approx(0.0, abs=0.03)
-
-
-def test_put_back_frees_the_vehicle() -> None:
-    """After `put_back` the vehicle is free nearby, and collisions and progress are kept."""
-    world = _world()
-    world.put(_before_a_wall(world, 0.7))
-    _drive(world, _AHEAD["car"], 2.0)
     before, progress = world.pose, world.progress_m
     world.put_back()
-    after = world.pose
-    assert math.hypot(after.x - before.x, after.y - before.y) < 2.0
+    assert math.dist((world.pose.x, world.pose.y), (before.x, before.y)) < 2.0
     assert world.collisions == 1
     assert abs(world.progress_m - progress) < 2.0
     assert world.inputs().speed == 0.0
@@ -227,7 +196,6 @@ def test_put_back_frees_the_vehicle() -> None:
 
 
 def test_acceleration_in_the_body_frame() -> None:
-    """Acceleration is forward at a start and centripetal in a bend."""
     world = _world()
     _drive(world, _AHEAD["car"], 0.05)
     assert world.inputs().acceleration_x > 0.1
@@ -247,36 +215,28 @@ def test_a_boat_drifts_with_the_current() -> None:
 
 
 def test_picture_needs_a_camera() -> None:
-    """The error names the missing argument."""
     with pytest.raises(WorldError, match="has no camera: pass a `size`"):
         _world().picture()
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "world", "sentence"),
+    ("vehicle", "options", "error", "sentence"),
     [
-        ("boat", "corridor", "A boat floats: it cannot drive in a corridor"),
-        ("car", "harbour", "A car does not float: it cannot drive in a harbour"),
+        ("boat", {"world": "corridor"}, WorldError, "A boat floats: it cannot drive in a corridor"),
+        ("car", {"world": "harbour"}, WorldError, "A car does not float: it cannot drive in a har"),
+        ("tnak", {"world": "yard"}, UnknownName, "No vehicle matches 'tnak'. Did you mean 'tank'"),
+        ("car", {"world": "yrad"}, UnknownName, "No world matches 'yrad'. Did you mean 'yard'"),
+        ("car", {"lenses": ("nihgt",)}, UnknownName, "matches 'nihgt'. Did you mean 'night'"),
     ],
 )
-def test_unsuitable_worlds_are_refused(vehicle: str, world: str, sentence: str) -> None:
-    """Boats need water, and other vehicles land."""
-    with pytest.raises(WorldError, match=sentence):
-        MujocoWorld(vehicle, world, size=None)
-
-
-def test_unknown_names_are_refused() -> None:
-    """Errors suggest the nearest name."""
-    with pytest.raises(UnknownName, match=r"No vehicle matches 'tnak'. Did you mean 'tank'"):
-        MujocoWorld("tnak", "corridor", size=None)
-    with pytest.raises(UnknownName, match=r"No world matches 'yrad'. Did you mean 'yard'"):
-        MujocoWorld("car", "yrad", size=None)
-    with pytest.raises(UnknownName, match=r"No lens matches 'nihgt'. Did you mean 'night'"):
-        MujocoWorld("car", size=None, lenses=("nihgt",))
+def test_unsuitable_worlds_and_unknown_names_are_refused(
+    vehicle: str, options: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    with pytest.raises(error, match=sentence):
+        MujocoWorld(vehicle, size=None, **options)
 
 
 def test_a_failed_layout_changes_nothing() -> None:
-    """A failed `lay_out` leaves the world unchanged."""
     world = _world()
     model, course, look = world.model, world.course, world.look
     with pytest.raises(WorldError, match="Seeds of courses count from 0"):
@@ -288,22 +248,9 @@ def test_a_failed_layout_changes_nothing() -> None:
     _drive(world, _AHEAD["car"], 0.2)
 
 
-def test_a_layout_error_keeps_the_course(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = _world()
-
-    def too_tight(kind: str, seed: int) -> Course:
-        raise WorldError(f"No {kind} with seed {seed} can be laid out: too tight.")
-
-    monkeypatch.setattr(world_module, "lay_out", too_tight)
-    with pytest.raises(WorldError, match="No corridor with seed 77777 can be laid out"):
-        world.lay_out(77_777)  # Not in the cache of another test.
-    assert world.seed == 3
-
-
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_an_image_shows_the_course_and_its_light() -> None:
-    """Pictures have the requested size and show the look."""
     world = MujocoWorld("car", seed=3, size=(64, 48))
     bright = world.picture()
     assert bright.shape == (48, 64, 3)
@@ -326,14 +273,3 @@ def test_a_moved_camera_changes_the_image() -> None:
     world.lay_out(3)
     np.testing.assert_array_equal(world.picture(), usual)
     world.close()
-
-
-@pytest.mark.gl
-@pytest.mark.usefixtures("gl")
-def test_lenses_change_images_only() -> None:
-    clear = MujocoWorld("car", seed=3, size=(64, 48))
-    night = MujocoWorld("car", seed=3, size=(64, 48), lenses=("night", "dirt"))
-    assert night.pose == clear.pose
-    assert night.picture().mean() < clear.picture().mean()
-    for world in (clear, night):
-        world.close()

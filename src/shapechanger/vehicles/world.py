@@ -59,7 +59,7 @@ class MujocoWorld:
         vehicle: Name of the vehicle, such as "car".
         world: Kind of course, such as "corridor"; None for the vehicle's own (`HOME`).
         seed: Seed of the course and of the first start.
-        size: Width and height of the camera's pictures in pixels; None for no camera.
+        size: Width and height of the camera's images, pixels; None for no camera.
         pitch_deg: Angle of the camera's axis below the horizon, degrees; None for the vehicle's.
         fovy_deg: Vertical field of view of the camera, degrees; None for the vehicle's.
         look: Light and colours; None for the usual look of the world.
@@ -105,7 +105,7 @@ class MujocoWorld:
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera: OnboardCamera | None = None
         if size is not None:
-            # Cameras are only loaded where there are pictures, and SciPy for their faults.
+            # Cameras are only loaded for images, and SciPy for their faults.
             from shapechanger.vehicles.cameras.camera import OnboardCamera
 
             self._camera = OnboardCamera(size)
@@ -204,7 +204,6 @@ class MujocoWorld:
         self._rest_at(pose)
         self._contacts.reset()
         self._progress.reset(pose.x, pose.y)
-        self._updated_at = pose.x, pose.y
 
     def path(self) -> CoursePath:
         """A path around the course for this vehicle, planned on the first call."""
@@ -220,11 +219,10 @@ class MujocoWorld:
         """
         path, here = self.path(), self._motion
         i = path.index(path.nearest(here.x, here.y).station)
-        x, y = path.points[i]
-        self._rest_at(Pose(float(x), float(y), float(path.heading[i])))
+        x, y = path.points[i].tolist()
+        self._rest_at(Pose(x, y, float(path.heading[i])))
         self._contacts.release()
-        self._progress.update(float(x), float(y))
-        self._updated_at = float(x), float(y)
+        self._progress.update(x, y)
 
     def zero_odometer(self) -> None:
         """Reset the travelled distance, as restarting the robot does."""
@@ -245,11 +243,10 @@ class MujocoWorld:
         if steps:
             self._rest_s -= steps * self._step_s
             self._step(outputs, steps)
-        x, y = self._motion[:2]
-        before_x, before_y = self._updated_at
-        if math.hypot(x - before_x, y - before_y) > _PROGRESS_M:
-            self._updated_at = x, y
-            self._progress.update(x, y)
+        here = self._motion[:2]
+        if math.dist(here, self._updated_at) > _PROGRESS_M:
+            self._updated_at = here
+            self._progress.update(*here)
 
     def inputs(self) -> Readings:
         """Quantities that sensors measure; see `World.inputs`."""
@@ -268,10 +265,8 @@ class MujocoWorld:
 
     def distance_m(self) -> float:
         """Distance by the shortest of three rays; see `World.distance_m`."""
-        found = self._rays(0.0, _CONE, _HEARD_M)
-        return max(
-            0.0, float(found.min(where=found >= 0.0, initial=math.inf)) - self.vehicle.nose_m
-        )
+        found = self._rays(0.0, _CONE, math.inf, _HEARD_M)
+        return max(0.0, float(found.min()) - self.vehicle.nose_m)
 
     def ranges_m(
         self, bearings: NDArray[np.float64], farthest_m: float = 6.0
@@ -281,28 +276,22 @@ class MujocoWorld:
         Args:
             bearings: Directions from the heading, rad, positive to the left, (n,); each from -pi/2
                 to pi/2, where the vehicle itself is not in the way.
-            farthest_m: Distance returned where there is nothing nearer, m.
+            farthest_m: Distance to report if nothing is nearer, m.
 
         Returns:
             Distances, m, (n,).
         """
-        found = self._rays(self.vehicle.nose_m, bearings, farthest_m)
-        found[found < 0.0] = farthest_m
+        found = self._rays(self.vehicle.nose_m, bearings, farthest_m, farthest_m)
         return np.minimum(found, farthest_m, out=found)
 
     def _rays(
-        self, ahead_m: float, bearings: NDArray[np.float64], farthest_m: float
+        self, ahead_m: float, bearings: NDArray[np.float64], nothing_m: float, farthest_m: float
     ) -> NDArray[np.float64]:
-        """Distances from a point ahead of the vehicle's middle, m, (n,); -1 for nothing."""
+        """Distances from a point ahead of the middle, m, (n,); `nothing_m` if nothing is hit."""
         pose, count = self._motion, len(bearings)
-        start = np.array(
-            (
-                pose.x + ahead_m * math.cos(pose.heading),
-                pose.y + ahead_m * math.sin(pose.heading),
-                0.5 * self.vehicle.camera.z,
-            )
-        )
-        angles = pose.heading + bearings
+        x = pose.x + ahead_m * math.cos(pose.heading)
+        y = pose.y + ahead_m * math.sin(pose.heading)
+        start, angles = np.array((x, y, 0.5 * self.vehicle.camera.z)), pose.heading + bearings
         rays = np.zeros((count, 3))
         rays[:, 0], rays[:, 1] = np.cos(angles), np.sin(angles)
         hit, found = np.empty(count, np.int32), np.empty(count)
@@ -310,21 +299,21 @@ class MujocoWorld:
             self.model, self.data, start, rays.ravel(), self._solid, True, self._chassis, hit,
             found, None, count, farthest_m,
         )  # fmt: skip
-        found[hit < 0] = -1.0
+        found[(hit < 0) | (found < 0.0)] = nothing_m
         return found
 
     def picture(self) -> NDArray[np.uint8]:
-        """Picture of the front camera; see `World.picture`.
+        """Image of the front camera; see `World.picture`.
 
         Raises:
             WorldError: If the world was made without a camera.
         """
         if self._camera is None:
             raise WorldError("This world has no camera: pass a `size`.")
-        picture = self._camera.picture(self.model, self.data)
+        image = self._camera.picture(self.model, self.data)
         for distort in self._distortions:
-            picture = distort(picture, self.course.seed)
-        return picture
+            image = distort(image, self.course.seed)
+        return image
 
     @property
     def reach(self) -> float:
@@ -340,7 +329,7 @@ class MujocoWorld:
         azimuth_rad: float | Sequence[float] = PORTRAITS_RAD,
         elevation_rad: float = _ABOVE_RAD,
     ) -> NDArray[np.uint8]:
-        """Picture of the vehicle in its world from outside, (height, width, 3).
+        """Image of the vehicle in its world from outside, (height, width, 3).
 
         Args:
             width: Width in pixels.
@@ -400,6 +389,7 @@ class MujocoWorld:
         self._bound.place(pose.x, pose.y, pose.heading)
         mujoco.mj_forward(self.model, self.data)
         self._motion = self._bound.motion()
+        self._updated_at = pose.x, pose.y
         self._rest_s = 0.0
         self._acceleration = (0.0, 0.0)
         self._rolled_m = self._bound.travelled_m()

@@ -29,34 +29,19 @@ def test_a_vehicle_at_rest_stays(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_top_speed_is_as_declared(name: str) -> None:
+def test_top_speed_is_as_declared_and_falls_with_the_voltage(name: str) -> None:
     here = ground(name)
     here.drive(6.0, AHEAD[name])
     assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
     pose = here.vehicle.motion()
     assert abs(pose.y) < 0.02
     assert here.vehicle.travelled_m() == pytest.approx(pose.x, rel=0.03)
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_speed_falls_with_the_voltage(name: str) -> None:
-    here = ground(name)
     here.drive(5.0, AHEAD[name], battery_v=0.8 * BATTERY_V)
     assert 0.6 < here.vehicle.motion().speed / here.kind.top_speed_mps < 0.9
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_reverse_is_negative(name: str) -> None:
-    here = ground(name)
-    here.drive(2.0, scaled(AHEAD[name], -0.5))
-    assert here.vehicle.motion().speed < -0.05
-    assert here.vehicle.travelled_m() < -0.03
-    assert here.vehicle.motion().x < -0.03
-
-
-@pytest.mark.parametrize("name", ALL)
 def test_left_is_counter_clockwise(name: str) -> None:
-    """Left turns are positive, and right turns mirror them."""
     here = ground(name)
     here.drive(3.0, TO_THE_LEFT[name])
     left = here.vehicle.motion().yaw_rate
@@ -74,18 +59,20 @@ def test_left_is_counter_clockwise(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("value", [0.03, -0.05])
-def test_small_outputs_do_not_move_a_vehicle(name: str, value: float) -> None:
-    """Outputs within the dead band have no effect."""
+def test_small_outputs_do_not_move_a_vehicle_and_larger_ones_move_it_their_way(
+    name: str, value: float
+) -> None:
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], value))
     assert here.pace() < 1e-3
     here.drive(2.0, scaled(AHEAD[name], math.copysign(0.2, value)))
-    assert here.pace() > 0.01
+    for moved in (here.vehicle.motion().speed, here.vehicle.motion().x, here.vehicle.travelled_m()):
+        assert math.copysign(moved, value) == moved
+        assert abs(moved) > 0.01
 
 
 @pytest.mark.parametrize("name", LAND)
 def test_zero_brakes_and_none_coasts(name: str) -> None:
-    """A shorted motor brakes more than an open one."""
     here = ground(name)
     ways: list[float] = []
     for value in (0.0, None):
@@ -148,7 +135,6 @@ def test_a_vehicle_comes_off_a_wall_slowly(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_random_outputs_are_stable(name: str) -> None:
-    """Random outputs and voltages keep the vehicle upright and its state finite."""
     rng = np.random.default_rng(7)
     here = ground(name, wall_x=2.0)
     with np.errstate(all="raise"):
@@ -165,7 +151,6 @@ def test_random_outputs_are_stable(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_place_resets_the_state(name: str) -> None:
-    """Motion after `place` does not depend on what was before."""
     here = ground(name)
     ends: list[tuple[float, float, float, float]] = []
     for _ in range(2):
@@ -178,17 +163,6 @@ def test_place_resets_the_state(name: str) -> None:
         pose = here.vehicle.motion()
         ends.append((pose.x, pose.y, pose.heading, here.vehicle.travelled_m()))
     assert ends[0] == ends[1]
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_speed_is_along_the_heading(name: str) -> None:
-    here = ground(name)
-    here.vehicle.place(0.0, 0.0, 2.5)
-    here.drive(2.0, AHEAD[name])
-    assert here.vehicle.motion().speed > 0.5
-    assert abs(here.vehicle.motion().lateral_speed) < 0.01
-    pose = here.vehicle.motion()
-    assert math.atan2(pose.y, pose.x) == pytest.approx(2.5, abs=0.02)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -213,7 +187,6 @@ def test_names_and_collision_bits(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_the_size_is_as_declared(name: str) -> None:
-    """The extent of the collision geoms is as declared."""
     here = ground(name)
     hits: list[float] = []
     for geom in map(here.model.geom, range(here.model.ngeom)):
@@ -230,7 +203,6 @@ def test_the_size_is_as_declared(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_the_camera_looks_ahead(name: str) -> None:
-    """The camera looks along the heading, level or slightly down."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 1.0)
     axes = here.data.camera("vehicle/camera").xmat.reshape(3, 3)

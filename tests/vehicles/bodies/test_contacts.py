@@ -65,18 +65,13 @@ def test_bouncing_counts_once() -> None:
     assert bench.touch.collisions == 2
 
 
-def test_a_contact_after_release_counts() -> None:
+def test_release_begins_another_collision_and_reset_clears_all() -> None:
     bench = _Bench()
     bench.stand(0.91)
     bench.touch.release()
     assert not bench.touch.touches
     bench.stand(0.91)
     assert bench.touch.collisions == 2
-
-
-def test_a_reset_clears_collisions() -> None:
-    bench = _Bench()
-    bench.stand(0.91)
     bench.touch.reset()
     assert bench.touch.collisions == 0
     assert not bench.touch.bumped

@@ -132,7 +132,6 @@ def test_meshes_are_read_by_object_and_material(tmp_path: Path) -> None:
 
 
 def test_the_top_is_brightest_and_the_bottom_darkest(tmp_path: Path) -> None:
-    """Brightness under an open sky falls from the top over the sides to the bottom."""
     path = tmp_path / "cube.obj"
     path.write_text(_CUBE)
     objects = read_obj(path)

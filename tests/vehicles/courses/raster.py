@@ -10,15 +10,10 @@ from shapechanger.vehicles.courses.geometry import wall_segments
 
 
 def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[float, float]]:
-    """Return a grid of free and blocked cells, seen from above.
+    """Return a grid of cells, and x and y of the centre of cell [0, 0], m.
 
-    Args:
-        course: The course.
-        cell_m: Width of a cell, m.
-
-    Returns:
-        Grid, (rows, columns), True where the centre of a cell is outside the lane or in an
-        obstacle; rows go along y and columns along x. And x and y of the centre of cell [0, 0], m.
+    Cells are True if their centre is outside the lane or in an obstacle; rows go along y and
+    columns along x.
     """
     feet = wall_segments(course.walls)
     low = np.minimum(feet[:, :2], feet[:, 2:]).min(axis=0) - 1.5 * cell_m
@@ -42,7 +37,6 @@ def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[f
 def _fill(
     blocked: NDArray[np.bool_], obstacle: Obstacle, x0: float, y0: float, cell_m: float
 ) -> None:
-    """Block the cells below an obstacle."""
     reach = float(np.hypot(obstacle.length, obstacle.width)) / 2.0
     rows, columns = blocked.shape
     c1 = max(0, int((obstacle.x - reach - x0) / cell_m))

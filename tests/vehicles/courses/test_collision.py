@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import mujoco
-import numpy as np
 import pytest
 
 from shapechanger.vehicles.courses.course import Look
@@ -36,16 +35,10 @@ def _touched(model: mujoco.MjModel, *place: float) -> set[str]:
 
 @pytest.mark.parametrize("world", _WORLDS)
 def test_every_name_has_the_prefix_of_the_world(world: str) -> None:
-    """All elements of a course are named "world/..."."""
     model = _compiled(world)
-    names = [
-        *(model.geom(i).name for i in range(model.ngeom)),
-        *(model.mat(i).name for i in range(model.nmat)),
-        *(model.tex(i).name for i in range(model.ntex)),
-        *(model.mesh(i).name for i in range(model.nmesh)),
-        *(model.light(i).name for i in range(model.nlight)),
-    ]
-    assert all(name.startswith("world/") for name in names)
+    kinds = (model.geom, model.ngeom), (model.mat, model.nmat), (model.tex, model.ntex)
+    for element, count in (*kinds, (model.mesh, model.nmesh), (model.light, model.nlight)):
+        assert all(element(i).name.startswith("world/") for i in range(count))
 
 
 @pytest.mark.parametrize("world", _WORLDS)
@@ -57,10 +50,8 @@ def test_collision_and_visual_geoms_are_separate(world: str) -> None:
     assert (model.geom_type[~touchable] == mujoco.mjtGeom.mjGEOM_MESH).all()
 
 
-def test_walls_and_obstacles_are_numbered() -> None:
-    """Collision geoms are numbered like the walls and obstacles of the course."""
-    model = _compiled("corridor")
-    course = square("corridor")
+def test_collision_geoms_are_numbered_like_walls_and_obstacles() -> None:
+    model, course = _compiled("corridor"), square("corridor")
     for number in range(len(course.walls)):
         assert model.geom(f"world/wall/{number}").contype == 1
     for number, obstacle in enumerate(course.obstacles):
@@ -85,11 +76,3 @@ def test_the_visible_side_of_a_wall_is_its_collision_surface() -> None:
     model = _compiled("corridor", **_HULL)
     assert _touched(model, 3.5, -0.89, 0.3) == set()
     assert _touched(model, 3.5, -0.91, 0.3) == {"world/wall/0"}
-
-
-def test_a_course_adds_no_mass_and_no_joints() -> None:
-    """A vehicle can be added to the same model."""
-    model = _compiled("yard", **_HULL)
-    assert model.body_mass[0] == 0.0
-    assert model.nv == 6
-    np.testing.assert_array_equal(model.body("ball").parentid, [0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,12 +12,13 @@ from scipy import ndimage
 
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles.courses import lay_out
-from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, Course, Obstacle
+from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, Course
 from shapechanger.vehicles.courses.geometry import (
     any_crossing,
     distances_from_obstacle,
     distances_to_segments,
     obstacle_gap,
+    turn_angles,
     wall_segments,
 )
 from tests.vehicles.courses.raster import occupancy
@@ -38,13 +40,6 @@ def _courses(world: str) -> list[Course]:
     return [_laid(world, seed) for seed in _SEEDS]
 
 
-def _bends(course: Course) -> np.ndarray:
-    """Return the left turn of the route at each point, rad."""
-    steps = np.diff(course.route, axis=0, append=course.route[:1])
-    headings = np.arctan2(steps[:, 1], steps[:, 0])
-    return (np.diff(headings, prepend=headings[-1:]) + math.pi) % (2 * math.pi) - math.pi
-
-
 def _same(one: Course, other: Course) -> bool:
     return (
         np.array_equal(one.route, other.route)
@@ -56,13 +51,11 @@ def _same(one: Course, other: Course) -> bool:
 
 @each_world
 def test_the_seed_determines_the_course(world: str) -> None:
-    """Equal seeds give equal courses, different seeds different ones."""
     for seed in _SEEDS[:5] + _SEEDS[-5:]:
         np.random.seed(seed % 7)  # noqa: NPY002 - The global state must not matter.
         assert _same(lay_out(world, seed), _laid(world, seed))
     courses = _courses(world)
     assert not any(_same(a, b) for i, a in enumerate(courses) for b in courses[:i])
-    assert {(c.world, c.seed) for c in courses} == {(world, seed) for seed in _SEEDS}
 
 
 @pytest.mark.parametrize("seed", [0, HELD_OUT[0]])
@@ -86,10 +79,9 @@ def test_the_route_is_closed_and_evenly_spaced(world: str) -> None:
 
 @each_world
 def test_courses_turn_both_ways(world: str) -> None:
-    """Each course turns left and right, and loops run in both directions."""
     sums = set[int]()
     for course in _courses(world):
-        bends = _bends(course)
+        bends = turn_angles(course.route)
         assert bends[bends > 0].sum() > 0.3
         assert bends[bends < 0].sum() < -0.3
         sums.add(round(bends.sum() / (2 * math.pi)))
@@ -98,16 +90,14 @@ def test_courses_turn_both_ways(world: str) -> None:
 
 @each_world
 def test_curvature_is_limited(world: str) -> None:
-    """The curvature of the route stays within the limit of its world."""
     for course in _courses(world):
         # Averaged over half a metre, since angles between single points are coarse.
-        turned = np.abs(ndimage.uniform_filter1d(_bends(course), 5, mode="wrap"))
+        turned = np.abs(ndimage.uniform_filter1d(turn_angles(course.route), 5, mode="wrap"))
         assert course.spacing / turned.max() >= 0.97 * _RADII[world]
 
 
 @each_world
 def test_walls_form_closed_lines(world: str) -> None:
-    """Each wall ends where exactly one other begins."""
     for course in _courses(world):
         starts = [wall.start for wall in course.walls]
         ends = [wall.end for wall in course.walls]
@@ -151,10 +141,9 @@ def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
 
 @each_world
 def test_obstacles_do_not_overlap(world: str) -> None:
-    """Obstacles overlap neither walls nor each other."""
     for course in _courses(world):
         feet = wall_segments(course.walls)
-        blocked, (x0, y0) = occupancy(_without(course), 0.05)
+        blocked, (x0, y0) = occupancy(replace(course, obstacles=()), 0.05)
         for i, obstacle in enumerate(course.obstacles):
             assert distances_from_obstacle(obstacle, feet).min() > 0.0
             assert not blocked[round((obstacle.y - y0) / 0.05), round((obstacle.x - x0) / 0.05)]
@@ -163,7 +152,6 @@ def test_obstacles_do_not_overlap(world: str) -> None:
 
 @each_world
 def test_the_start_is_free(world: str) -> None:
-    """The route is free around its first point."""
     for course in _courses(world):
         n = len(course.route)
         behind, before = round(1.5 / course.spacing), round(2.0 / course.spacing)
@@ -211,7 +199,7 @@ def test_corridors_have_corners_and_doors() -> None:
     """Corridors have at least six corners and, over all seeds, all kinds of wall and furniture."""
     surfaces, kinds = set[str](), set[str]()
     for course in _courses("corridor"):
-        turned = np.abs(_bends(course)).sum() / (math.pi / 2.0)
+        turned = np.abs(turn_angles(course.route)).sum() / (math.pi / 2.0)
         assert turned == pytest.approx(round(turned), abs=0.01)
         assert turned >= 5.99
         assert {wall.height for wall in course.walls} == {2.5}
@@ -241,7 +229,6 @@ def test_only_harbours_have_currents() -> None:
 
 
 def test_unknown_worlds_and_seeds_are_refused() -> None:
-    """Errors list the worlds, or explain what is wrong with the seed."""
     with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
         lay_out("harbor", 0)
     with pytest.raises(WorldError, match="from 0, got -1"):
@@ -249,7 +236,6 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
 
 
 def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search for a layout gives up with an error."""
     from shapechanger.vehicles.courses import channel
 
     def never(world: str, rng: np.random.Generator, seed: int) -> Course | None:
@@ -258,11 +244,3 @@ def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(channel, "open_course", never)
     with pytest.raises(WorldError, match="No yard with seed 3"):
         lay_out("yard", 3)
-
-
-def _without(course: Course) -> Course:
-    obstacles: tuple[Obstacle, ...] = ()
-    return Course(
-        course.world, course.seed, course.route, course.half_width, course.walls, obstacles,
-        course.lamps, course.ceiling_m, course.gap_m,
-    )  # fmt: skip

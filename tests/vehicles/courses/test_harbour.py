@@ -11,16 +11,9 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Look, Obstacle
-from shapechanger.vehicles.courses.harbour import (
-    BANK_M,
-    add_banks,
-    add_dinghy,
-    extent,
-    fittings,
-    moored,
-)
-from shapechanger.vehicles.courses.surfaces import Surfaces
-from shapechanger.vehicles.courses.textures import QuadMesh
+from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
+from shapechanger.vehicles.courses.harbour import BANK_M, add_banks, extent, fittings, moored
+from shapechanger.vehicles.courses.surfaces import QuadMesh, Surfaces
 
 _SEEDS = (0, 1, 2, 5, 1_000_000)
 # Tyres and ladders stand out of their wall.
@@ -44,11 +37,7 @@ def _in_lane(course: Course, points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _from_walls(course: Course, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of points, m, (n, 2), from the nearest wall, m, (n,)."""
-    starts = np.array([wall.start for wall in course.walls])
-    ways = np.array([wall.end for wall in course.walls]) - starts
-    away = points[:, None, :] - starts
-    share = np.clip((away * ways).sum(axis=2) / (ways * ways).sum(axis=1), 0.0, 1.0)
-    return np.linalg.norm(away - share[..., None] * ways, axis=2).min(axis=1)
+    return distances_to_segments(points, wall_segments(course.walls)).min(axis=1)
 
 
 def _points(mesh: QuadMesh) -> NDArray[np.float64]:
@@ -102,18 +91,17 @@ def test_obstacles_are_drawn_where_the_course_says(seed: int) -> None:
             np.testing.assert_allclose(np.abs(flat).max(axis=0), half, rtol=0.01)
 
 
-def test_a_dinghy_is_blunt() -> None:
+@pytest.mark.parametrize("length", [1.600, 1.601], ids=["open", "with a cabin"])
+def test_a_dinghy_is_blunt(length: float) -> None:
     """Its bow is at least 70 % as wide as its collision box, so that a boat meets what it sees."""
-    for length in (1.600, 1.601):  # An open one, and one with a cabin.
-        mesh = QuadMesh()
-        add_dinghy(mesh, Obstacle("dinghy", 0.0, 0.0, 0.0, length, 0.8, 0.45), 1.0)
-        bow = _points(mesh)
-        bow = bow[bow[:, 0] > 0.49 * length]
-        assert np.abs(bow[:, 1]).max() > 0.7 * 0.4
+    dinghy = Obstacle("dinghy", 0.0, 0.0, 0.0, length, 0.8, 0.45)
+    course = replace(lay_out("harbour", 0), obstacles=(dinghy,))
+    bow = _points(Surfaces(course, Look.of("harbour")).obstacles())
+    bow = bow[bow[:, 0] > 0.49 * length]
+    assert np.abs(bow[:, 1]).max() > 0.7 * 0.4
 
 
 def test_the_far_shore_is_within_the_water() -> None:
-    """The water reaches the shore, and the shore surrounds the course."""
     course = lay_out("harbour", 0)
     middle, radius = extent(course)
     water = _points(Surfaces(course, Look.of("harbour")).ground())

@@ -12,19 +12,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import mujoco
 
 from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, VehicleModel
-from shapechanger.vehicles.bodies.parts import (
-    HOBBY_MOTOR,
-    HOBBY_SERVO,
-    CameraMount,
-    add_camera,
-    add_hull,
-)
-from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress
+from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR, CameraMount, DcMotor
 
 _WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
 # Share of its full speed that the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
@@ -39,29 +33,29 @@ class Propeller:
     Attributes:
         diameter: Diameter, m.
         thrust: Thrust coefficient at J = 0.
-        thrust_ends: J at which the thrust is 0.
+        zero_thrust_j: J at which the thrust is 0.
         torque: Torque coefficient at J = 0.
-        torque_ends: J at which the torque is 0.
+        zero_torque_j: J at which the torque is 0.
         astern: Share of thrust and torque when turning backwards.
         wake: Speed of the water at the propeller, as a share of the boat's.
-        pushes: Share of the thrust that moves the boat; the rest is thrust deduction.
+        thrust_deduction: Share of the thrust that is lost, since the propeller sucks at the hull.
     """
 
     diameter: float
     thrust: float
-    thrust_ends: float
+    zero_thrust_j: float
     torque: float
-    torque_ends: float
+    zero_torque_j: float
     astern: float
     wake: float
-    pushes: float
+    thrust_deduction: float
 
     def loads(self, n: float, u: float) -> tuple[float, float]:
         """Thrust, N, and torque, N·m, at turns per second and a speed through the water, m/s."""
         inflow = self.wake * u / self.diameter
         common = _WATER_DENSITY * self.diameter**4 * abs(n) * (self.astern if n < 0.0 else 1.0)
-        thrust = common * self.thrust * (n - inflow / self.thrust_ends)
-        torque = common * self.diameter * self.torque * (n - inflow / self.torque_ends)
+        thrust = common * self.thrust * (n - inflow / self.zero_thrust_j)
+        torque = common * self.diameter * self.torque * (n - inflow / self.zero_torque_j)
         return thrust, torque
 
     def wash(self, thrust: float, u: float) -> float:
@@ -102,7 +96,7 @@ class Fin:
     def force(self, flow: float, v: float, r: float, angle: float) -> tuple[float, float, float]:
         """Forces X and Y, N, and moment N, N·m, in a flow from ahead, m/s.
 
-        `angle` is that of the blade, rad, counter-clockwise; a negative one turns the boat left.
+        `angle` of the blade is in rad, counter-clockwise; a negative one turns the boat left.
         """
         aside = v + self.x * r
         sine, cosine = math.sin(angle), math.cos(angle)
@@ -120,7 +114,7 @@ _MASS: Final = _WATER_DENSITY * _BLOCK * _LENGTH * _WIDTH * _DRAUGHT
 # Radius of gyration in yaw over length: 0.25, the usual estimate for ships (Fossen, chapter 6).
 _INERTIA: Final = _MASS * (0.25 * _LENGTH) ** 2
 # Mass and inertia with the water that accelerates with the hull: ahead, to the side and in yaw.
-# The shares are those of CyberShip II, a model of 1.26 m: R. Skjetne, T. I. Fossen and P.
+# The shares were measured for CyberShip II, a model of 1.26 m: R. Skjetne, T. I. Fossen and P.
 # Kokotović, Adaptive maneuvering, Automatica 41 (2005), table of parameters.
 _ALONG: Final = _MASS + 2.0 / 23.8 * _MASS  # kg
 _ACROSS: Final = _MASS + 10.0 / 23.8 * _MASS  # kg
@@ -174,31 +168,22 @@ def _acceleration(
 _PROPELLER: Final = Propeller(
     diameter=0.035,
     thrust=0.38,
-    thrust_ends=0.95,
+    zero_thrust_j=0.95,
     torque=0.045,
-    torque_ends=1.1,
+    zero_torque_j=1.1,
     astern=0.5,
     wake=0.85,
-    pushes=0.9,
+    thrust_deduction=0.1,
 )
-_TWIN: Final = Propeller(0.028, 0.38, 0.95, 0.045, 1.1, 0.5, 0.9, 0.9)
-# Propeller of each part, and its position to the left, m.
-_PROPELLERS: Final = {
-    "propeller": (_PROPELLER, 0.0),
-    "left propeller": (_TWIN, 0.07),
-    "right propeller": (_TWIN, -0.07),
-}
-_SHAFT_X: Final = -0.23  # m
+_TWIN: Final = Propeller(0.028, 0.38, 0.95, 0.045, 1.1, 0.5, 0.9, 0.1)
+_PROPELLERS: Final = {"propeller": _PROPELLER, "left propeller": _TWIN, "right propeller": _TWIN}
 
 # The motor with a gear of 2.5:1 instead of its own 4.4:1, as sold for model boats.
 _MOTOR: Final = HOBBY_MOTOR.geared(2.5 / 4.4)
-_PROPELLER_INERTIA: Final = 2e-6  # kg·m2, with entrained water: an estimate
 
 _RUDDER: Final = Fin(x=-0.27, height=0.045, chord=0.035)
 _SKEG: Final = Fin(x=-0.20, height=0.035, chord=0.10)
 _FULL_RUDDER: Final = math.radians(35.0)  # The usual limit of ships.
-
-_CAMERA: Final = CameraMount(x=0.16, y=0.0, z=0.14, pitch_rad=math.radians(3.0))
 
 _TURN: Final = 2.0 * math.pi
 
@@ -210,10 +195,19 @@ class Floating(BoundVehicle):
     the manoeuvring equations.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        super().__init__(model, data, dict.fromkeys(_PROPELLERS, _MOTOR))
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor) -> None:
+        super().__init__(model, data, motor)
         self._dt = float(model.opt.timestep)
-        self._shafts = {part: int(model.joint(f"vehicle/{part}").dofadr[0]) for part in _PROPELLERS}
+        chassis = model.body("vehicle/chassis")
+        self._mass, self._inertia = float(chassis.mass[0]), float(chassis.inertia[2])
+        # Address in qvel of the shaft of each propeller, and its position to the left, m.
+        self._shafts = {
+            part: (
+                int(model.joint(f"vehicle/{part}").dofadr[0]),
+                float(model.body(f"vehicle/{part}").pos[1]),
+            )
+            for part in _PROPELLERS
+        }
         # Three joints in a row: x, y and yaw.
         self._qpos0 = int(model.joint("vehicle/chassis x").qposadr[0])
         self._qvel0 = int(model.joint("vehicle/chassis x").dofadr[0])
@@ -268,15 +262,16 @@ class Floating(BoundVehicle):
         self._logged_s = now_s
         x, y, n = _SKEG.force(u, v, r, 0.0)
         flow = u
-        for part, (propeller, beside) in _PROPELLERS.items():
-            rate, dof = self._drives[part].rate(), self._shafts[part]
+        for part, propeller in _PROPELLERS.items():
+            rate, (dof, aside) = self._drives[part].rate(), self._shafts[part]
             if abs(rate) < 1e-3:  # Stopped: neither thrust nor torque.
                 self._push[dof] = 0.0
                 continue
             thrust, torque = propeller.loads(rate / _TURN, u)
             self._push[dof] = -torque
-            x += propeller.pushes * thrust
-            n -= propeller.pushes * thrust * beside
+            push = (1.0 - propeller.thrust_deduction) * thrust
+            x += push
+            n -= push * aside
             if part == "propeller" and thrust > 0.0 and u >= 0.0:
                 # The wash meets a part of the rudder. Squares of speeds are averaged over its
                 # height, because forces are proportional to them.
@@ -288,59 +283,11 @@ class Floating(BoundVehicle):
         du, dv, dr = _acceleration(u, v, r, x, y, n)
         # From rates in the turning frame of the boat to the acceleration in the world. A uniform
         # flow adds nothing, because u and v are relative to it.
-        along, across = _MASS * (du - r * v), _MASS * (dv + r * u)
+        along, across = self._mass * (du - r * v), self._mass * (dv + r * u)
         i = self._qvel0
         self._push[i] = along * cosine - across * sine
         self._push[i + 1] = along * sine + across * cosine
-        self._push[i + 2] = _INERTIA * dr
-
-
-def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
-    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    box, ellipsoid = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_ELLIPSOID
-    chassis = spec.worldbody.add_body(name="vehicle/chassis")
-    chassis.add_joint(name="vehicle/chassis x", type=slide, axis=[1.0, 0.0, 0.0])
-    chassis.add_joint(name="vehicle/chassis y", type=slide, axis=[0.0, 1.0, 0.0])
-    chassis.add_joint(name="vehicle/chassis yaw", type=hinge, axis=[0.0, 0.0, 1.0])
-    chassis.explicitinertial = True
-    chassis.mass = _MASS
-    chassis.inertia = [0.1 * _INERTIA, _INERTIA, _INERTIA]
-    # Collision geoms: a box amidships and a rounded bow, without mass.
-    add_hull(chassis, "vehicle/hull", box, (-0.06, 0.0, 0.02), (0.24, _WIDTH / 2, 0.05), 0.0)
-    bow = (0.16, 0.0, 0.02), (0.14, _WIDTH / 2, 0.05)
-    add_hull(chassis, "vehicle/bow", ellipsoid, *bow, 0.0)
-    dress(chassis, "chassis", paint)
-    add_shadow(chassis, (-0.29, -0.08), (0.20, 0.08), paint)
-    for part, (_, y) in _PROPELLERS.items():  # Below the water, and so not drawn.
-        name, armature = f"vehicle/{part}", _MOTOR.rotor_inertia + _PROPELLER_INERTIA
-        place = [_SHAFT_X, y, -_DRAUGHT]
-        _add_massless(chassis, name, place, [1.0, 0.0, 0.0], armature)
-        _MOTOR.add(spec, name).wrap_joint(name, 1.0)
-    place, damping = [_RUDDER.x, 0.0, -_DRAUGHT], HOBBY_SERVO.damping
-    name, axis = "vehicle/rudder", [0.0, 0.0, 1.0]
-    stock = _add_massless(chassis, name, place, axis, 2e-4, damping)
-    dress(stock, "rudder", paint, ground_z=_DRAUGHT)  # Its head turns behind the transom.
-    HOBBY_SERVO.add(spec, name, name)
-    add_camera(chassis, _CAMERA)
-
-
-def _add_massless(
-    chassis: mujoco.MjsBody,
-    name: str,
-    pos: list[float],
-    axis: list[float],
-    armature: float,
-    damping: float = 0.0,
-) -> mujoco.MjsBody:
-    """Add a turning part whose weight belongs to the hull, so that its middle stays amidships."""
-    body = chassis.add_body(name=name, pos=pos)
-    body.explicitinertial = True
-    body.mass = 1e-4
-    body.inertia = [1e-8, 1e-8, 1e-8]
-    body.add_joint(
-        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, armature=armature, damping=damping
-    )
-    return body
+        self._push[i + 2] = self._inertia * dr
 
 
 BOAT: Final = VehicleModel(
@@ -350,9 +297,9 @@ BOAT: Final = VehicleModel(
     width_m=_WIDTH,
     nose_m=_LENGTH / 2,
     floats=True,
-    camera=_CAMERA,
+    camera=CameraMount(x=0.16, y=0.0, z=0.14, pitch_rad=math.radians(3.0)),
     top_speed_mps=1.2,
     turning_radius_m=0.7,  # At full throttle; measured in a test.
-    build=_build,
-    bind=Floating,
+    motor=_MOTOR,
+    bind=partial(Floating, motor=_MOTOR),
 )

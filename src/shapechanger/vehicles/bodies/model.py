@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 
 from shapechanger.vehicles.bodies.parts import CameraMount, DcMotor
-from shapechanger.vehicles.bodies.visuals import Paint
 
 Outputs = Mapping[str, float | None]
 """Output of each part, from -1 to 1; None for a motor that is disconnected.
@@ -83,18 +82,16 @@ class BoundVehicle(ABC):
     Args:
         model: Compiled model with the vehicle.
         data: Its state.
-        motors: Motor of each driving part; its actuator is named "vehicle/" plus the part.
+        motor: Motor of each tendon; a tendon is named "vehicle/" plus the part that it drives.
     """
 
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, motors: Mapping[str, DcMotor]
-    ) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, motor: DcMotor) -> None:
         self._model = model
         self._data = data
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        tendons = (model.tendon(i).name for i in range(model.ntendon))
         self._drives = {
-            part: MotorDrive(model, data, f"vehicle/{part}", motor)
-            for part, motor in motors.items()
+            name.removeprefix("vehicle/"): MotorDrive(model, data, name, motor) for name in tendons
         }
         self._flow = (0.0, 0.0)
         # Addresses in qpos and qvel of the joints of wheels, rudders and trailers.
@@ -156,8 +153,8 @@ class VehicleModel:
         camera: Mount of its camera.
         top_speed_mps: Speed at full throttle and `BATTERY_V`, on level ground or in still water.
         turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
-        build: Adds its body, joints, motors and looks to a model.
-        bind: Finds them in the compiled model.
+        motor: Motor of each of its driving parts.
+        bind: Finds its joints and motors in a compiled model.
     """
 
     name: str
@@ -170,7 +167,7 @@ class VehicleModel:
     camera: CameraMount
     top_speed_mps: float
     turning_radius_m: float
-    build: Callable[[mujoco.MjSpec, Paint], None]
+    motor: DcMotor
     bind: Callable[[mujoco.MjModel, mujoco.MjData], BoundVehicle]
 
     @property

@@ -1,4 +1,4 @@
-"""Parts that vehicles are built from: hulls, wheels, cameras, motors and servos."""
+"""Parts of vehicles: cameras, motors and servos."""
 
 from __future__ import annotations
 
@@ -8,111 +8,11 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import WorldError
-from shapechanger.vehicles.bodies.visuals import OWN_VIEW, Paint, dress_wheel
-
-# Collision bits. MuJoCo lets two geoms collide if the contype of one shares a bit with the
-# conaffinity of the other. Walls have the type 1 and the affinity 2, the ground 4 and 8.
-_HULL_TYPE, _HULL_MEETS = 2, 1  # Collides with walls and obstacles, not with the ground.
-_WHEEL_TYPE, _WHEEL_MEETS = 10, 5  # Collides with all of them.
-
-_HIDDEN_GROUP: Final = 3
-
-HULL_FRICTION: Final = 0.2
-"""Friction between a smooth plastic hull and a wall; an estimate, below that of rubber tyres."""
-
-_WHEEL_FRICTION: Final = 0.3  # The larger one of the wheel and the ground counts.
-_WHEEL_DAMPING: Final = 1e-4  # N·m·s/rad in the bearing; small, an estimate.
 
 PI_CAMERA_FOVY_DEG: Final = 48.8
 """Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
-
-
-def add_look(
-    body: mujoco.MjsBody,
-    kind: mujoco.mjtGeom,
-    pos: ArrayLike,
-    size: ArrayLike,
-    material: str,
-    *,
-    euler_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> None:
-    """Add a simple visual geom for the own camera: without mass and collisions.
-
-    Its sizes are MuJoCo's, m; its orientation is x-y-z Euler angles.
-    """
-    quat = np.empty(4)
-    mujoco.mju_euler2Quat(quat, np.radians(euler_deg), "xyz")
-    body.add_geom(
-        type=kind, pos=pos, size=_three(size), quat=quat, material=material, mass=0.0,
-        contype=0, conaffinity=0, group=OWN_VIEW,
-    )  # fmt: skip
-
-
-def add_hull(
-    body: mujoco.MjsBody,
-    name: str,
-    kind: mujoco.mjtGeom,
-    pos: ArrayLike,
-    size: ArrayLike,
-    mass: float,
-) -> None:
-    """Add a hidden collision geom with a mass, kg, and slightly soft contacts."""
-    body.add_geom(
-        name=name, type=kind, pos=pos, size=_three(size), mass=mass,
-        friction=[HULL_FRICTION, 0.005, 0.0001], priority=1, condim=3,
-        solref=[0.02, 1.0], solimp=[0.8, 0.95, 0.005, 0.5, 2.0], group=_HIDDEN_GROUP,
-        contype=_HULL_TYPE, conaffinity=_HULL_MEETS,
-    )  # fmt: skip
-
-
-def add_wheel(
-    body: mujoco.MjsBody,
-    name: str,
-    pos: tuple[float, float, float],
-    radius: float,
-    width: float,
-    mass: float,
-    paint: Paint,
-    *,
-    armature: float = 0.0,
-    friction: float | None = None,
-    tyre: str = "tyre",
-) -> mujoco.MjsBody:
-    """Add a wheel; rolling forward is positive.
-
-    It collides as a flat ellipsoid, which touches the ground in one point.
-
-    Args:
-        body: Body to extend.
-        name: Name of its body, joint and geom.
-        pos: Position of its middle, m.
-        radius: Radius, m.
-        width: Width, m.
-        mass: Mass, kg.
-        paint: Source of its materials.
-        armature: Share of the motor's rotor inertia, kg·m2.
-        friction: Friction on any ground; None for that of the ground.
-        tyre: Colour of the tyre, or "track" for a road wheel within a track.
-    """
-    wheel = body.add_body(name=name, pos=pos)
-    wheel.add_joint(
-        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 1.0, 0.0],
-        armature=armature, damping=_WHEEL_DAMPING,
-    )  # fmt: skip
-    wheel.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=[radius, width / 2, radius],
-        mass=mass, friction=[friction or _WHEEL_FRICTION, 0.005, 0.0001],
-        priority=0 if friction is None else 1, condim=3, group=_HIDDEN_GROUP,
-        contype=_WHEEL_TYPE, conaffinity=_WHEEL_MEETS,
-    )  # fmt: skip
-    aside = (90.0, 0.0, 0.0)
-    size, black = (radius, width / 2), paint(tyre)
-    add_look(wheel, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.0, 0.0, 0.0), size, black, euler_deg=aside)
-    dress_wheel(wheel, radius, paint)
-    return wheel
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,11 +40,6 @@ class CameraMount:
             pitch_rad=self.pitch_rad if pitch_deg is None else math.radians(pitch_deg),
             fovy_deg=self.fovy_deg if fovy_deg is None else fovy_deg,
         )
-
-
-def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
-    """Add the camera "vehicle/camera", which looks ahead."""
-    aim_camera(body.add_camera(name="vehicle/camera"), mount)
 
 
 def aim_camera(camera: mujoco.MjsCamera, mount: CameraMount) -> None:
@@ -216,12 +111,6 @@ def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> Non
         place.quat[:] = turned
 
 
-def _three(size: ArrayLike) -> NDArray[np.float64]:
-    """Sizes padded with zeros to three numbers."""
-    given = np.asarray(size, dtype=np.float64)
-    return np.concatenate([given, np.zeros(3 - len(given))])
-
-
 BATTERY_V: Final = 7.2
 """Voltage of six NiMH cells, the usual battery of cars of this size."""
 
@@ -277,22 +166,23 @@ class DcMotor:
         current = (volts - self.volts_per_speed * speed) / self.resistance
         return max(0.0, current if volts > 0.0 else -current) if volts else 0.0
 
-    def add(self, spec: mujoco.MjSpec, name: str) -> mujoco.MjsTendon:
-        """Add the motor as an actuator controlled by a voltage, and its shaft as a fixed tendon.
+    def add(self, spec: mujoco.MjSpec) -> None:
+        """Let a motor of this kind turn each tendon of a vehicle, controlled by a voltage.
 
         MuJoCo's affine actuator implements the motor's equation:
         https://mujoco.readthedocs.io/en/stable/XMLreference.html#actuator-general
         """
-        shaft = spec.add_tendon(
-            name=name,
-            frictionloss=self.friction,
+        driven = [joint for joint in spec.joints if joint.classname.name == "driven"]
+        for joint in driven:
+            joint.armature += self.rotor_inertia / (len(driven) // len(spec.tendons))
+        for shaft in spec.tendons:
+            shaft.frictionloss = self.friction
             # Stiffer than MuJoCo's default, so that friction holds the shaft.
-            solref_friction=[0.01, 1.0],
-            solimp_friction=[0.99, 0.999, 0.001, 0.5, 2.0],
-        )
-        gain = self.torque_per_current / self.resistance
-        _add_actuator(spec, mujoco.mjtTrn.mjTRN_TENDON, name, name, gain, 0.0, -self.damping)
-        return shaft
+            shaft.solref_friction = [0.01, 1.0]
+            shaft.solimp_friction = [0.99, 0.999, 0.001, 0.5, 2.0]
+            motor = spec.actuator(shaft.name)
+            motor.gainprm[0] = self.torque_per_current / self.resistance
+            motor.biasprm[2] = -self.damping
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,31 +204,16 @@ class ServoMotor:
         """Damping of its joint, N·m·s/rad: at full torque it turns at the free rate."""
         return self.stall_torque / self.free_rate
 
-    def add(self, spec: mujoco.MjSpec, name: str, joint: str, share: float = 1.0) -> None:
-        """Add the servo as an actuator controlled by an angle, rad, with a share of its torque."""
-        torque = share * self.stall_torque
-        stiffness = torque / self.error_at_stall
-        servo = _add_actuator(
-            spec, mujoco.mjtTrn.mjTRN_JOINT, name, joint, stiffness, -stiffness, 0.0
-        )
-        servo.forcelimited, servo.forcerange = True, [-torque, torque]
-
-
-def _add_actuator(
-    spec: mujoco.MjSpec,
-    kind: mujoco.mjtTrn,
-    name: str,
-    target: str,
-    gain: float,
-    stiffness: float,
-    damping: float,
-) -> mujoco.MjsActuator:
-    """Add an actuator whose force is linear in its control, its length and its velocity."""
-    return spec.add_actuator(
-        name=name, trntype=kind, target=target, gaintype=mujoco.mjtGain.mjGAIN_FIXED,
-        gainprm=[gain, *[0.0] * 9], biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-        biasprm=[0.0, stiffness, damping, *[0.0] * 7],
-    )  # fmt: skip
+    def add(self, spec: mujoco.MjSpec) -> None:
+        """Let one servo turn all steering joints of a vehicle, controlled by their angles, rad."""
+        joints = [joint for joint in spec.joints if joint.classname.name == "steering"]
+        for joint in joints:
+            joint.damping[0] = self.damping / len(joints)
+            torque = self.stall_torque / len(joints)
+            servo = spec.actuator(joint.name)
+            servo.gainprm[0] = torque / self.error_at_stall
+            servo.biasprm[1] = -servo.gainprm[0]
+            servo.forcelimited, servo.forcerange = True, [-torque, torque]
 
 
 # Pololu item 4801, a motor of 25 mm with a gear of 4.4:1: https://www.pololu.com/product/4801. At

@@ -1,11 +1,12 @@
-"""Looks of vehicles: their colours, and the meshes that are seen from outside."""
+"""Visuals of vehicles: their colours, and the meshes that are seen from outside."""
 
 from __future__ import annotations
 
 import functools
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,7 +19,7 @@ triangle is there twice."""
 OWN_VIEW: Final = 1
 """Group of the geoms that only the vehicle's own camera sees.
 
-Policies are trained on its pictures, so these simple shapes stay as they are.
+Policies are trained on its images, so these simple shapes stay as they are.
 """
 
 OUTSIDE_VIEW: Final = 2
@@ -30,7 +31,7 @@ class Solids(NamedTuple):
 
     Attributes:
         faces: Corners of the faces.
-        uvs: Texture coordinates of the corners, (n, 4, 2); empty without any.
+        uvs: Texture coordinates of the corners, (n, 4, 2 or 3); empty without any.
     """
 
     faces: Faces
@@ -54,7 +55,7 @@ def read_obj(path: Path) -> Mapping[str, Mapping[str, Solids]]:
         elif kind == "f":
             corners = [[int(i) - 1 for i in word.split("/")] for word in rest.split()]
             faces.append([*corners, corners[-1]][:4])
-    points, uvs = (np.array(numbers[kind]).reshape(-1, n) for kind, n in (("v", 3), ("vt", 2)))
+    points, uvs = np.array(numbers["v"]), np.array(numbers["vt"])
 
     def solids(faces: list[list[list[int]]]) -> Solids:
         at = np.array(faces)
@@ -66,17 +67,8 @@ def read_obj(path: Path) -> Mapping[str, Mapping[str, Solids]]:
     }
 
 
-def read_mtl(path: Path) -> Mapping[str, tuple[float, float, float]]:
-    """Read the colours of an MTL file: red, green and blue, each 0 to 1, by material."""
-    blocks = path.read_text("utf-8").split("newmtl ")[1:]
-    lines = (block.splitlines() for block in blocks)
-    return {
-        name: (float(r), float(g), float(b)) for name, kd in lines for _, r, g, b in [kd.split()]
-    }
-
-
 _MESHES: Final = Path(__file__).parent / "meshes"
-_COLOURS: Final = read_mtl(_MESHES / "colours.mtl")
+_COLOURS: Final = tomllib.loads(Path(__file__).with_name("colours.toml").read_text("utf-8"))
 
 
 def normals(faces: Faces) -> NDArray[np.float64]:
@@ -92,143 +84,122 @@ def shading(faces: Faces) -> NDArray[np.float64]:
     return np.clip(light + (0.07 * x + 0.1 * y) * (1.0 - np.abs(up)), 0.05, 1.0)
 
 
-class Paint:
-    """Materials and meshes of a vehicle.
-
-    Args:
-        spec: Model that the materials are added to.
-        vehicle: Name of the vehicle, whose meshes are in `meshes/`.
-        light: Red, green and blue of the light on what is seen from outside, each 0 to 1.
-
-    Attributes:
-        spec: The model.
-        meshes: Faces seen from outside, keyed by object, such as "wheel", and colour.
-    """
-
-    def __init__(
-        self, spec: mujoco.MjSpec, vehicle: str, light: ArrayLike = (1.0, 1.0, 1.0)
-    ) -> None:
-        self.spec = spec
-        self.meshes = read_obj(_MESHES / f"{vehicle}.obj")
-        self._light = np.asarray(light, float)
-        self._made: set[str] = set()
-
-    def __call__(self, colour: str) -> str:
-        """Name of a material for the own camera, emissive because courses have no lights."""
-        rgba = [*_COLOURS[colour], 1.0]
-        return self._add(colour, rgba=rgba, emission=0.6, specular=0.2, shininess=0.3)
-
-    def lit(self, colour: str, *, turning: bool = False) -> str:
-        """Name of a material for `_add_shape`, whose brightness is in the normals of its mesh.
-
-        A `turning` part is equally bright in any direction.
-        """
-        rgba, name = [*self._light * _COLOURS[colour], 1.0], "even" if turning else "shaded"
-        emission = 0.85 if turning else 0.0
-        return self._add(
-            f"{colour}/{name}", rgba=rgba, emission=emission, specular=0.0, shininess=0.0
-        )
-
-    def shadow(self) -> str:
-        """Name of the material of one layer of a shadow."""
-        rgba = [0.0, 0.0, 0.0, _LAYER_DARKNESS]
-        return self._add("shadow", rgba=rgba, emission=0.0, specular=0.0, shininess=0.0)
-
-    def _add(self, name: str, **properties: Any) -> str:
-        material = f"vehicle/{name}"
-        if material not in self._made:
-            self.spec.add_material(name=material, **properties)
-            self._made.add(material)
-        return material
-
-
-def _add_shape(
-    body: mujoco.MjsBody,
-    name: str,
-    faces: Faces,
-    brightness: NDArray[np.float64],
-    material: str,
-    paint: Paint,
-    pos: ArrayLike = (0.0, 0.0, 0.0),
-) -> None:
-    """Add a visual mesh that is seen from outside only: without mass and collisions.
-
-    Courses have one light, which shines straight up. So the normals are chosen for the brightness
-    that they give, which turns about the vertical axis do not change. A brightness of 0 gives
-    normals along y, so that a wheel's do not change as it rolls either.
-    """
-    if paint.spec.mesh(name) is None:
-        triangles = faces[:, [[0, 1, 2], [0, 2, 3]]]
-        edges = triangles - np.roll(triangles, 1, axis=2)
-        full = (edges != 0.0).any(axis=3).all(axis=2)  # A face of three corners is one triangle.
-        points = triangles[full].reshape(-1, 3)
-        light = np.repeat(np.broadcast_to(brightness[:, None], full.shape)[full], 3)
-        normals = np.stack([np.zeros_like(light), np.sqrt(1.0 - light * light), -light], axis=1)
-        paint.spec.add_mesh(
-            name=name,
-            uservert=points.ravel(),
-            usernormal=normals.ravel(),
-            # Unused, but without them MuJoCo draws the faces with their own normals.
-            usertexcoord=np.zeros(2 * len(points)),
-            userface=np.arange(len(points)),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-        )
-    body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=material, pos=pos, mass=0.0,
-        contype=0, conaffinity=0, group=OUTSIDE_VIEW,
-    )  # fmt: skip
-
-
-def dress(body: mujoco.MjsBody, name: str, paint: Paint, *, ground_z: float = 0.0) -> None:
-    """Add the object of this name, and its reflection in a glossy ground at `ground_z`, m."""
-    for colour, (faces, _) in paint.meshes[name].items():
-        below = faces[:, [0, 3, 2, 1]] * (1.0, 1.0, -1.0) + (0.0, 0.0, 2.0 * ground_z)
-        both, light = np.concatenate([faces, below]), np.tile(shading(faces), 2)
-        _add_shape(body, f"{body.name}/{colour}", both, light, paint.lit(colour), paint)
-
-
 # A shadow is a stack of layers, each larger than the next, so that its edge is soft.
 _LAYERS: Final = 18
 _LAYER_DARKNESS: Final = 0.055
 _LAYER_RISE_M: Final = 0.0002
 
 
-def add_shadow(
+def dress(spec: mujoco.MjSpec, vehicle: str, light: ArrayLike) -> None:
+    """Add everything of a vehicle that is seen from outside.
+
+    That is the object of each body, with its reflection in a glossy ground, its shadow, and tyres
+    and rims of wheels. `light` is the red, green and blue of the light on them, each 0 to 1.
+    """
+    objects = read_obj(_MESHES / f"{vehicle}.obj")
+    tints = {colour: np.asarray(light, float) * rgb for colour, rgb in _COLOURS.items()}
+    for body in spec.bodies:
+        ground_z = -float(body.pos[2])
+        for colour, (faces, _) in objects.get(body.name, {}).items():
+            below = faces[:, [0, 3, 2, 1]] * (1.0, 1.0, -1.0) + (0.0, 0.0, 2.0 * ground_z)
+            both, bright = np.concatenate([faces, below]), np.tile(shading(faces), 2)
+            material = _material(spec, f"{colour}/shaded", tints[colour])
+            _add_shape(spec, body, f"{body.name}/{colour}", both, bright, material)
+        for geom in list(body.geoms):
+            if geom.classname.name == "shadow":
+                faces = _shadow(tuple(geom.pos[:2]), tuple(geom.size[:2]), ground_z)
+                material = _material(spec, "shadow", (0.0, 0.0, 0.0), alpha=_LAYER_DARKNESS)
+                _add_shape(spec, body, f"{body.name}/shadow", faces, None, material)
+                spec.delete(geom)
+        if body.name.endswith(" wheel"):
+            for colour, (faces, _) in objects["wheel"].items():
+                name = f"{colour} of wheels"
+                # Equally bright in any direction.
+                material = _material(spec, f"{colour}/even", tints[colour], 0.85)
+                _add_shape(spec, body, name, faces, None, material)
+                # Its reflection does not turn.
+                mirrored = body.pos - (0.0, 0.0, 2.0 * body.geoms[0].size[0])
+                _add_shape(spec, body.parent, name, faces, None, material, mirrored)
+
+
+def _material(
+    spec: mujoco.MjSpec, name: str, rgb: ArrayLike, emission: float = 0.0, alpha: float = 1.0
+) -> str:
+    """Add a matt material unless there is one of that name, and return the name."""
+    if spec.material(name) is None:
+        rgba = [*np.asarray(rgb), alpha]
+        spec.add_material(name=name, rgba=rgba, emission=emission, specular=0.0, shininess=0.0)
+    return name
+
+
+def _add_shape(
+    spec: mujoco.MjSpec,
     body: mujoco.MjsBody,
-    low: tuple[float, float],
-    high: tuple[float, float],
-    paint: Paint,
-    *,
-    ground_z: float = 0.0,
+    name: str,
+    faces: Faces,
+    brightness: NDArray[np.float64] | None,
+    material: str,
+    pos: ArrayLike = (0.0, 0.0, 0.0),
 ) -> None:
-    """Add a soft shadow of a rectangle on the ground, which is seen from outside only."""
-    faces = _layers(low, high, ground_z)
-    name = f"{body.name}/shadow"
-    _add_shape(body, name, faces, np.zeros(len(faces)), paint.shadow(), paint)
+    """Add a visual mesh without mass and collisions, from a mesh of that name if there is one.
+
+    `brightness` of each face is 0 to 1, (n,). Without it, rolling does not change the normals.
+    """
+    if spec.mesh(name) is None:
+        triangles = faces[:, [[0, 1, 2], [0, 2, 3]]]
+        edges = triangles - np.roll(triangles, 1, axis=2)
+        full = (edges != 0.0).any(axis=3).all(axis=2)  # A face of three corners is one triangle.
+        points = triangles[full].reshape(-1, 3)
+        given = np.zeros(len(faces)) if brightness is None else brightness
+        light = np.repeat(np.broadcast_to(given[:, None], full.shape)[full], 3)
+        # Texture coordinates are unused, but without them MuJoCo draws the faces with their own
+        # normals.
+        uvs = np.zeros((len(points), 2))
+        add_lit_mesh(spec, name, points, light, uvs, np.arange(len(points)), axis=1)
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=material, pos=pos, mass=0.0,
+        contype=0, conaffinity=0, group=OUTSIDE_VIEW,
+    )  # fmt: skip
+
+
+def add_lit_mesh(
+    spec: mujoco.MjSpec,
+    name: str,
+    points: NDArray[np.float64],
+    lights: NDArray[np.float64],
+    uvs: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+    *,
+    axis: int,
+) -> None:
+    """Add a mesh with a light, 0 to 1, at each of its points, m.
+
+    MuJoCo has no brightness per vertex, but a normal. Courses have one light, which shines straight
+    up, so the normals are chosen for the brightness that they give. They lean along `axis`, 0 or 1:
+    along y, so that rolling does not change the normals of a wheel.
+    """
+    normals = np.zeros((len(points), 3))
+    normals[:, axis], normals[:, 2] = np.sqrt(1.0 - lights * lights), -lights
+    spec.add_mesh(
+        name=name,
+        uservert=points.ravel(),
+        usernormal=normals.ravel(),
+        usertexcoord=uvs.ravel(),
+        userface=triangles.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )
 
 
 @functools.cache
-def _layers(low: tuple[float, float], high: tuple[float, float], ground_z: float) -> Faces:
-    """Rectangles with round corners; see `add_shadow`."""
-    middle, half = 0.5 * np.add(low, high), 0.5 * np.subtract(high, low)
+def _shadow(middle: tuple[float, float], half: tuple[float, float], ground_z: float) -> Faces:
+    """Layers of the shadow of a rectangle on the ground, with round corners."""
     angle = np.linspace(0.0, 2.0 * np.pi, 28, endpoint=False)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     layers: list[Faces] = []
     for number, spread in enumerate(np.linspace(0.05, -0.02, _LAYERS)):
-        flat = middle + np.sign(direction) * (half - 0.03) + direction * (0.03 + spread)
+        flat = middle + np.sign(direction) * np.subtract(half, 0.03) + direction * (0.03 + spread)
         height = ground_z + 0.001 + _LAYER_RISE_M * number
         ring = np.column_stack([flat, np.full(len(flat), height)])
         first = np.broadcast_to(ring[0], (len(ring) - 2, 3))
         layers.append(np.stack([first, ring[1:-1], ring[2:], ring[2:]], axis=1))
     return np.concatenate(layers)
-
-
-def dress_wheel(wheel: mujoco.MjsBody, radius: float, paint: Paint) -> None:
-    """Add tyre and rim of a wheel, which are seen from outside only; its axle is its y axis."""
-    for colour, (faces, _) in paint.meshes["wheel"].items():
-        name = f"vehicle/{colour} of wheels"
-        dark, material = np.zeros(len(faces)), paint.lit(colour, turning=True)
-        _add_shape(wheel, name, faces, dark, material, paint)
-        # Its reflection does not turn.
-        mirrored = wheel.pos - (0.0, 0.0, 2.0 * radius)
-        _add_shape(wheel.parent, name, faces, dark, material, paint, mirrored)

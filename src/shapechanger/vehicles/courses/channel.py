@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Surface, Wall
 from shapechanger.vehicles.courses.furniture import (
-    Lane,
     LaneObstacles,
     Scatter,
     place_sun_patches,
@@ -40,30 +39,8 @@ from shapechanger.vehicles.courses.geometry import (
 # Points of the route while it is shaped, and for pairwise distances.
 _FINE: Final = 1024
 _COARSE: Final = 128
+_SPACING_M: Final = 0.1
 _WIND_RAD: Final = 0.4  # Smallest sum of the turns to either side.
-
-
-@dataclass(frozen=True, slots=True)
-class ChannelShape:
-    """Ranges of a lane's shape, m.
-
-    Attributes:
-        pitch: Pitch of the grid that it follows.
-        cells: Number of grid cells that it encloses.
-        blur: Standard deviation by which its corners are smoothed.
-        length: Length of the route.
-        radius: Smallest radius of a curve.
-        half_width: Half width of the lane.
-        wall: Space for the wall between two parts of the lane, per part.
-    """
-
-    pitch: tuple[float, float]
-    cells: tuple[int, int]
-    blur: tuple[float, float]
-    length: tuple[float, float]
-    radius: float
-    half_width: tuple[float, float]
-    wall: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,49 +64,84 @@ class BankKind:
     rough: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class OpenWorld:
+    """A kind of course in the open.
+
+    Attributes:
+        pitch: Range of the pitch of the grid that the lane follows, m.
+        cells: Range of the number of grid cells that it encloses.
+        blur: Range of the standard deviation by which its corners are smoothed, m.
+        length: Range of the length of the route, m.
+        radius: Smallest radius of a curve, m.
+        dug: Range of the half width before the lane has banks, m.
+        wall: Space for the wall between two parts of the lane, per part, m.
+        half_width: Range of the final half width, m.
+        banks: Kinds of bank.
+        obstacles: Kinds of obstacle.
+        per_m: Range of the mean number of obstacles per metre.
+        gap_m: Smallest gap next to an obstacle, m.
+        current_mps: Fastest current, m/s; 0 on land.
+    """
+
+    pitch: tuple[float, float]
+    cells: tuple[int, int]
+    blur: tuple[float, float]
+    length: tuple[float, float]
+    radius: float
+    dug: tuple[float, float]
+    wall: float
+    half_width: tuple[float, float]
+    banks: tuple[BankKind, ...]
+    obstacles: tuple[Scatter, ...]
+    per_m: tuple[float, float]
+    gap_m: float
+    current_mps: float = 0.0
+
+
 def _dig_channel(
-    rng: np.random.Generator, shape: ChannelShape, spacing: float
+    rng: np.random.Generator, world: OpenWorld
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Try to lay out a route: points, m, (n, 2), and distance from the banks, m, (n,).
 
     The corners of a loop on a grid are smoothed more and more until the lane fits everywhere. None
     if the random loop is too tight or too close to itself.
     """
-    loop = trace_outline(grow_cells(rng, int(rng.integers(shape.cells[0], shape.cells[1] + 1))))
+    loop = trace_outline(grow_cells(rng, int(rng.integers(world.cells[0], world.cells[1] + 1))))
     if loop is None:
         return None
-    points = scale_grid(rng, loop, *shape.pitch)
-    points += rng.normal(0.0, 0.1 * shape.pitch[0], size=points.shape)
+    points = scale_grid(rng, loop, *world.pitch)
+    points += rng.normal(0.0, 0.1 * world.pitch[0], size=points.shape)
     if rng.random() < 0.5:
         points = points[::-1]
     turn = float(rng.uniform(-np.pi, np.pi))
     points = points @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     # Scaling the grid too much would spoil the proportions of the lane.
-    points *= float(np.clip(rng.uniform(*shape.length) / length(points), 0.8, 1.2))
+    points *= float(np.clip(rng.uniform(*world.length) / length(points), 0.8, 1.2))
     sharp = resample(points, length(points) / _FINE)
-    blur = shape.blur[0]
+    blur = world.blur[0]
     while True:
         line = smooth(sharp, blur * _FINE / length(points))
         coarse = line[:: _FINE // _COARSE]
         room = tangent_radii(coarse)
-        most = np.minimum(0.85 * room, room - shape.wall)
-        if room.min() >= shape.radius and most.min() >= shape.half_width[0]:
+        most = np.minimum(0.85 * room, room - world.wall)
+        if room.min() >= world.radius and most.min() >= world.dug[0]:
             break
         blur *= 1.2
-        if blur > shape.blur[1]:
+        if blur > world.blur[1]:
             return None
-    if not shape.length[0] <= length(line) <= shape.length[1] or not _winds(coarse):
+    if not world.length[0] <= length(line) <= world.length[1] or not _winds(coarse):
         return None
-    # It starts where it is straight.
+    # The route starts on a straight.
     first = int(np.argmin(smooth(np.abs(turn_angles(coarse)), 2.0)))
     line = np.roll(line, -first * (_FINE // _COARSE), axis=0)
     coarse, most = np.roll(coarse, -first, axis=0), np.roll(most, -first)
-    low, high = shape.half_width
+    low, high = world.dug
     # The width varies every few metres, within the available space.
     waves = smooth(rng.normal(size=_COARSE), 3.0 * _COARSE / length(line))
     half = low + (high - low) * (0.5 + waves / (4.0 * float(waves.std())))
     half = smooth(np.clip(np.minimum(half, most), low, high), 1.0)
-    route = resample(line, spacing)
+    route = resample(line, _SPACING_M)
     knots = arc_lengths(coarse)
     s = even_distances(float(knots[-1]), len(route))
     return route, interpolate(half[:, None], knots, s)[:, 0]
@@ -186,40 +198,9 @@ def _bank(
     )
     points += back * (rng.uniform(0.0, 1.0, len(points)) * rough)[:, None]
     return tuple(
-        Wall(
-            (float(points[i - 1, 0]), float(points[i - 1, 1])),
-            (float(points[i, 0]), float(points[i, 1])),
-            heights[i],
-            kind.surface,
-        )
+        Wall.between(points[i - 1], points[i], heights[i], kind.surface)
         for i, kind in enumerate(chosen)
     )
-
-
-_SPACING_M: Final = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class OpenWorld:
-    """A kind of course in the open.
-
-    Attributes:
-        shape: Ranges of the lane's shape.
-        half_width: Range of its final half width, m.
-        banks: Kinds of bank.
-        obstacles: Kinds of obstacle.
-        per_m: Range of the mean number of obstacles per metre.
-        gap_m: Smallest gap beside an obstacle, m.
-        current_mps: Fastest current, m/s; 0 on land.
-    """
-
-    shape: ChannelShape
-    half_width: tuple[float, float]
-    banks: tuple[BankKind, ...]
-    obstacles: tuple[Scatter, ...]
-    per_m: tuple[float, float]
-    gap_m: float
-    current_mps: float = 0.0
 
 
 _WORLDS: Final = msgspec.convert(
@@ -231,16 +212,16 @@ _WORLDS: Final = msgspec.convert(
 def open_course(name: str, rng: np.random.Generator, seed: int) -> Course | None:
     """Try to lay out a yard or a harbour; None if the random layout does not fit."""
     world = _WORLDS[name]
-    channel = _dig_channel(rng, world.shape, _SPACING_M)
+    channel = _dig_channel(rng, world)
     if channel is None:
         return None
-    lane = Lane(channel[0], *build_banks(rng, *channel, world.banks))
-    if any_crossing(wall_segments((*lane.left, *lane.right))):
+    left, right = build_banks(rng, *channel, world.banks)
+    if any_crossing(wall_segments((*left, *right))):
         return None
-    half_width = lane.half_width()
+    obstacles = LaneObstacles(channel[0], left, right, world.gap_m)
+    half_width = obstacles.half_width
     if half_width.min() < world.half_width[0] or half_width.max() > world.half_width[1]:
         return None
-    obstacles = LaneObstacles(lane, half_width, world.gap_m)
     scatter_obstacles(rng, obstacles, world.obstacles, per_m=float(rng.uniform(*world.per_m)))
     current = (0.0, 0.0)
     if world.current_mps:
@@ -250,11 +231,11 @@ def open_course(name: str, rng: np.random.Generator, seed: int) -> Course | None
     return Course(
         world=name,
         seed=seed,
-        route=lane.route,
+        route=obstacles.route,
         half_width=half_width,
-        walls=(*lane.left, *lane.right),
+        walls=(*left, *right),
         obstacles=tuple(obstacles.obstacles),
-        lamps=place_sun_patches(rng, lane.route, half_width),
+        lamps=place_sun_patches(rng, obstacles.route, half_width),
         ceiling_m=0.0,
         gap_m=obstacles.gap_m,
         current_mps=current,

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Lamp, Surface, Wall
-from shapechanger.vehicles.courses.furniture import Lane, LaneObstacles, Size, weighted_choice
+from shapechanger.vehicles.courses.furniture import LaneObstacles, Size, weighted_choice
 from shapechanger.vehicles.courses.geometry import (
     arc_lengths,
     grow_cells,
     resample,
     scale_grid,
     trace_outline,
+    turn_angles,
 )
 
 # Widths of a door without its frame and of the frame, and depth of a recessed door, m.
@@ -50,24 +51,21 @@ def panel_walls(
     # Length by which corners are cut off, mostly 0.
     cut = np.where(rng.random(n) < 0.3, rng.uniform(0.2, 0.5, n), 0.0)
     brick = np.where((bends > 0) & (rng.random(n) < 0.35), rng.uniform(0.3, 0.8, n), 0.0)
+    ahead, _ = _legs(corners)
     walls: list[Wall] = []
     for k in range(n):
         after = (k + 1) % n
-        ahead = corners[after] - corners[k]
-        length = float(np.hypot(*ahead))
-        ahead /= length
-        start, end = corners[k] + ahead * cut[k], corners[after] - ahead * cut[after]
-        first, last = start + ahead * brick[k], end - ahead * brick[after]
+        start, end = corners[k] + ahead[k] * cut[k], corners[after] - ahead[k] * cut[after]
+        first, last = start + ahead[k] * brick[k], end - ahead[k] * brick[after]
         if brick[k] > 0.0:
-            walls.append(_wall(start, first, height, "brick"))
+            walls.append(Wall.between(start, first, height, "brick"))
         walls.extend(_leg(rng, first, last, height))
         if brick[after] > 0.0:
-            walls.append(_wall(last, end, height, "brick"))
+            walls.append(Wall.between(last, end, height, "brick"))
         if cut[after] > 0.0:
-            beyond = corners[(k + 2) % n] - corners[after]
-            beyond /= np.hypot(*beyond)
+            beyond = corners[after] + ahead[after] * cut[after]
             surface: Surface = "brick" if brick[after] > 0.0 else "plaster"
-            walls.append(_wall(end, corners[after] + beyond * cut[after], height, surface))
+            walls.append(Wall.between(end, beyond, height, surface))
     return tuple(walls)
 
 
@@ -86,19 +84,15 @@ def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) ->
         if t + wide + 0.3 > length:
             break
         near, far = start + ahead * t, start + ahead * (t + wide)
-        yield _wall(done, near, height, "plaster")
+        yield Wall.between(done, near, height, "plaster")
         if recessed:
-            yield _wall(near, near + back, height, "plaster")
-            yield _wall(near + back, far + back, height, surface)
-            yield _wall(far + back, far, height, "plaster")
+            yield Wall.between(near, near + back, height, "plaster")
+            yield Wall.between(near + back, far + back, height, surface)
+            yield Wall.between(far + back, far, height, "plaster")
         else:
-            yield _wall(near, far, height, surface)
+            yield Wall.between(near, far, height, surface)
         done, t = far, t + wide + gap
-    yield _wall(done, end, height, "plaster")
-
-
-def _wall(start: _Point, end: _Point, height: float, surface: Surface) -> Wall:
-    return Wall((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), height, surface)
+    yield Wall.between(done, end, height, "plaster")
 
 
 _CEILING_M: Final = 2.5  # Height of the ceiling, and of every wall.
@@ -131,22 +125,21 @@ def corridor(rng: np.random.Generator, seed: int) -> Course | None:
     along = arc_lengths(route)
     if not _LENGTH_M[0] <= along[-1] <= _LENGTH_M[1]:
         return None
-    normals = _normals(corners)
+    ahead, _ = _legs(corners)
+    normals = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
     reach = (np.roll(normals * widths[:, None], 1, axis=0) + normals * widths[:, None]) / 2.0
     turns = _turns(corners)
     # Walls have the lane on their left: the right one runs forwards, the left one backwards.
     right = panel_walls(rng, corners - reach, -turns, _CEILING_M)
     left = panel_walls(rng, (corners + reach)[::-1], turns[::-1], _CEILING_M)
-    lane = Lane(route, left, right)
-    half_width = lane.half_width()
-    obstacles = LaneObstacles(lane, half_width, _GAP_M)
-    _furnish(rng, obstacles, corners, widths, starts)
+    obstacles = LaneObstacles(route, left, right, _GAP_M)
+    _furnish(rng, obstacles, corners, normals, widths, starts)
     _plant(rng, obstacles, corners, reach * turns[:, None], starts)
     return Course(
         world="corridor",
         seed=seed,
         route=route,
-        half_width=half_width,
+        half_width=obstacles.half_width,
         walls=(*left, *right),
         obstacles=tuple(obstacles.obstacles),
         lamps=_lamps(rng, corners, widths),
@@ -166,24 +159,19 @@ def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
     points = points[_turns(points) != 0]
     if len(points) < 6:  # A rectangle turns one way only.
         return None
-    legs = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
-    return np.roll(points, -int(np.argmax(legs)), axis=0)
+    return np.roll(points, -int(np.argmax(_legs(points)[1])), axis=0)
 
 
 def _turns(points: NDArray[np.float64]) -> NDArray[np.int64]:
     """Turn at each point: 1 to the left, -1 to the right, 0 for none."""
-    back = points - np.roll(points, 1, axis=0)
-    ahead = np.roll(points, -1, axis=0) - points
-    return np.sign(np.round(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], 6)).astype(
-        np.int64
-    )
+    return np.sign(np.round(turn_angles(points), 6)).astype(np.int64)
 
 
-def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors to the left of each leg, (n, 2)."""
-    ahead = np.roll(corners, -1, axis=0) - corners
-    ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
-    return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+def _legs(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit vector from each corner to the next, (n, 2), and distance, m, (n,)."""
+    legs = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(legs[:, 0], legs[:, 1])
+    return legs / lengths[:, None], lengths
 
 
 def _route(
@@ -194,9 +182,8 @@ def _route(
     It starts after a third of the first leg. With half the width as the radius of a corner, its
     distance from the inner edge is constant.
     """
-    back = corners - np.roll(corners, 1, axis=0)
-    back /= np.hypot(back[:, 0], back[:, 1])[:, None]
-    ahead = np.roll(back, -1, axis=0)
+    ahead, _ = _legs(corners)
+    back = np.roll(ahead, 1, axis=0)
     radii = np.minimum(widths, np.roll(widths, 1)) / 2.0
     pieces = [corners[:1] + (corners[1:2] - corners[:1]) / 3.0]
     angles = np.linspace(0.0, np.pi / 2.0, 25)[:, None]
@@ -213,17 +200,14 @@ def _furnish(
     rng: np.random.Generator,
     obstacles: LaneObstacles,
     corners: NDArray[np.float64],
+    normals: NDArray[np.float64],
     widths: NDArray[np.float64],
     along: NDArray[np.float64],
 ) -> None:
     """Add furniture along the walls, and a few boxes in the way."""
-    normals = _normals(corners)
     density = rng.uniform(0.1, 0.35)  # Obstacles per metre.
-    for k in range(len(corners)):
-        after = (k + 1) % len(corners)
-        leg = corners[after] - corners[k]
-        length = float(np.hypot(*leg))
-        ahead, yaw = leg / length, float(np.arctan2(leg[1], leg[0]))
+    for k, (ahead, length) in enumerate(zip(*_legs(corners), strict=True)):
+        yaw = float(np.arctan2(ahead[1], ahead[0]))
         for _ in range(rng.poisson(density * length)):
             size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
             t = float(rng.uniform(1.2, length - 1.2))
@@ -235,7 +219,7 @@ def _furnish(
                 obstacle = replace(obstacle, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
             x, y = corners[k] + ahead * t + normals[k] * side * aside
             obstacle = replace(obstacle, x=float(x), y=float(y))
-            obstacles.offer(obstacle, float(along[after]) - (length - t))
+            obstacles.offer(obstacle, float(along[(k + 1) % len(along)]) - (length - t))
 
 
 def _plant(
@@ -263,12 +247,10 @@ def _lamps(
     long, wide = float(rng.uniform(0.9, 1.3)), float(rng.uniform(0.12, 0.3))
     across = rng.random() < 0.35
     lamps: list[Lamp] = []
-    for k, corner in enumerate(corners):
-        leg = corners[(k + 1) % len(corners)] - corner
-        length = float(np.hypot(*leg))
+    for corner, width, ahead, length in zip(corners, widths, *_legs(corners), strict=True):
         count = max(1, round(length / every))
-        yaw = float(np.arctan2(leg[1], leg[0])) + (np.pi / 2.0 if across else 0.0)
+        yaw = float(np.arctan2(ahead[1], ahead[0])) + (np.pi / 2.0 if across else 0.0)
         for i in range(count):
-            x, y = corner + leg * (i + 0.5) / count
-            lamps.append(Lamp(float(x), float(y), yaw, min(long, 0.6 * float(widths[k])), wide))
+            x, y = corner + ahead * length * (i + 0.5) / count
+            lamps.append(Lamp(float(x), float(y), yaw, min(long, 0.6 * float(width)), wide))
     return tuple(lamps)

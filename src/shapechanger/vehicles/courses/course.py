@@ -58,6 +58,25 @@ class Wall:
     height: float
     surface: Surface
 
+    @staticmethod
+    def between(
+        start: NDArray[np.float64], end: NDArray[np.float64], height: float, surface: Surface
+    ) -> Wall:
+        """A wall between two points, m, (2,)."""
+        (x0, y0), (x1, y1) = start.tolist(), end.tolist()
+        return Wall((x0, y0), (x1, y1), height, surface)
+
+    def frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Start, m, unit vector towards the end, and length, m; (2,), (2,) and a number."""
+        start, ahead = np.asarray(self.start, float), np.subtract(self.end, self.start)
+        length = float(np.hypot(*ahead))
+        return start, ahead / length, length
+
+    def behind(self) -> NDArray[np.float64]:
+        """Unit vector away from the lane, (2,)."""
+        _, (x, y), _ = self.frame()
+        return np.array([y, -x])
+
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
@@ -197,7 +216,7 @@ class Look:
 
     @staticmethod
     def random(world: str, rng: np.random.Generator) -> Look:
-        """Domain randomization of the look, around that of a world.
+        """Domain randomization of the look, around the usual look of a world.
 
         All are uniform: `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3,
         `gloss` x 0.4 to 1.6, each channel of `wall` and `ground` x 0.75 to 1.0, and one of
@@ -219,10 +238,10 @@ class Look:
             texture_seed=int(rng.integers(VARIANTS)),
         )
 
-    def tone(self, own: Colour = (1.0, 1.0, 1.0)) -> Colour:
+    def tone(self, colour: Colour = (1.0, 1.0, 1.0)) -> Colour:
         """A colour in this light, each channel from 0 to 1."""
         tinted = 1.0 - self.warmth * (1.0 - _WARM)
-        red, green, blue = (float(x) for x in np.clip(self.light * tinted * own, 0.0, 1.0))
+        red, green, blue = (float(x) for x in np.clip(self.light * tinted * colour, 0.0, 1.0))
         return red, green, blue
 
 

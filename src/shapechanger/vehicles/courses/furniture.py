@@ -59,27 +59,6 @@ class Size:
         return replace(obstacle, yaw=0.0, width=length) if obstacle.is_round else obstacle
 
 
-@dataclass(frozen=True, slots=True)
-class Lane:
-    """An empty lane.
-
-    Attributes:
-        route: Its middle, as in `Course`, m, (n, 2).
-        left: Walls on its left.
-        right: Walls on its right.
-    """
-
-    route: NDArray[np.float64]
-    left: tuple[Wall, ...]
-    right: tuple[Wall, ...]
-
-    def half_width(self) -> NDArray[np.float64]:
-        """Distance of each point of the route from the nearest wall, m, (n,)."""
-        return distances_to_segments(self.route, wall_segments((*self.left, *self.right))).min(
-            axis=1
-        )
-
-
 class LaneObstacles:
     """Obstacles in a lane; those that would block it are rejected.
 
@@ -87,23 +66,32 @@ class LaneObstacles:
     stand close together; two that are passed on different sides are a gap apart.
 
     Args:
-        lane: The lane.
-        half_width: Result of `lane.half_width()`, m, (n,).
+        route: Middle of the lane, as in `Course`, m, (n, 2).
+        left: Walls on its left.
+        right: Walls on its right.
         gap_m: Smallest gap that must remain, m.
+
+    Attributes:
+        route: Middle of the lane.
+        half_width: Distance of each of its points from the nearest wall, m, (n,).
+        obstacles: The obstacles that fit.
+        gap_m: Narrowest remaining passage, m.
     """
 
-    def __init__(self, lane: Lane, half_width: NDArray[np.float64], gap_m: float) -> None:
-        self.lane = lane
-        self.half_width = half_width
+    def __init__(
+        self,
+        route: NDArray[np.float64],
+        left: tuple[Wall, ...],
+        right: tuple[Wall, ...],
+        gap_m: float,
+    ) -> None:
+        self.route, self._lefts, self._wanted = route, len(left), gap_m
+        self._walls = wall_segments((*left, *right))
+        self._doors = np.array([wall.surface == "door" for wall in (*left, *right)])
+        self.half_width = distances_to_segments(route, self._walls).min(axis=1)
+        self.gap_m = 2.0 * float(self.half_width.min())
+        self._round_m = length(route)
         self.obstacles: list[Obstacle] = []
-        self.gap_m = 2.0 * float(half_width.min())
-        """Narrowest remaining passage, m."""
-        walls = (*lane.left, *lane.right)
-        self._walls = wall_segments(walls)
-        self._lefts = len(lane.left)
-        self._doors = np.array([wall.surface == "door" for wall in walls])
-        self._wanted = gap_m
-        self._round_m = length(lane.route)
         self._passed_left: list[bool] = []
 
     def offer(self, obstacle: Obstacle, s: float) -> bool:
@@ -156,7 +144,7 @@ def scatter_obstacles(
 
     Attempts are drawn with a mean of `per_m` for each metre; obstacles that do not fit are dropped.
     """
-    route, half_width = obstacles.lane.route, obstacles.half_width
+    route, half_width = obstacles.route, obstacles.half_width
     along, left = arc_lengths(route), normals(route)
     shares = [kind.share for kind in kinds]
     for _ in range(rng.poisson(per_m * float(along[-1]))):
@@ -164,16 +152,14 @@ def scatter_obstacles(
         i = int(rng.integers(len(route)))
         heading = float(np.arctan2(-left[i, 0], left[i, 1]))
         obstacle = kind.draw(rng, heading)
+        most = float(half_width[i]) - obstacle.width / 2.0
         if rng.random() < kind.moored:
             side = 1.0 if rng.random() < 0.5 else -1.0
-            aside = side * (
-                float(half_width[i]) - obstacle.width / 2.0 - float(rng.uniform(0.05, 0.3))
-            )
+            aside = side * (most - float(rng.uniform(0.05, 0.3)))
         else:
-            most = float(half_width[i]) - obstacle.width / 2.0
             aside = float(rng.uniform(-most, most))
-            yaw = 0.0 if obstacle.is_round else float(rng.uniform(-np.pi, np.pi))
-            obstacle = replace(obstacle, yaw=yaw)
+            if not obstacle.is_round:
+                obstacle = replace(obstacle, yaw=float(rng.uniform(-np.pi, np.pi)))
         x, y = route[i] + left[i] * aside
         obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(along[i]))
 
@@ -181,7 +167,7 @@ def scatter_obstacles(
 def place_sun_patches(
     rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
 ) -> tuple[Lamp, ...]:
-    """Two to eight patches of sun on a lane: its middle, m, (n, 2), and half width, m, (n,)."""
+    """Two to eight patches of sun on a route, m, (n, 2), with a half width, m, (n,)."""
     left = normals(route)
     lamps: list[Lamp] = []
     for _ in range(int(rng.integers(2, 9))):

@@ -182,66 +182,52 @@ def any_crossing(pieces: Segments) -> bool:
     return bool((parted & parted.T).any())
 
 
-def box_sides(obstacle: Obstacle) -> Segments:
-    """Sides of a box, counter-clockwise, m, (4, 4)."""
-    ends = _to_world(obstacle, np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2.0)
-    return np.concatenate([ends, np.roll(ends, -1, axis=0)], axis=1)
+_CORNERS: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
 def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.float64]:
-    """Distance of an obstacle from each segment, m, (m,); 0 or less where they overlap."""
+    """Distance of an obstacle from each segment, m, (m,); 0 or less if they overlap."""
     if obstacle.is_round:
-        return (
-            distances_to_segments(np.array([[obstacle.x, obstacle.y]]), pieces)[0]
-            - obstacle.length / 2.0
-        )
+        middle = np.array([[obstacle.x, obstacle.y]])
+        return distances_to_segments(middle, pieces)[0] - obstacle.length / 2.0
     starts, ends = _into(obstacle, pieces[:, :2]), _into(obstacle, pieces[:, 2:])
-    half = np.array([obstacle.length, obstacle.width]) / 2.0
-    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    far = distances_to_segments(corners, np.concatenate([starts, ends], axis=1)).min(axis=0)
-    far = np.minimum(far, np.minimum(_from_box(starts, half), _from_box(ends, half)))
-    return np.where(_crosses(starts, ends, half), 0.0, far)
+    size = np.array([obstacle.length, obstacle.width])
+    far = distances_to_segments(_CORNERS * size, np.concatenate([starts, ends], axis=1)).min(axis=0)
+    for points in (pieces[:, :2], pieces[:, 2:]):
+        far = np.minimum(far, _distances_from_points(obstacle, points))
+    # A segment crosses the box if it enters both of its slabs before it leaves one.
+    ahead = ends - starts
+    ahead = np.where(np.abs(ahead) < 1e-12, 1e-12, ahead)
+    low, high = (-size / 2.0 - starts) / ahead, (size / 2.0 - starts) / ahead
+    enter, leave = np.minimum(low, high).max(axis=1), np.maximum(low, high).min(axis=1)
+    return np.where(np.maximum(enter, 0.0) < np.minimum(leave, 1.0), 0.0, far)
 
 
 def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
-    """Distance between two obstacles, m; 0 or less where they overlap."""
-    for box, round_one in ((one, other), (other, one)):
+    """Distance between two obstacles, m; 0 or less if they overlap."""
+    for thing, round_one in ((one, other), (other, one)):
         if round_one.is_round:
             middle = np.array([[round_one.x, round_one.y]])
-            return float(_from_points(box, middle)[0]) - round_one.length / 2.0
-    return float(
-        min(
-            distances_from_obstacle(one, box_sides(other)).min(),
-            distances_from_obstacle(other, box_sides(one)).min(),
-        )
-    )
+            return float(_distances_from_points(thing, middle)[0]) - round_one.length / 2.0
+    pairs = ((one, other), (other, one))
+    return float(min(distances_from_obstacle(a, box_sides(b)).min() for a, b in pairs))
 
 
-def _from_points(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of points, m, (n, 2), from an obstacle; 0 or less inside."""
+def box_sides(obstacle: Obstacle) -> Segments:
+    """Sides of a box, counter-clockwise, m, (4, 4)."""
+    corners = _CORNERS * np.array([obstacle.length, obstacle.width]) @ _axes(obstacle)
+    corners += [obstacle.x, obstacle.y]
+    return np.concatenate([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+def _distances_from_points(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points, m, (n, 2), from an obstacle, m, (n,); 0 or less inside."""
     if obstacle.is_round:
         away = points - np.array([obstacle.x, obstacle.y])
         return np.hypot(away[:, 0], away[:, 1]) - obstacle.length / 2.0
     half = np.array([obstacle.length, obstacle.width]) / 2.0
-    return _from_box(_into(obstacle, points), half)
-
-
-def _from_box(points: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of points from a box around the origin; 0 inside."""
-    over = np.maximum(np.abs(points) - half, 0.0)
+    over = np.maximum(np.abs(_into(obstacle, points)) - half, 0.0)
     return np.hypot(over[:, 0], over[:, 1])
-
-
-def _crosses(
-    starts: NDArray[np.float64], ends: NDArray[np.float64], half: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Mask of the segments that pass through a box around the origin, by clipping."""
-    ahead = ends - starts
-    ahead = np.where(np.abs(ahead) < 1e-12, 1e-12, ahead)
-    low, high = (-half - starts) / ahead, (half - starts) / ahead
-    enter = np.minimum(low, high).max(axis=1)
-    leave = np.maximum(low, high).min(axis=1)
-    return np.maximum(enter, 0.0) < np.minimum(leave, 1.0)
 
 
 def _axes(obstacle: Obstacle) -> NDArray[np.float64]:
@@ -253,14 +239,6 @@ def _axes(obstacle: Obstacle) -> NDArray[np.float64]:
 def _into(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points in the frame of an obstacle, along its length and its width."""
     return (points - np.array([obstacle.x, obstacle.y])) @ _axes(obstacle).T
-
-
-def _to_world(obstacle: Obstacle, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World coordinates of points given as shares of its length and width."""
-    return shares * np.array([obstacle.length, obstacle.width]) @ _axes(obstacle) + [
-        obstacle.x,
-        obstacle.y,
-    ]
 
 
 FAR_M: Final = 2.5
@@ -300,5 +278,5 @@ class ClearanceField:
         for obstacle in self._obstacles:
             reach, here = obstacle.length + obstacle.width, np.array((obstacle.x, obstacle.y))
             if (here + reach >= low).all() and (here - reach <= high).all():
-                found = np.minimum(found, _from_points(obstacle, points))
+                found = np.minimum(found, _distances_from_points(obstacle, points))
         return np.maximum(found, 0.0)

@@ -1,16 +1,105 @@
-"""Surfaces of a course as meshes with precomputed light: ground, ceiling, walls and obstacles."""
+"""Surfaces of a course as meshes with precomputed light: ground, ceiling, walls and obstacles.
+
+Obstacles, boats and the fittings of quays are the solids of `solids.obj`.
+"""
 
 from __future__ import annotations
 
-import tomllib
 from collections import defaultdict
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from shapechanger.vehicles.courses.course import Course, Look, Obstacle, Wall
-from shapechanger.vehicles.courses.textures import CELLS, ROWS, Array, QuadMesh, add_box, add_turned
+from shapechanger.vehicles.bodies.visuals import read_obj
+from shapechanger.vehicles.courses.course import Course, Look, Wall
+
+Array = NDArray[np.float64]
+
+_SOLIDS: Final = Path(__file__).with_name("solids.obj")
+# The corners of a quad are counter-clockwise seen from its front.
+_TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
+# A mirrored quad has the opposite order.
+_MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
+_DOWN: Final = np.array([1.0, 1.0, -1.0])
+
+
+class QuadMesh:
+    """Quads with texture coordinates and light.
+
+    Each has four corners, counter-clockwise seen from its front; its back is invisible. Texture
+    coordinates are u to the right and v down, from 0 to 1.
+    """
+
+    def __init__(self) -> None:
+        self._quads: list[tuple[Array, Array, Array, NDArray[np.bool_]]] = []
+
+    def add(
+        self, corners: Array, uvs: Array, lights: Array | float = 1.0, *, reflected: bool = True
+    ) -> None:
+        """Add n quads.
+
+        Corners are (n, 4, 3), m, texture coordinates (n, 4, 2), and lights, 0 to 1, (n, 4). What is
+        not `reflected` is hidden in a glossy ground.
+        """
+        lights = np.broadcast_to(lights, corners.shape[:2])
+        self._quads.append((corners, uvs, lights, np.full(len(corners), reflected)))
+
+    def add_grid(self, points: Array, uvs: Array, lights: Array) -> None:
+        """Add the cells of a grid whose rows go up and whose columns go right, seen from its front.
+
+        Its arrays have the shapes (rows, columns, 3), (rows, columns, 2) and (rows, columns).
+        """
+        self.add(*(_grid_cells(grid) for grid in (points, uvs, lights)))
+
+    def add_solid(
+        self,
+        name: str,
+        place: ArrayLike,
+        yaw: float,
+        scale: ArrayLike = 1.0,
+        light: float = 1.0,
+        *,
+        reflected: bool = True,
+    ) -> None:
+        """Add a solid, scaled and turned by a yaw, rad, about its origin, at a place, m, (3,).
+
+        The wall of a fitting is along x, with the lane at y > 0.
+        """
+        faces, uvs = read_obj(_SOLIDS)[name][name]
+        cosine, sine = np.cos(yaw), np.sin(yaw)
+        turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        corners = faces * np.asarray(scale) @ turn + np.asarray(place)
+        self.add(corners, uvs[..., :2], light * uvs[..., 2], reflected=reflected)
+
+    def __bool__(self) -> bool:
+        return bool(self._quads)
+
+    def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """Points, m, (m, 3), texture coordinates, (m, 2), lights, (m,), and triangles, (k, 3).
+
+        `mirrored` adds a copy below the ground, for a glossy ground.
+        """
+        corners, uvs, lights, shown = map(np.concatenate, zip(*self._quads, strict=True))
+        first = np.arange(0, 4 * len(corners), 4)[:, None, None]
+        triangles = first + _TRIANGLES
+        if mirrored:
+            first = first[: shown.sum()] + 4 * len(corners)
+            triangles = np.concatenate([triangles, first + _MIRRORED])
+            corners = np.concatenate([corners, corners[shown] * _DOWN])
+            uvs, lights = (np.concatenate([values, values[shown]]) for values in (uvs, lights))
+        return (
+            corners.reshape(-1, 3), uvs.reshape(-1, 2), lights.reshape(-1),
+            triangles.reshape(-1, 3),
+        )  # fmt: skip
+
+
+def _grid_cells(grid: Array) -> Array:
+    """Values at the corners of each cell of a grid (rows, columns, ...): (n, 4, ...)."""
+    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
+    return np.stack(corners, axis=2).reshape(-1, 4, *grid.shape[2:])
+
 
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
@@ -51,8 +140,6 @@ _LONGEST: Final = 0.8
 _ROWS: Final = np.array([0.0, 0.35, 1.0])
 _UPWARDS: Final = np.array([0.86, 1.0, 0.94])
 
-_SHAPES: Final = tomllib.loads(Path(__file__).with_name("obstacles.toml").read_text("utf-8"))
-
 
 class Surfaces:
     """Surfaces of a course with precomputed light."""
@@ -81,31 +168,21 @@ class Surfaces:
 
     def lamps(self) -> QuadMesh:
         """Lamps, seen from below, with the middle of their texture cell everywhere."""
-        row, column = divmod(CELLS["lamp"], ROWS)
-        place = (np.array([column, row]) + 0.5) / ROWS
-        mesh = QuadMesh()
+        mesh, z = QuadMesh(), self._course.ceiling_m - _GAP
         for lamp in self._course.lamps:
-            cos, sin = np.cos(lamp.yaw), np.sin(lamp.yaw)
-            half = 0.5 * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)]) * (lamp.length, lamp.width)
-            corners = np.full((1, 4, 3), self._course.ceiling_m - _GAP)
-            corners[0, :, 0] = lamp.x + cos * half[:, 0] - sin * half[:, 1]
-            corners[0, :, 1] = lamp.y + sin * half[:, 0] + cos * half[:, 1]
-            mesh.add(corners, np.tile(place, (1, 4, 1)))
+            mesh.add_solid("lamp", (lamp.x, lamp.y, z), lamp.yaw, (lamp.length, lamp.width, 0.0))
         return mesh
 
     def verges(self) -> QuadMesh:
         """Strips of grass along the walls."""
         mesh = QuadMesh()
         for wall in self._course.walls:
-            start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
-            length = float(np.hypot(*(end - start)))
-            along = (end - start) / length
-            inwards = _VERGE_WIDTH * np.array([-along[1], along[0]])
+            inwards = -_VERGE_WIDTH * wall.behind()
+            start, end = np.array(wall.start), np.array(wall.end)
             flat = np.array([start, end, end + inwards, start + inwards])
-            corners = np.concatenate([flat, np.full((4, 1), _VERGE_RISE)], axis=1)[None]
-            far = length / 1.5
+            far = wall.frame()[2] / 1.5
             uvs = np.array([[(0.0, 0.2), (far, 0.2), (far, 0.0), (0.0, 0.0)]])
-            mesh.add(corners, uvs, self._light_at(flat)[None])
+            mesh.add(_raised(flat[None], _VERGE_RISE), uvs, self._light_at(flat)[None])
         return mesh
 
     def walls(self) -> dict[str, QuadMesh]:
@@ -132,17 +209,14 @@ class Surfaces:
         """All obstacles of a course, which share one texture."""
         mesh = QuadMesh()
         for obstacle in self._course.obstacles:
-            bright = float(self._light_at(np.array([obstacle.x, obstacle.y])))
-            if obstacle.kind == "dinghy":
-                from shapechanger.vehicles.courses.harbour import add_dinghy
-
-                add_dinghy(mesh, obstacle, bright)
-            elif obstacle.is_round:
-                for outline, material in _SHAPES["turned"][obstacle.kind]:
-                    profile = np.array(outline) * (obstacle.length, obstacle.height)
-                    add_turned(mesh, obstacle.x, obstacle.y, profile, material, bright)
-            else:
-                _add_boxes(mesh, obstacle, bright)
+            place, size = (
+                (obstacle.x, obstacle.y),
+                (obstacle.length, obstacle.width, obstacle.height),
+            )
+            light = float(self._light_at(np.array(place)))
+            has_cabin = obstacle.kind == "dinghy" and round(1000.0 * obstacle.length) % 2
+            name = "cabin dinghy" if has_cabin else obstacle.kind
+            mesh.add_solid(name, (*place, 0.0), obstacle.yaw, size, light)
         return mesh
 
     def _light_at(self, points: Array) -> Array:
@@ -194,32 +268,30 @@ class Surfaces:
 
     def _add_wall(self, mesh: QuadMesh, wall: Wall, low: float, high: float, offset: float) -> None:
         """Add a wall between two heights, m, in pieces short enough for the light to vary."""
-        start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
-        length = float(np.hypot(*(end - start)))
-        columns = max(1, int(np.ceil(length / _LONGEST)))
-        share = np.linspace(0.0, 1.0, columns + 1)
-        across, down = _spread(wall, length, low, high)
+        start, end, (_, _, length) = np.array(wall.start), np.array(wall.end), wall.frame()
+        share = np.linspace(0.0, 1.0, max(1, int(np.ceil(length / _LONGEST))) + 1)
         # Seen from the front, the end of the wall is on the left.
         base = end + share[:, None] * (start - end)
-        rows = low + _ROWS * (high - low)
-        points = np.empty((len(rows), columns + 1, 3))
-        points[..., :2] = base
-        points[..., 2] = rows[:, None]
-        uvs = np.empty((len(rows), columns + 1, 2))
+        across, down = _spread(wall, length, low, high)
+        points, uvs = np.empty((len(_ROWS), len(share), 3)), np.empty((len(_ROWS), len(share), 2))
+        points[..., :2], points[..., 2] = base, (low + _ROWS * (high - low))[:, None]
         uvs[..., 0] = offset * (wall.surface in _PERIOD) + across * share
         uvs[..., 1] = (1.0 - _ROWS[:, None]) * down
-        along = end - start
-        facing = self._facing(float(np.arctan2(along[0], -along[1])))
-        lights = _UPWARDS[:, None] * (facing * self._light_at(base))[None, :]
-        mesh.add_grid(points, uvs, lights)
+        dx, dy = end - start
+        facing = self._facing(float(np.arctan2(dx, -dy)))
+        mesh.add_grid(points, uvs, _UPWARDS[:, None] * (facing * self._light_at(base)))
 
 
 def _level(corners: Array, height: float, period: float, lights: Array) -> QuadMesh:
     """Horizontal quads with a texture of a width `period`, m."""
     mesh = QuadMesh()
-    up = np.full((*corners.shape[:2], 1), height)
-    mesh.add(np.concatenate([corners, up], axis=2), corners / period, lights)
+    mesh.add(_raised(corners, height), corners / period, lights)
     return mesh
+
+
+def _raised(corners: Array, height: float) -> Array:
+    """Corners, m, (n, 4, 2), at a height, m: (n, 4, 3)."""
+    return np.concatenate([corners, np.full((*corners.shape[:2], 1), height)], axis=2)
 
 
 def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, float]:
@@ -230,12 +302,3 @@ def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, 
     if wall.surface in _WHOLE:
         return float(max(1, round(length / _WHOLE[wall.surface]))), 1.0
     return length / _PERIOD[wall.surface], high / _BRICK_HEIGHT if wall.surface == "brick" else 1.0
-
-
-def _add_boxes(mesh: QuadMesh, obstacle: Obstacle, bright: float) -> None:
-    size = np.array([obstacle.length, obstacle.width, obstacle.height])
-    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
-    for half, place, material in _SHAPES["boxes"][obstacle.kind]:
-        dx, dy, dz = np.array(place) * size
-        middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
-        add_box(mesh, middle, np.array(half) * size, obstacle.yaw, material, bright)
