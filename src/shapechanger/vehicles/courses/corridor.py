@@ -206,8 +206,9 @@ def _furnish(
 ) -> None:
     """Add furniture along the walls, and a few boxes in the way."""
     density = rng.uniform(0.1, 0.35)  # Obstacles per metre.
-    for k, (ahead, length) in enumerate(zip(*_legs(corners), strict=True)):
-        yaw = float(np.arctan2(ahead[1], ahead[0]))
+    ahead, lengths = _legs(corners)
+    for k, length in enumerate(lengths.tolist()):
+        yaw = float(np.arctan2(ahead[k, 1], ahead[k, 0]))
         for _ in range(rng.poisson(density * length)):
             size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
             t = float(rng.uniform(1.2, length - 1.2))
@@ -217,7 +218,7 @@ def _furnish(
             if obstacle.kind in ("box", "crate") and rng.random() < 0.4:
                 aside *= float(rng.uniform(0.4, 0.9))
                 obstacle = replace(obstacle, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
-            x, y = corners[k] + ahead * t + normals[k] * side * aside
+            x, y = corners[k] + ahead[k] * t + normals[k] * side * aside
             obstacle = replace(obstacle, x=float(x), y=float(y))
             obstacles.offer(obstacle, float(along[(k + 1) % len(along)]) - (length - t))
 
@@ -247,10 +248,11 @@ def _lamps(
     long, wide = float(rng.uniform(0.9, 1.3)), float(rng.uniform(0.12, 0.3))
     across = rng.random() < 0.35
     lamps: list[Lamp] = []
-    for corner, width, ahead, length in zip(corners, widths, *_legs(corners), strict=True):
+    ahead, lengths = _legs(corners)
+    for k, length in enumerate(lengths.tolist()):
         count = max(1, round(length / every))
-        yaw = float(np.arctan2(ahead[1], ahead[0])) + (np.pi / 2.0 if across else 0.0)
+        yaw = float(np.arctan2(ahead[k, 1], ahead[k, 0])) + (np.pi / 2.0 if across else 0.0)
         for i in range(count):
-            x, y = corner + ahead * length * (i + 0.5) / count
-            lamps.append(Lamp(float(x), float(y), yaw, min(long, 0.6 * float(width)), wide))
+            x, y = corners[k] + ahead[k] * length * (i + 0.5) / count
+            lamps.append(Lamp(float(x), float(y), yaw, min(long, 0.6 * float(widths[k])), wide))
     return tuple(lamps)
