@@ -38,13 +38,14 @@ from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import use_one_thread
+from shapechanger.vehicles.cameras.rectify import CanonicalView
 from shapechanger.vehicles.cloning import CloningSettings, record_demonstrations, state_actions
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.envs.waypoints import waypoint_demonstrator
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
-from shapechanger.vehicles.waypoint_demonstrations import CanonicalView, as_waypoints
+from shapechanger.vehicles.waypoints import as_waypoints
 
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3

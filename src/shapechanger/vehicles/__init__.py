@@ -2,6 +2,6 @@
 
 Begin with `envs`, the Gymnasium envs, and `world`, which simulates a vehicle on a course: `bodies`
 models vehicles, `courses` lays out and draws places, `cameras` render and corrupt images, and
-`expert` drives a known course. `waypoints` is the action that all vehicles share; `learning` trains
-a camera policy from a teacher; `remote` and `twin` reach real and simulated robots.
+`expert` drives a known course. `waypoints` is the action that all vehicles share; `cloning` trains
+camera policies from demonstrations; `remote` and `twin` reach real and simulated robots.
 """

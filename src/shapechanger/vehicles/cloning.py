@@ -1,20 +1,35 @@
-"""Behavioural cloning as a learner: record demonstrations, clone them, evaluate at each budget."""
+"""Camera policies that are cloned from demonstrations, of an expert or of a teacher.
+
+`CloneLearner` records an env's demonstrator, and evaluates a clone at each budget. `train_student`
+learns from a teacher with privileged observations: distances, speed and rate of turn, from which
+reinforcement learning takes two minutes. First the teacher drives, and the student clones it from
+pictures alone (D. Chen et al., "Learning by Cheating", CoRL 2019). Then the student drives, and its
+pictures are labelled with the teacher's actions (S. Ross et al., "A Reduction of Imitation Learning
+and Structured Prediction to No-Regret Online Learning", AISTATS 2011).
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from itertools import pairwise
+from itertools import accumulate, chain, pairwise
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import gymnasium as gym
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import EnvRef, EnvTraits, HasDemonstrator, layouts_of
+from shapechanger.contract.env_ref import (
+    CanBeTaught,
+    EnvRef,
+    EnvTraits,
+    HasDemonstrator,
+    TaskDemonstrator,
+    layouts_of,
+)
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
@@ -23,7 +38,7 @@ from shapechanger.errors import StudyError
 from shapechanger.files import make_folder
 from shapechanger.policy import kind_of, load_policy
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.identities import ENV, identify, known
+from shapechanger.transfer.identities import ENV, identify, known, require_same_env
 from shapechanger.transfer.learners import (
     Learner,
     LearnerSettings,
@@ -37,6 +52,10 @@ from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
 )
+from shapechanger.vehicles.waypoints import LEAST_THROTTLE
+
+if TYPE_CHECKING:
+    from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
 
 class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
@@ -113,63 +132,68 @@ class Demonstrations(NamedTuple):
     Attributes:
         pictures: (n, h, w, 3) as a policy sees them.
         actions: (n, 2) intended action of the demonstrator at each picture.
-        done: (n, 2) executed action.
-        rewards: (n,) reward of the executed action.
         episodes: Number of steps of each episode, in order.
     """
 
     pictures: NDArray[np.uint8]
     actions: NDArray[np.float32]
-    done: NDArray[np.float32]
-    rewards: NDArray[np.float32]
     episodes: tuple[int, ...]
 
     def first(self, steps: int) -> Demonstrations:
         """Return the first `steps` steps."""
-        episodes: list[int] = []
-        left = steps
-        for length in self.episodes:
-            if left > 0:
-                episodes.append(min(length, left))
-                left -= length
-        return Demonstrations(
-            self.pictures[:steps],
-            self.actions[:steps],
-            self.done[:steps],
-            self.rewards[:steps],
-            tuple(episodes),
-        )
+        begins = [0, *accumulate(self.episodes)]
+        lengths = (min(end, steps) - begin for begin, end in pairwise(begins))
+        kept = tuple(length for length in lengths if length > 0)
+        return Demonstrations(self.pictures[:steps], self.actions[:steps], kept)
+
+
+def drive(
+    env: gym.Env[Any, Any],
+    demonstrator: TaskDemonstrator,
+    steps: int,
+    framing: Framing,
+    seed: int | None,
+    chosen: Callable[[NDArray[np.uint8], NDArray[np.float32]], NDArray[np.float32]],
+    on_steps: Callable[[int], None] = lambda steps: None,
+) -> Demonstrations:
+    """Drive, and record what a demonstrator does.
+
+    Args:
+        env: An env of a camera.
+        demonstrator: Its demonstrator.
+        steps: Number of steps.
+        framing: Part of the frame that is recorded.
+        seed: Seed of the first reset.
+        chosen: Returns the action to take, for a frame and the demonstrator's disturbed action.
+        on_steps: Called with the number of steps driven, after each episode.
+    """
+    pictures: list[NDArray[np.uint8]] = []
+    actions = np.empty((steps, 2), np.float32)
+    episodes: list[int] = []
+    while len(pictures) < steps:
+        seen = env.reset(seed=None if episodes else seed)[0]
+        demonstrator.begin()
+        episodes.append(0)
+        over = False
+        while not over and len(pictures) < steps:
+            actions[len(pictures)], disturbed = demonstrator.act()
+            pictures.append(prepare(seen[np.newaxis], framing)[0])
+            seen, _, terminated, truncated, _ = env.step(chosen(seen, disturbed))
+            episodes[-1] += 1
+            over = terminated or truncated
+        on_steps(len(pictures))
+    return Demonstrations(np.stack(pictures), actions, tuple(episodes))
 
 
 def record_demonstrations(
-    env: EnvRef,
-    steps: int,
-    episode_steps: int,
-    seed: int,
-    framing: Framing,
+    env: EnvRef, steps: int, episode_steps: int, seed: int, framing: Framing
 ) -> Demonstrations:
     """Record the demonstrator of an env."""
     with closing(env.make(max_episode_steps=episode_steps)) as made:
         if not isinstance(made.unwrapped, HasDemonstrator):
             raise StudyError(f"{env} has no demonstrator to learn from.")
         driver = made.unwrapped.demonstrator(seed)
-        pictures: list[NDArray[np.uint8]] = []
-        actions, executed = np.empty((2, steps, 2), np.float32)
-        rewards = np.empty(steps, np.float32)
-        episodes: list[int] = []
-        while len(pictures) < steps:
-            seen = made.reset(seed=seed if not episodes else None)[0]
-            driver.begin()
-            episodes.append(0)
-            over = False
-            while not over and len(pictures) < steps:
-                step = len(pictures)
-                actions[step], executed[step] = driver.act()
-                pictures.append(prepare(seen[np.newaxis], framing)[0])
-                seen, rewards[step], terminated, truncated, _ = made.step(executed[step])
-                episodes[-1] += 1
-                over = terminated or truncated
-    return Demonstrations(np.stack(pictures), actions, executed, rewards, tuple(episodes))
+        return drive(made, driver, steps, framing, seed, lambda _, disturbed: disturbed)
 
 
 def load_or_record(
@@ -179,8 +203,8 @@ def load_or_record(
     path = file.path
     if path.exists():
         with np.load(path) as arrays:
-            named = {name: arrays[name] for name in Demonstrations._fields[:-1]}
-            found = Demonstrations(**named, episodes=tuple(arrays["episodes"].tolist()))
+            episodes = tuple(arrays["episodes"].tolist())
+            found = Demonstrations(arrays["pictures"], arrays["actions"], episodes)
         if len(found.actions) >= steps:
             return found.first(steps)
     recorded = record_demonstrations(env, steps, episode_steps, file.seed, framing)
@@ -332,4 +356,119 @@ def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
     if layout.names == ("steering", "throttle"):
         return policy
     card = msgspec.structs.replace(policy.card, action_layout=layout)
+    return CameraPolicy(policy.network, card)
+
+
+STUDENT_STEPS: Final = 7200
+"""Default steps of a student: six minutes, a third of which the teacher drives."""
+
+STUDENT_CLONING: Final = CloneSettings(held_out=0.0, passes=50.0, most_steps=3000)
+"""Default settings of its cloning."""
+
+_EPISODE_STEPS: Final = 200
+# Rounds that the student drives, trained anew before each, after one round of the teacher. With one
+# round of as many steps students had 1.8 collisions per 100 m.
+_ROUNDS: Final = 2
+# Limit of the training steps of the clones that drive a round.
+_BETWEEN: Final = 1500
+
+
+def train_student(
+    env: EnvRef,
+    teacher: TrainedPolicy,
+    steps: int,
+    seed: int,
+    *,
+    settings: CloneSettings = STUDENT_CLONING,
+    on_steps: Callable[[int], None] = lambda steps: None,
+) -> CameraPolicy:
+    """Train a camera policy from a teacher.
+
+    Args:
+        env: The student's env, such as `Car`.
+        teacher: A policy of the same vehicle on distances, such as one of `CarRanges`.
+        steps: Steps of driving: a third by the teacher, the others by the student.
+        seed: Seed of everything random.
+        settings: Settings of its cloning.
+        on_steps: Called with the number of steps driven, after each episode.
+
+    Raises:
+        StudyError: If the env has no teachers, the policy is of another env, or there is not at
+            least one step for each round.
+    """
+    if steps < 1 + _ROUNDS:
+        raise StudyError(
+            f"The teacher drives at least one step and the student {_ROUNDS}, got {steps} in total."
+        )
+    with closing(env.make(max_episode_steps=_EPISODE_STEPS)) as made:
+        inner = made.unwrapped
+        if not isinstance(inner, CanBeTaught):
+            raise StudyError(
+                f"{env} has no teachers: choose an env of a vehicle's camera, such as Car."
+            )
+        wanted, taught = inner.teacher_env, teacher.card.env.id
+        if taught != wanted:
+            name = wanted.rpartition("/")[2].removesuffix("-v1")
+            raise StudyError(
+                f"A teacher for {env.id} is a policy of {wanted}, and this one is of {taught}: "
+                f"train one by `shapechanger train {name}`."
+            )
+        if ENV in teacher.card.identity:
+            now = identify(teacher.card.env).identity
+            remedy = "Train the teacher again."
+            require_same_env(teacher.card.identity, teacher.card.env, now, "the teacher", remedy)
+        driver = inner.taught_by(teacher.act, seed)
+
+        def lesson(
+            steps: int, before: int = 0, student: CameraPolicy | None = None
+        ) -> Demonstrations:
+            return drive(
+                made,
+                driver,
+                steps,
+                settings.framing,
+                seed if student is None else None,
+                lambda seen, act: _moving(act) if student is None else student.predict(seen),
+                lambda done: on_steps(before + done),
+            )
+
+        each = steps // (1 + _ROUNDS)
+        shown = [lesson(steps - _ROUNDS * each)]
+        for _ in range(_ROUNDS):
+            student = _student(shown, settings, seed, most_steps=_BETWEEN)
+            shown.append(lesson(each, sum(len(one.actions) for one in shown), student))
+    policy = _student(shown, settings, seed)
+    return stated(policy, env, demonstrated_steps=steps, teacher=taught)
+
+
+def _moving(action: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return steering and throttle, (..., 2), with at least the least throttle.
+
+    Pictures do not show the speed. If the teacher brakes or starts depending on it, a clone takes
+    the mean of both actions; one stood still on one course of 17. So it never drives with less.
+    """
+    return np.maximum(action, np.array((-np.inf, LEAST_THROTTLE), np.float32))
+
+
+def _student(
+    shown: Sequence[Demonstrations],
+    settings: CloneSettings,
+    seed: int,
+    most_steps: int | None = None,
+) -> CameraPolicy:
+    """Clone a teacher from all that was recorded, in at most this many training steps."""
+    most = min(most_steps or settings.most_steps, settings.most_steps)
+    fewest = min(settings.fewest_steps, most)
+    pictures, labels, episodes = zip(*shown, strict=True)
+    actions = _moving(np.concatenate(labels))
+    # The whole range of the throttle above the least is the range of the network's output.
+    actions[:, 1] = 2.0 * ((actions[:, 1] - LEAST_THROTTLE) / (1.0 - LEAST_THROTTLE)) - 1.0
+    policy, _ = clone(
+        np.concatenate(pictures),
+        actions,
+        settings=msgspec.structs.replace(settings, most_steps=most, fewest_steps=fewest),
+        seed=seed % 2**31,
+        episodes=tuple(chain(*episodes)),
+    )
+    card = msgspec.structs.replace(policy.card, low=(-1.0, LEAST_THROTTLE), high=(1.0, 1.0))
     return CameraPolicy(policy.network, card)

@@ -1,19 +1,27 @@
-"""The action of the envs with waypoints, and its conversion to steering and back."""
+"""Waypoints, the action that all vehicles share: to steering, from steering, and from recordings.
+
+The frames of all vehicles are warped to one virtual camera, in which waypoints are seen.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.world import STANDING_MPS, STANDING_RADPS
-from shapechanger.errors import ShapechangerError, SpaceMismatch, StudyError, WorldError
+from shapechanger.errors import DemosError, ShapechangerError, SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
+from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, HALF_WIDTH_RAD, Rectifier
+
+if TYPE_CHECKING:
+    from shapechanger.demos.dataset import Dataset
 
 AHEAD_M: Final = 0.8
 """Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
@@ -21,8 +29,10 @@ AHEAD_M: Final = 0.8
 WIDEST_RAD: Final = 1.0
 """Bearing of the waypoint at an action of -1 or 1, rad."""
 
+LEAST_THROTTLE: Final = 0.25
+"""Least throttle, in size, that overcomes the friction at rest of all vehicles."""
+
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
-_LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
 # Of a fit to a drive: largest change of the steering within the lag of the turn, the jitter of the
 # steps' times, and the least share of the turning that the steering must explain.
@@ -36,6 +46,11 @@ _ROUNDING: Final = 1e-9
 # is left out because the vehicle is still changing its motion.
 _SECONDS: Final = 5.0
 _HOLD: Final = 6
+
+# Ways out of a missing sensor: of the speed, and of the rate of turn alone.
+_WITHOUT: Final = ("leave out sensed", "pass response=(RAD_PER_M, RAD_PER_S)")
+_COMMANDS: Final = ("steering", "throttle")
+_MOTION: Final = ("steering/applied", "speed", "yaw_rate")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +99,8 @@ def measure_response(
     """Measure how a vehicle turns, from 5 s of its own motion at random commands.
 
     Args:
-        env: A vehicle that observes numbers, with steering and throttle as its action. It is reset.
-        speed_at: Place of the speed, m/s, in its observation.
+        env: A vehicle with steering and throttle as its action. It is reset.
+        speed_at: Place of the speed, m/s, in the numbers that it observes.
         yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
         seed: Seed of the start and the commands.
 
@@ -106,8 +121,9 @@ def measure_response(
             command = np.array((rng.uniform(-0.5, 0.5), rng.uniform(0.4, 0.8)), np.float32)
         seen, _, terminated, truncated, _ = env.step(command)
         if step % _HOLD >= _HOLD // 2:
-            turning.append((float(command[0] * seen[speed_at]), float(command[0])))
-            rates.append(-float(seen[yaw_rate_at]))
+            numbers = _numbers(seen)
+            turning.append((float(command[0] * numbers[speed_at]), float(command[0])))
+            rates.append(-float(numbers[yaw_rate_at]))
         if terminated or truncated:
             env.reset()
             step = -1
@@ -213,39 +229,37 @@ def command(
         )
     bearing, share = np.clip(values, -1.0, 1.0).tolist()
     steering = response.steering(bearing * WIDEST_RAD, speed)
-    throttle = max(_LEAST_THROTTLE, 0.5 * (share + 1.0))
+    throttle = max(LEAST_THROTTLE, 0.5 * (share + 1.0))
     if on_the_spot:
-        throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
+        throttle = min(throttle, max(LEAST_THROTTLE, 1.0 - abs(steering)))
     return np.array((steering, throttle), np.float32)
 
 
-def rectifier_of(
-    name: str,
-    pitch_deg: float | None,
-    fovy_deg: float | None,
-    size: tuple[int, int],
-    error: type[ShapechangerError],
-) -> Rectifier:
-    """Return what warps the frames of a robot's camera to the virtual camera.
+def _numbers(seen: Any) -> NDArray[np.float32]:
+    """Return the numbers of an observation, which may have a frame, too."""
+    return seen["state"] if isinstance(seen, dict) else seen
+
+
+def places_of_motion(
+    env: gym.Env[Any, Any], names: Sequence[str], robot: str, error: type[ShapechangerError]
+) -> list[int]:
+    """Return the places of a vehicle's motion in the numbers that it observes.
 
     Args:
-        name: Name of the robot or its profile, for errors.
-        pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
-        fovy_deg: Vertical field of view, degrees; None if unknown.
-        size: Width and height of its frames, pixels.
-        error: Error to raise if one is unknown, or the camera sees too little.
+        env: The vehicle.
+        names: Quantities, such as "speed".
+        robot: Name of the robot or its profile, for errors.
+        error: Error to raise if a quantity is not measured.
     """
-    if pitch_deg is None or fovy_deg is None:
-        numbers = {"pitch_deg": pitch_deg, "fovy_deg": fovy_deg}
-        missing = " and ".join(key for key, value in numbers.items() if value is None)
+    slices: dict[str, slice] = env.get_wrapper_attr("observation_layout").slices
+    missing = [name for name in names if name not in slices]
+    if missing:
         raise error(
-            f"{name}: [camera] does not state {missing}, which waypoints need: `shapechanger robot "
-            "camera` measures them from one picture of a checkerboard, and writes a profile to use."
+            f"{robot} has no sensor of {' and '.join(missing)}, which waypoints need: add it to "
+            f"the profile, or {_WITHOUT[missing == ['yaw_rate']]}."
         )
-    try:
-        return Rectifier(CameraGeometry(pitch_deg, fovy_deg), size)
-    except WorldError as reason:
-        raise error(f"{name}: {reason}") from reason
+    pixels = slices["camera/image"].stop if "camera/image" in slices else 0
+    return [slices[name].start - pixels for name in names]
 
 
 class WaypointView(gym.Env[Any, NDArray[np.float32]]):
@@ -258,9 +272,10 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
     response: SteeringResponse | None
     _env: Any
 
-    def _see(self, rectifier: Rectifier, *, turns_on_the_spot: bool) -> None:
+    def _see(self, rectifier: Rectifier, speed_at: int, *, turns_on_the_spot: bool) -> None:
         """Set the spaces and layouts."""
-        self._rectifier, self._turns_on_the_spot = rectifier, turns_on_the_spot
+        self._rectifier, self._speed_at = rectifier, speed_at
+        self._turns_on_the_spot = turns_on_the_spot
         self._speed = 0.0
         self.observation_space = gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -289,17 +304,18 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
         seen, reward, terminated, truncated, info = self._env.step(steering)
         return self._rectified(seen), reward, terminated, truncated, info
 
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the newest frame as the camera took it; see the vehicle's own env."""
+        return self._env.render()
+
     def close(self) -> None:
         """Release the renderer or the robot."""
         self._env.close()
 
     def _rectified(self, seen: Any) -> NDArray[np.uint8]:
-        self._speed, image = self._split(seen)
-        return self._rectifier(image)
-
-    def _split(self, seen: Any) -> tuple[float, NDArray[np.uint8]]:
-        """Return the speed, m/s, and the frame of an observation."""
-        raise NotImplementedError
+        self._speed = float(np.nan_to_num(_numbers(seen)[self._speed_at]))
+        has_image = isinstance(seen, dict)
+        return self._rectifier(seen["image"] if has_image else self._env.world.picture())
 
 
 class WaypointLabels(NamedTuple):
@@ -344,10 +360,124 @@ def waypoints_of(
     turns = np.abs(steering) * response.per_second >= STANDING_RADPS
     # Backwards it cannot point ahead; at rest only a throttle, or tracks that turn, say something.
     usable = np.where(
-        moves, speed > 0.0, (throttle >= _LEAST_THROTTLE) | ((throttle >= 0.0) & turns)
+        moves, speed > 0.0, (throttle >= LEAST_THROTTLE) | ((throttle >= 0.0) & turns)
     )
     return WaypointLabels(
         np.stack((bearing, np.clip(2.0 * throttle - 1.0, -1.0, 1.0)), axis=1).astype(np.float32),
         usable & np.isfinite(values).all(axis=1) & np.isfinite(speed),
         (np.abs(steering) >= _AT_LOCK) | (np.abs(sine) >= widest),
     )
+
+
+class WaypointDemonstrations(NamedTuple):
+    """Demonstrations with waypoints as actions.
+
+    Attributes:
+        data: The demonstrations.
+        kept: Which of the given steps they are, shape (n,).
+        response: How the vehicle that was driven turns.
+        notes: Sentences on what was done.
+    """
+
+    data: Dataset
+    kept: NDArray[np.bool_]
+    response: SteeringResponse
+    notes: tuple[str, ...]
+
+
+def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> WaypointDemonstrations:
+    """Return demonstrations of steering and throttle as demonstrations of waypoints.
+
+    Steps that do not say where the way is are left out; see `waypoints_of`.
+
+    Args:
+        data: The demonstrations, with rectified pictures.
+        response: How the vehicle turns; None to fit it to the recorded motion.
+
+    Raises:
+        DemosError: If the actions are others, there are no pictures, the response or the speed is
+            unknown, or no step is left.
+    """
+    names = data.action_layout.names
+    if names == ACTION_LAYOUT.names:
+        raise DemosError("These demonstrations have waypoints as actions: leave out --waypoints.")
+    if names != _COMMANDS:
+        raise DemosError(
+            f"Waypoints follow from steering and throttle, and these demonstrations have the "
+            f"actions {', '.join(names)}."
+        )
+    if data.pictures is None:
+        raise DemosError("These demonstrations have no pictures, and waypoints are seen in them.")
+    source = "as given"
+    if response is None:
+        response, source = _fitted(data), "fitted to the recorded motion"
+    labels = waypoints_of(data.actions, response, _speed(data, response))
+    kept = labels.usable
+    if not kept.any():
+        raise DemosError("In no step of these demonstrations does the vehicle drive forward.")
+    ends = np.cumsum(data.episodes)
+    lengths = [int(part.sum()) for part in np.split(kept, ends[:-1])]
+    beside = np.abs(labels.actions[kept, 0]) * WIDEST_RAD > HALF_WIDTH_RAD
+    notes = (
+        f"The vehicle turns {response.per_metre:.2f} rad for each metre and "
+        f"{response.per_second:.2f} for each second at full steering, {source}.",
+        f"{np.mean(~kept):.1%} of the steps are left out: it stands still, drives backward, or did "
+        "not measure its speed.",
+        f"{np.mean(beside):.1%} of the waypoints are beside the picture, which ends "
+        f"{math.degrees(HALF_WIDTH_RAD):.0f} degrees to each side; "
+        f"{np.mean(labels.at_limit[kept]):.1%} are at the limit of the steering, so that the way "
+        "may be farther aside.",
+    )
+    converted = dataclasses.replace(
+        data,
+        pictures=data.pictures[kept],
+        states=None,
+        actions=labels.actions[kept],
+        episodes=tuple(length for length in lengths if length),
+        times_s=data.times_s[kept],
+        files=tuple(file for file, keep in zip(data.files, kept, strict=True) if keep),
+        action_layout=ACTION_LAYOUT,
+        state_layout=None,
+    )
+    return WaypointDemonstrations(converted, kept, response, notes)
+
+
+def _fitted(data: Dataset) -> SteeringResponse:
+    """Fit the response to the recorded motion."""
+    motion = [_column(data, name) for name in _MOTION]
+    missing = [name for name, column in zip(_MOTION, motion, strict=True) if column is None]
+    try:
+        if missing:
+            raise StudyError(
+                "How the vehicle turns is unknown, because the recording lacks "
+                f"{', '.join(missing)}."
+            )
+        steering, speed, yaw_rate = cast("list[NDArray[np.float64]]", motion)
+        return fit_response(steering, speed, yaw_rate, data.times_s)
+    except StudyError as error:
+        raise DemosError(
+            f"{str(error).rstrip('.')}: give --response RAD_PER_M RAD_PER_S, the `response` of "
+            "RemoteWaypoint-v1 after its first reset."
+        ) from error
+
+
+def _speed(data: Dataset, response: SteeringResponse) -> NDArray[np.float64]:
+    """Return the speed at each step, m/s; NaN where it is unknown."""
+    speed = _column(data, "speed")
+    if speed is not None:
+        return speed
+    if response.per_second > 0.0:
+        raise DemosError(
+            "The recording has no speed, on which the waypoint depends in a vehicle that turns "
+            f"{response.per_second:g} rad for each second: record it with a sensor of speed."
+        )
+    # The circle of wheels does not depend on the speed; with a throttle they roll forward.
+    return np.where(data.actions[:, 1] > 0.0, 1.0, np.nan)
+
+
+def _column(data: Dataset, name: str) -> NDArray[np.float64] | None:
+    """Return a number of the state at each step, (n,); None if it was not recorded."""
+    layout, states = data.state_layout, data.states
+    if layout is None or states is None or name not in layout.names:
+        return None
+    return states[:, layout.slices[name].start].astype(np.float64)

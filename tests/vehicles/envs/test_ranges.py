@@ -17,10 +17,10 @@ from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
 from shapechanger.vehicles.envs.ranges import (
     BEARINGS_DEG,
     FARTHEST_M,
-    LEAST_THROTTLE,
     MeanOutputs,
     leave_rest,
 )
+from shapechanger.vehicles.waypoints import LEAST_THROTTLE
 
 _COURSE = {"course": 2, "start": 2}
 _STEPS = 60

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.evaluation import EvaluationResult
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.vehicles.cameras.rectify import CanonicalView
     from shapechanger.vehicles.cloning import CloningSettings
-    from shapechanger.vehicles.waypoint_demonstrations import CanonicalView
     from shapechanger.vehicles.waypoints import SteeringResponse
 
 
@@ -82,7 +82,7 @@ class TrainClone:
         data = load_dataset(self.data, shrink=shrinking)
         origin: dict[str, Any] = {}
         if view is not None:
-            from shapechanger.vehicles.waypoint_demonstrations import as_waypoints
+            from shapechanger.vehicles.waypoints import as_waypoints
 
             shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):
@@ -175,9 +175,9 @@ class TrainClone:
 
 def _view(camera: tuple[float, float] | None) -> CanonicalView:
     """Return how pictures are warped to the virtual camera, from pitch and field of view given."""
-    from shapechanger.vehicles.waypoint_demonstrations import CanonicalView, camera_geometry
+    from shapechanger.vehicles.cameras.rectify import CameraGeometry, CanonicalView
 
-    return CanonicalView(None if camera is None else camera_geometry(*camera))
+    return CanonicalView(None if camera is None else CameraGeometry(*camera))
 
 
 def _response(given: tuple[float, float] | None) -> SteeringResponse | None:
@@ -257,7 +257,7 @@ class Evaluate:
         shrinking = ShrunkFrames(policy.card.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         if view is not None and view.rectifiers:
-            from shapechanger.vehicles.waypoint_demonstrations import as_waypoints
+            from shapechanger.vehicles.waypoints import as_waypoints
 
             shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):

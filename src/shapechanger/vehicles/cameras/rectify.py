@@ -8,13 +8,17 @@ same field of view for all, and sees no part of the vehicle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra, WorldError
+from shapechanger.errors import DemosError, MissingExtra, ShapechangerError, WorldError
+from shapechanger.layout import Layout
+
+if TYPE_CHECKING:
+    from shapechanger.demos.episodes import EpisodeHeader
 
 CANONICAL_SIZE: Final = (80, 48)
 """Width and height of a rectified picture, pixels."""
@@ -36,6 +40,7 @@ _FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
 _PITCH_SD_DEG: Final = 1.0
 _FOVY_SD_DEG: Final = 2.5
 _MOST_TILT_DEG: Final = 45.0
+_CORNER_SD_PX: Final = 0.1
 _YELLOW: Final = (255, 220, 0)
 
 
@@ -46,10 +51,20 @@ class CameraGeometry:
     Attributes:
         pitch_deg: Angle of the optical axis below the horizon, degrees.
         fovy_deg: Vertical field of view, degrees, above 0 and below 180.
+
+    Raises:
+        WorldError: If there is no such camera.
     """
 
     pitch_deg: float
     fovy_deg: float
+
+    def __post_init__(self) -> None:
+        if not (abs(self.pitch_deg) < 90.0 and 0.0 < self.fovy_deg < 180.0):
+            raise WorldError(
+                "A camera's pitch is from -90 to 90 degrees and its field of view from 0 to 180, "
+                f"got {self.pitch_deg:g} and {self.fovy_deg:g}."
+            )
 
 
 class Rectifier:
@@ -113,6 +128,95 @@ class Rectifier:
         return mean.astype(np.uint8).reshape(CANONICAL_SIZE[1], CANONICAL_SIZE[0], 3)
 
 
+def rectifier_of(
+    robot: str,
+    pitch_deg: float | None,
+    fovy_deg: float | None,
+    size: tuple[int, int] | None,
+    error: type[ShapechangerError],
+) -> Rectifier:
+    """Return the rectifier of a robot's camera.
+
+    Args:
+        robot: Name of the robot or its profile, for errors.
+        pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
+        fovy_deg: Vertical field of view, degrees; None if unknown.
+        size: Width and height of its frames, pixels; None without a camera.
+        error: Error to raise if something is unknown, or the camera sees too little.
+    """
+    if size is None:
+        raise error(f"{robot} has no camera, which a policy with waypoints needs.")
+    if pitch_deg is None or fovy_deg is None:
+        numbers = {"pitch_deg": pitch_deg, "fovy_deg": fovy_deg}
+        missing = " and ".join(key for key, value in numbers.items() if value is None)
+        raise error(
+            f"{robot}: [camera] does not state {missing}, which waypoints need: `shapechanger "
+            "robot camera` measures them from one picture of a checkerboard, and writes a profile "
+            "to use."
+        )
+    try:
+        return Rectifier(CameraGeometry(pitch_deg, fovy_deg), size)
+    except WorldError as reason:
+        raise error(f"{robot}: {reason}") from reason
+
+
+@dataclass
+class CanonicalView:
+    """Warps pictures to the virtual camera of all vehicles.
+
+    Attributes:
+        camera: Pitch and vertical field of view of the camera, degrees; None for those that each
+            episode states.
+        rectifiers: Those used so far, by camera and size of its pictures.
+        bodies: Bodies of the episodes.
+    """
+
+    camera: CameraGeometry | None = None
+    rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = field(
+        default_factory=dict[tuple[CameraGeometry, tuple[int, int]], Rectifier]
+    )
+    bodies: set[str] = field(default_factory=set[str])
+
+    def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
+        """Return a picture of an episode as the virtual camera would have taken it.
+
+        Pictures of episodes whose actions are waypoints are so already.
+
+        Raises:
+            DemosError: If the camera is unknown, or the episodes are of several bodies.
+            WorldError: If there is no such camera, or it does not see what the virtual camera sees.
+        """
+        self.bodies.add(header.body)
+        if len(self.bodies) > 1:
+            raise DemosError(
+                f"These demonstrations are of several bodies, {', '.join(sorted(self.bodies))}, "
+                "which turn differently: learn from one at a time."
+            )
+        if Layout.from_json(header.action_layout).names[0].startswith("waypoint/"):
+            return picture
+        camera, pitch, fovy = self.camera, header.camera_pitch_deg, header.camera_fovy_deg
+        if camera is None:
+            if pitch is None or fovy is None:
+                raise DemosError(
+                    "The recording does not state pitch and field of view of its camera: give "
+                    "--camera PITCH FOVY, in degrees, which `shapechanger robot camera` measures."
+                )
+            camera = CameraGeometry(pitch, fovy)
+        key = camera, (picture.shape[1], picture.shape[0])
+        if key not in self.rectifiers:
+            self.rectifiers[key] = Rectifier(*key)
+        return self.rectifiers[key](picture)
+
+    def note(self) -> str:
+        """Return a sentence on the cameras."""
+        cameras = sorted({(one.pitch_deg, one.fovy_deg) for one, _ in self.rectifiers})
+        each = " and ".join(
+            f"looks {pitch:.3g} degrees down with a vertical field of view of {fovy:.3g}"
+            for pitch, fovy in cameras
+        )
+        return f"Pictures are warped to the camera of all vehicles; the one that took them {each}."
+
+
 @dataclass(frozen=True, slots=True)
 class MeasuredCamera:
     """A camera's geometry from a picture of a checkerboard.
@@ -154,8 +258,8 @@ def measure_camera(
 ) -> MeasuredCamera:
     """Measure a camera's geometry from one picture of a checkerboard that stands upright.
 
-    Corners are found by OpenCV; focal length and pose of a camera without distortion, with square
-    pixels and its axis in the middle, are fitted to them by least squares.
+    OpenCV finds the corners, and fits focal length and pose of a camera without distortion, with
+    square pixels and its axis in the middle.
 
     Args:
         picture: Shape (height, width, 3), of the camera's whole field of view. Without `fovy_deg`
@@ -169,31 +273,49 @@ def measure_camera(
         WorldError: If there is no such board in the picture, or it does not tell the geometry.
     """
     points = _find_corners(picture, corners)
+    import cv2
+
     height, width = picture.shape[:2]
-    pixels = points - 0.5 * np.array((width, height))
-    board = np.stack(np.meshgrid(np.arange(corners[0]), np.arange(corners[1])), axis=-1).reshape(
-        -1, 2
+    board = np.zeros((len(points), 3), np.float32)
+    board[:, :2] = np.mgrid[: corners[0], : corners[1]].T.reshape(-1, 2)
+    flags = (
+        cv2.CALIB_USE_INTRINSIC_GUESS
+        | cv2.CALIB_FIX_ASPECT_RATIO
+        | cv2.CALIB_FIX_PRINCIPAL_POINT
+        | cv2.CALIB_ZERO_TANGENT_DIST
+        | cv2.CALIB_FIX_K1
+        | cv2.CALIB_FIX_K2
+        | cv2.CALIB_FIX_K3
     )
-    board = board - board.mean(axis=0)
-    fits = [
-        _fit(board, pixels, height, first, free=fovy_deg is None)
-        for first in (_FIRST_FOVY_DEG if fovy_deg is None else (fovy_deg,))
-    ]
-    solution, covariance, error = min(fits, key=lambda fit: fit[2])
-    fovy = math.degrees(2.0 * math.atan(0.5 * height / math.exp(solution[6])))
+    if fovy_deg is not None:
+        flags |= cv2.CALIB_FIX_FOCAL_LENGTH
+    fits: list[tuple[Any, ...]] = []
+    for first in _FIRST_FOVY_DEG if fovy_deg is None else (fovy_deg,):
+        focal = 0.5 * height / math.tan(0.5 * math.radians(first))
+        lens = np.array(
+            ((focal, 0.0, 0.5 * (width - 1)), (0.0, focal, 0.5 * (height - 1)), (0.0, 0.0, 1.0))
+        )
+        fits.append(
+            cv2.calibrateCameraExtended(
+                [board], [points], (width, height), lens, np.zeros(5), flags=flags
+            )
+        )
+    error, lens, _, turns, _, lens_sd, pose_sd, _ = min(fits, key=lambda fit: fit[0])
+    # Corners are read to a tenth of a pixel at best in each direction, however well a model fits.
+    scale = max(1.0, math.sqrt(2.0) * _CORNER_SD_PX / error)
+    focal = float(lens[1, 1])
+    fovy = math.degrees(2.0 * math.atan(0.5 * height / focal))
+    # d fovy / d focal = -sin(fovy) / focal.
+    fovy_sd = scale * float(lens_sd[1, 0]) * math.degrees(math.sin(math.radians(fovy))) / focal
+    turn, slopes = cv2.Rodrigues(turns[0])
     # The side of the board that is nearer to the vertical of the picture points down.
-    sides = _turn(solution[:3])[:, :2]
-    side = int(np.argmax(np.abs(sides[1])))
-    sign = math.copysign(1.0, sides[1, side])
-
-    def pitch_of(turn: NDArray[np.float64]) -> float:
-        return math.degrees(math.asin(sign * _turn(turn)[2, side]))
-
-    pitch = pitch_of(solution[:3])
-    slope = np.array([(pitch_of(solution[:3] + 1e-6 * axis) - pitch) / 1e-6 for axis in np.eye(3)])
-    pitch_sd = math.sqrt(slope @ covariance[:3, :3] @ slope)
-    # d fovy / d log f = -sin(fovy).
-    fovy_sd = math.sqrt(covariance[6, 6]) * math.degrees(math.sin(math.radians(fovy)))
+    side = int(np.argmax(np.abs(turn[1, :2])))
+    sign = math.copysign(1.0, turn[1, side])
+    sine = float(sign * turn[2, side])
+    pitch = math.degrees(math.asin(sine))
+    pitch_sd = scale * math.degrees(
+        float(np.linalg.norm(slopes[:, 6 + side] * pose_sd[:3, 0])) / math.sqrt(1.0 - sine**2)
+    )
     if abs(pitch) > _MOST_TILT_DEG:
         raise WorldError(
             f"The board seems to be tilted by {abs(pitch):.0f} degrees against the camera: it must "
@@ -205,7 +327,7 @@ def measure_camera(
             f"view by {fovy_sd:.1f}: bring the board nearer, turn it by 30 to 45 degrees to one "
             "side, or give the field of view of the camera's data sheet."
         )
-    roll = math.degrees(math.atan2(sign * sides[0, side], sign * sides[1, side]))
+    roll = math.degrees(math.atan2(sign * turn[0, side], sign * turn[1, side]))
     return MeasuredCamera(CameraGeometry(pitch, fovy), roll, pitch_sd, fovy_sd, error)
 
 
@@ -264,8 +386,8 @@ def _seen_at(
     return np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
 
 
-def _find_corners(picture: NDArray[np.uint8], corners: tuple[int, int]) -> NDArray[np.float64]:
-    """Find the inner corners of a board, shape (n, 2), pixels from the top left."""
+def _find_corners(picture: NDArray[np.uint8], corners: tuple[int, int]) -> NDArray[np.float32]:
+    """Find the inner corners of a board, shape (n, 1, 2), in OpenCV's pixels."""
     try:
         import cv2
     except ImportError as error:
@@ -285,59 +407,4 @@ def _find_corners(picture: NDArray[np.uint8], corners: tuple[int, int]) -> NDArr
             f"picture of {grey.shape[1]} x {grey.shape[0]} pixels: show all of it with a white "
             "margin, near and in even light."
         )
-    # OpenCV's pixels have their middles at whole numbers, ours at halves.
-    return np.asarray(points, np.float64).reshape(-1, 2) + 0.5
-
-
-def _fit(
-    board: NDArray[np.float64],
-    pixels: NDArray[np.float64],
-    height: int,
-    fovy_deg: float,
-    *,
-    free: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Fit pose and focal length to corners.
-
-    Args:
-        board: Places on the board, shape (n, 2), in squares.
-        pixels: Places in the picture from its middle, shape (n, 2).
-        height: Height of the picture, pixels.
-        fovy_deg: Vertical field of view to begin with, degrees.
-        free: Whether the focal length is fitted too.
-
-    Returns:
-        Rotation vector, place in squares and log of the focal length, (7,); their covariance, (7,
-        7); and the root mean square error, pixels.
-    """
-    import cv2
-    from scipy.optimize import least_squares
-
-    focal = 0.5 * height / math.tan(0.5 * math.radians(fovy_deg))
-    flat = np.column_stack((board, np.zeros(len(board))))
-    lens = np.diag((focal, focal, 1.0))
-    _, turn, place = cv2.solvePnP(flat, pixels, lens, None, flags=cv2.SOLVEPNP_IPPE)
-
-    def errors(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        seen = board @ _turn(x[:3])[:, :2].T + x[3:6]
-        scale = math.exp(x[6]) if free else focal
-        return (scale * seen[:, :2] / np.maximum(seen[:, 2:], 1e-3) - pixels).ravel()
-
-    start = np.array((*turn.ravel(), *place.ravel(), math.log(focal)))
-    best = least_squares(errors, start, x_scale=(*(3 * [0.1]), *(3 * [1.0]), 0.1))
-    solution = best.x
-    error = math.sqrt(2.0 * best.cost / len(pixels))
-    used = slice(0, 7 if free else 6)
-    # Corners are read to a tenth of a pixel at best, however well a model fits.
-    variance = max(2.0 * best.cost / (pixels.size - used.stop), 0.1**2)
-    covariance = np.zeros((7, 7))
-    slopes = np.asarray(best.jac, np.float64)[:, used]
-    covariance[used, used] = variance * np.linalg.pinv(slopes.T @ slopes)
-    return solution, covariance, error
-
-
-def _turn(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotation matrix, shape (3, 3), of a rotation vector, rad."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_rotvec(vector).as_matrix()
+    return np.asarray(points, np.float32)

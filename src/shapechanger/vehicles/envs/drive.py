@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
 import gymnasium as gym
 import msgspec
@@ -20,7 +20,14 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.drive import DriveReward
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
+from shapechanger.errors import (
+    ProfileError,
+    RenderError,
+    SpaceMismatch,
+    UnknownName,
+    WorldError,
+    check_seed,
+)
 from shapechanger.layout import Layout
 from shapechanger.registry import ROBOTS
 from shapechanger.vehicles.bodies import require_fit, vehicle_model
@@ -134,71 +141,18 @@ _KINDS: Final = {"training": TRAINING, "held-out": HELD_OUT}
 _OPTIONS: Final = ("course", "start")
 
 
-class EpisodeSetup(NamedTuple):
-    """Course, start and appearance of one episode.
-
-    Attributes:
-        course: Seed of the course.
-        start: Seed of the start.
-        look: Light and textures; None for the default ones.
-        camera: Displacement of the camera; None for none.
-    """
-
-    course: int
-    start: int
-    look: Look | None
-    camera: CameraJitter | None
-
-
-class CourseSampler:
-    """Samples course, start and appearance of episodes."""
-
-    def __init__(self, courses: Courses, randomise: bool) -> None:
-        if isinstance(courses, str):
-            if courses not in _KINDS:
-                raise UnknownName("kind of courses", courses, _KINDS)
-            self._seeds: Sequence[int] = _KINDS[courses]
-        else:
-            given: Any = courses  # May be a single seed where nothing checks types.
-            seeds = cast("Iterable[Any]", given if isinstance(given, Iterable) else (given,))
-            self._seeds = tuple(_seed_of("course", seed) for seed in seeds)
-        if not self._seeds:
-            raise WorldError("There are no courses to draw from: give at least one seed.")
-        self._randomise = randomise
-
-    @property
-    def first(self) -> int:
-        """Seed of the first course."""
-        return self._seeds[0]
-
-    def hold_out(self) -> None:
-        """Sample held-out courses from now on."""
-        self._seeds = HELD_OUT
-
-    def draw(
-        self, rng: np.random.Generator, world: str, options: Mapping[str, Any]
-    ) -> EpisodeSetup:
-        """Sample the next episode.
-
-        Args:
-            rng: Source of randomness. Values that `options` give are drawn all the same, so that
-                the others do not depend on the options.
-            world: Kind of place.
-            options: `course` and `start`, each a seed.
-        """
-        for name in options:
-            if name not in _OPTIONS:
-                raise UnknownName("option of reset", name, _OPTIONS)
-        course = self._seeds[int(rng.integers(len(self._seeds)))]
-        start = int(rng.integers(2**31))
-        look = Look.random(world, rng) if self._randomise else None
-        camera = CameraJitter.random(rng) if self._randomise else None
-        return EpisodeSetup(
-            _seed_of("course", options.get("course", course)),
-            _seed_of("start", options.get("start", start)),
-            look,
-            camera,
-        )
+def _course_seeds(courses: Courses) -> Sequence[int]:
+    """Return the seeds of the courses to sample from."""
+    if isinstance(courses, str):
+        if courses not in _KINDS:
+            raise UnknownName("kind of courses", courses, _KINDS)
+        return _KINDS[courses]
+    given: Any = courses  # May be a single seed where nothing checks types.
+    seeds = cast("Iterable[Any]", given if isinstance(given, Iterable) else (given,))
+    checked = tuple(_seed_of("course", seed) for seed in seeds)
+    if not checked:
+        raise WorldError("There are no courses to draw from: give at least one seed.")
+    return checked
 
 
 def _seed_of(kind: str, seed: Any) -> int:
@@ -219,7 +173,6 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     parts: frozenset[str]
     action_layout: Layout
     _world: MujocoWorld
-    _draw: CourseSampler
 
     def _set_up(
         self,
@@ -237,12 +190,14 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         lenses: Sequence[str] = (),
     ) -> None:
         """Open the world, and set what all views of it have; see their arguments."""
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise UnknownName("render mode", render_mode, self.metadata["render_modes"])
         self.render_mode, self._puts_back = render_mode, put_back
-        self._draw = CourseSampler(courses, randomise)
+        self._seeds, self._randomise = _course_seeds(courses), randomise
         self._world = MujocoWorld(
             vehicle,
             world,
-            self._draw.first,
+            self._seeds[0],
             size=robot.size if has_camera or render_mode else None,
             pitch_deg=robot.camera_pitch_deg,
             fovy_deg=robot.camera_fovy_deg,
@@ -264,7 +219,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     def hold_out(self) -> None:
         """Sample held-out courses from the next reset on."""
-        self._draw.hold_out()
+        self._seeds = HELD_OUT
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -282,17 +237,27 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
                 the start.
         """
         super().reset(seed=seed)
-        world = self._world
-        drawn = self._draw.draw(self.np_random, world.course.world, options or {})
-        if drawn.course != world.seed or drawn.look is not None:
-            world.lay_out(drawn.course, drawn.look, drawn.camera)
+        options = options or {}
+        for name in options:
+            if name not in _OPTIONS:
+                raise UnknownName("option of reset", name, _OPTIONS)
+        world, rng = self._world, self.np_random
+        # Given values are drawn, too, so that the others do not depend on the options.
+        course = self._seeds[int(rng.integers(len(self._seeds)))]
+        start = int(rng.integers(2**31))
+        look = Look.random(world.course.world, rng) if self._randomise else None
+        camera = CameraJitter.random(rng) if self._randomise else None
+        course = _seed_of("course", options.get("course", course))
+        start = _seed_of("start", options.get("start", start))
+        if course != world.seed or look is not None:
+            world.lay_out(course, look, camera)
         world.zero_odometer()  # So that no episode depends on earlier ones.
-        world.place(drawn.start)
+        world.place(start)
         self._begin()
         if world.touches:
             raise WorldError(
-                f"The {world.vehicle.name} is stuck at start {drawn.start} of course "
-                f"{drawn.course}: choose another."
+                f"The {world.vehicle.name} is stuck at start {start} of course {course}: choose "
+                "another."
             )
         self._needs_reset = False
         return self._observe()
@@ -357,8 +322,16 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return Demonstrator(self._world, lambda: partial(self.expert(), None), seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the camera's picture, shape (height, width, 3); None without a render mode."""
-        return self._world.picture() if self.render_mode else None
+        """Return the camera's frame, shape (height, width, 3); None without a render mode.
+
+        Raises:
+            RenderError: If `reset` was never called.
+        """
+        if not self.render_mode:
+            return None
+        if self._needs_reset:
+            raise RenderError("Call reset() before render().")
+        return self._world.picture()
 
     @property
     def reach(self) -> float:

@@ -10,17 +10,12 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.contract.limits import (
-    aimed,
-    bump_blocks,
-    bump_ends_ns,
-    forward_actions,
-    slewed,
-)
+from shapechanger.contract.limits import Bump, aimed, forward_actions, slewed
 from shapechanger.contract.plan import GuardPlan, output_values
 from shapechanger.contract.world import STANDING_MPS
 from shapechanger.layout import Feature, Layout
 from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot, space_of
+from shapechanger.vehicles.waypoints import LEAST_THROTTLE
 from shapechanger.vehicles.world import MujocoWorld
 
 BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
@@ -28,12 +23,6 @@ BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
 
 FARTHEST_M: Final = 6.0
 """Distance that it sees where nothing is nearer, m."""
-
-LEAST_THROTTLE: Final = 0.25
-"""Least throttle of a teacher's vehicle that stands, in size; it overcomes the friction at rest.
-
-`shapechanger.vehicles.learning` holds its students to the same.
-"""
 
 _BEARINGS: Final = np.radians(BEARINGS_DEG)
 
@@ -75,17 +64,16 @@ class MeanOutputs:
         """Bring all actions to rest."""
         self.applied = tuple(action.rest for action in self._plan.actions)
         self._now_ns = 0
-        self._block_ends_ns: int | None = None
+        self._bump = Bump(self._plan.limits.bump_hold_ms)
 
     def outputs(
         self, values: tuple[float, ...], bumped: bool, ticks: int
     ) -> Mapping[str, float | None]:
         """Return the mean output of each part over a control period."""
-        hold_ms = self._plan.limits.bump_hold_ms
-        self._block_ends_ns = bump_ends_ns(bumped, self._now_ns, self._block_ends_ns, hold_ms)
+        self._bump.sense({"bump": float(bumped)}, self._now_ns)
         actions = self._plan.actions
         aims = [aimed(action, value) for action, value in zip(actions, values, strict=True)]
-        if bump_blocks(bumped, self._now_ns, self._block_ends_ns):
+        if self._bump.blocks(self._now_ns):
             for i in self._forward:
                 aims[i] = min(aims[i], actions[i].rest)
         self._now_ns += ticks * self._tick_ns

@@ -7,7 +7,7 @@ lens that distorts nothing, or a size that nothing uses.
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import gymnasium as gym
 import msgspec
@@ -18,8 +18,9 @@ from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.vehicles.waypoints import SteeringResponse
 from shapechanger.vehicles.world import MujocoWorld
 
-_STEPS: Final = 40
 # Commands of the rollout: half of the steps straight ahead, the other half to the left.
+_STEPS: Final = 40
+_HALF: Final = _STEPS // 2
 _THROTTLE: Final = 0.5
 _STEERING: Final = -0.5
 
@@ -74,71 +75,55 @@ def certify_vehicles(
     names = _name(source), _name(target)
     old, new = _facts(source), _facts(target)
     one, two = _drive(source, seed), _drive(target, seed)
-    shift = VehicleShift(
-        *names,
-        changes=tuple(
-            f"{what}: {old[what]} -> {new[what]}" for what in old if old[what] != new[what]
-        ),
-        answers=_answers(source, one, two),
-        is_empty=one.same_as(two),
-    )
-    if shift.is_empty and not allow_empty:
+    is_empty = all(map(np.array_equal, one, two))
+    if is_empty and not allow_empty:
         raise EmptyShift(
             f"{names[0]} and {names[1]} behave alike: {_STEPS} steps gave the same frames, places "
             "and rewards, so there is nothing to transfer."
         )
-    return shift
+    changes = tuple(f"{name}: {old[name]} -> {new[name]}" for name in old if old[name] != new[name])
+    return VehicleShift(*names, changes, _answers(source, one, two), is_empty)
 
 
-class _Rollout(NamedTuple):
-    """First and last observation, poses, x, y and heading, (n, 3), and rewards of a vehicle."""
-
-    seen: tuple[NDArray[np.float64], NDArray[np.float64]]
-    path: NDArray[np.float64]
-    rewards: NDArray[np.float64]
-
-    def same_as(self, other: _Rollout) -> bool:
-        """Return whether two rollouts are equal."""
-        mine, theirs = (*self.seen, *self[1:]), (*other.seen, *other[1:])
-        return all(np.array_equal(one, two) for one, two in zip(mine, theirs, strict=True))
-
-    def moved(self) -> tuple[float, float]:
-        """Metres in the first half, and degrees of turn to the left in the second."""
-        half = min(_STEPS // 2, len(self.path) - 1)
-        turned = np.unwrap(self.path[half:, 2])
-        straight_m = float(np.linalg.norm(self.path[half, :2] - self.path[0, :2]))
-        return straight_m, math.degrees(float(turned[-1] - turned[0]))
-
-
-def _drive(env: gym.Env[Any, Any], seed: int) -> _Rollout:
-    def flat() -> NDArray[np.float64]:
-        return np.asarray(gym.spaces.flatten(env.observation_space, seen), np.float64)
-
+def _drive(env: gym.Env[Any, Any], seed: int) -> tuple[NDArray[np.float64], ...]:
+    """Return poses, x, y and heading, (n, 3), rewards, and the first and last observation."""
     seen, info = env.reset(seed=seed)
-    first, path, rewards = flat(), [info["pose"]], list[float]()
+    observations, path, rewards = [seen], [info["pose"]], list[float]()
     for step in range(_STEPS):
-        steering = 0.0 if step < _STEPS // 2 else _STEERING
-        action = np.array([steering, _THROTTLE], np.float32)
+        action = np.array([0.0 if step < _HALF else _STEERING, _THROTTLE], np.float32)
         seen, reward, terminated, truncated, info = env.step(action)
         path.append(info["pose"])
         rewards.append(float(reward))
         if terminated or truncated:
             break
-    return _Rollout((first, flat()), np.array(path), np.array(rewards))
+    space = env.observation_space
+    flat = [np.asarray(gym.spaces.flatten(space, one), float) for one in (*observations, seen)]
+    return np.array(path), np.array(rewards), *flat
 
 
-def _answers(source: gym.Env[Any, Any], one: _Rollout, two: _Rollout) -> tuple[str, ...]:
+def _answers(
+    source: gym.Env[Any, Any],
+    one: tuple[NDArray[np.float64], ...],
+    two: tuple[NDArray[np.float64], ...],
+) -> tuple[str, ...]:
+    """Return a sentence on each difference of two rollouts."""
     has_waypoints = hasattr(source.unwrapped, "response")
     aside, forward = ("bearing", "speed") if has_waypoints else ("steering", "throttle")
-    (metres, degrees), (other_metres, other_degrees) = one.moved(), two.moved()
+    moved: list[str] = []
+    turned: list[str] = []
+    for path, *_ in (one, two):
+        half = min(_HALF, len(path) - 1)
+        moved.append(f"{np.linalg.norm(path[half, :2] - path[0, :2]):.2f}")
+        heading = np.unwrap(path[half:, 2])
+        turned.append(f"{math.degrees(heading[-1] - heading[0]):.0f}")
     sentences = [
-        f"straight ahead at a {forward} of {_THROTTLE:g} for {_STEPS // 2} steps: "
-        f"{metres:.2f} m -> {other_metres:.2f} m",
-        f"then a {aside} of {_STEERING:g} for as many: turned by {degrees:.0f} -> "
-        f"{other_degrees:.0f} degrees",
+        f"straight ahead at a {forward} of {_THROTTLE:g} for {_HALF} steps: {moved[0]} m -> "
+        f"{moved[1]} m",
+        f"then a {aside} of {_STEERING:g} for as many: turned by {turned[0]} -> {turned[1]} "
+        "degrees",
     ]
-    if one.seen[0].shape == two.seen[0].shape:
-        gaps = [float(np.abs(a - b).mean()) for a, b in zip(one.seen, two.seen, strict=True)]
+    if one[2].shape == two[2].shape:
+        gaps = [np.abs(a - b).mean() for a, b in zip(one[2:], two[2:], strict=True)]
         sentences.append(
             f"their observations from the same seed differ by {gaps[0]:.1f} at the start and "
             f"{gaps[1]:.1f} at the end, mean over all numbers"
@@ -147,7 +132,7 @@ def _answers(source: gym.Env[Any, Any], one: _Rollout, two: _Rollout) -> tuple[s
 
 
 def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
-    """Return the properties of a vehicle by name."""
+    """Return the properties of a vehicle, keyed by their names."""
     inner: Any = env.unwrapped
     world: MujocoWorld = inner.world
     model, camera = world.vehicle, world.mount

@@ -11,7 +11,6 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.errors import RenderError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.vehicles.envs.drive import (
     Courses,
@@ -27,7 +26,6 @@ from shapechanger.vehicles.envs.shift import certify_vehicles
 if TYPE_CHECKING:
     from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
-_MODES: Final = ("rgb_array",)
 _ABSENT: Final = "absent"
 
 
@@ -119,8 +117,6 @@ class VehicleEnv(DriveEnv):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        if render_mode is not None and render_mode not in _MODES:
-            raise UnknownName("render mode", render_mode, _MODES)
         self.welcome = profile = simulated_robot(vehicle, robot, size, steering)
         self._set_up(
             profile, vehicle, world, courses, {**profile.reward, **(reward or {})},
@@ -195,16 +191,6 @@ class VehicleEnv(DriveEnv):
             return leave_rest(action, self._world.inputs().stands)
 
         return Demonstrator(self._world, lambda: teach, seed)
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the camera's frame, shape (height, width, 3); None without a render mode.
-
-        Raises:
-            RenderError: If `reset` was never called.
-        """
-        if self.render_mode and self._needs_reset:
-            raise RenderError("Call reset() before render().")
-        return super().render()
 
     def _touches(self) -> float | None:
         """Return whether sensors say that it touches something, 0 or 1; None if none can say."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from contextlib import closing
 from functools import lru_cache, partial
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import ProfileError
 from shapechanger.vehicles.bodies import vehicle_model
+from shapechanger.vehicles.cameras.rectify import rectifier_of
 from shapechanger.vehicles.courses.course import FLOODED
 from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert, require_rate
 from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot
@@ -32,7 +34,7 @@ from shapechanger.vehicles.waypoints import (
     SteeringResponse,
     WaypointView,
     measure_response,
-    rectifier_of,
+    places_of_motion,
 )
 from shapechanger.vehicles.world import MujocoWorld
 
@@ -47,18 +49,11 @@ def _response_of(
     """Measure the response of a simulated vehicle, once in a process."""
     common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
     env = VehicleEnv(vehicle, image=False, **common) if sensed else RangesEnv(vehicle, **common)
-    try:
-        places = env.observation_layout.slices
-        missing = [name for name in ("speed", "yaw_rate") if name not in places]
-        if missing:
-            raise ProfileError(
-                f"{simulated_robot(vehicle, robot).path} has no sensor of "
-                f"{' and '.join(missing)}, which waypoints with sensed=True need: add it to the "
-                "profile, or leave out sensed."
-            )
-        return measure_response(env, places["speed"].start, places["yaw_rate"].start)
-    finally:
-        env.close()
+    with closing(env):
+        profile = simulated_robot(vehicle, robot).path
+        return measure_response(
+            env, *places_of_motion(env, ("speed", "yaw_rate"), profile, ProfileError)
+        )
 
 
 class WaypointEnv(WaypointView, DriveEnv):
@@ -128,7 +123,7 @@ class WaypointEnv(WaypointView, DriveEnv):
         world = world or (FLOODED if body.floats else "corridor")
         common: dict[str, Any] = {
             "world": world, "robot": robot, "courses": courses, "randomise": randomise,
-            "put_back": put_back,
+            "put_back": put_back, "render_mode": render_mode,
         }  # fmt: skip
         self.response = _response_of(vehicle, world, robot, sensed)
         self._env = env = (
@@ -136,11 +131,14 @@ class WaypointEnv(WaypointView, DriveEnv):
             if sensed
             else RangesEnv(vehicle, camera=True, **common)
         )
-        self.parts, self._world, self._draw = env.parts, env.world, env._draw
+        self.parts, self._world = env.parts, env.world
         self.render_mode, self.metadata = render_mode, env.metadata
-        self._see(rectifier, turns_on_the_spot=body.turning_radius_m == 0.0)
-        pixels = env.observation_layout.slices["camera/image"].stop if sensed else 0
-        self._speed_at = env.observation_layout.slices["speed"].start - pixels
+        (speed_at,) = places_of_motion(env, ("speed",), profile.path, ProfileError)
+        self._see(rectifier, speed_at, turns_on_the_spot=body.turning_radius_m == 0.0)
+
+    def hold_out(self) -> None:
+        """Sample held-out courses from the next reset on."""
+        self._env.hold_out()
 
     def demonstrator(self, seed: int) -> Demonstrator:
         """Return an expert that knows the whole course and recovers from its own mistakes.
@@ -153,11 +151,6 @@ class WaypointEnv(WaypointView, DriveEnv):
         """
         require_rate(self.metadata["render_fps"])
         return waypoint_demonstrator(self.world, seed)
-
-    def _split(self, seen: Any) -> tuple[float, NDArray[np.uint8]]:
-        if isinstance(self._env, RangesEnv):
-            return float(seen[self._speed_at]), self.world.picture()
-        return float(np.nan_to_num(seen["state"][self._speed_at])), seen["image"]
 
 
 def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any, Final
+from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import RobotRefused
-from shapechanger.layout import Layout
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.link.messages import Welcome
+from shapechanger.vehicles.cameras.rectify import rectifier_of
 from shapechanger.vehicles.waypoints import (
     SteeringResponse,
     WaypointView,
     measure_response,
-    rectifier_of,
+    places_of_motion,
 )
-
-_SENSORS: Final = ("speed", "yaw_rate")
 
 
 class RemoteWaypointEnv(WaypointView):
@@ -68,22 +64,26 @@ class RemoteWaypointEnv(WaypointView):
             welcome = self._env.welcome
             if self.response is None and welcome.turning is not None:
                 self.response = SteeringResponse(*welcome.turning)
-            size, pitch, fovy = (
-                welcome.image_size, welcome.camera_pitch_deg, welcome.camera_fovy_deg
-            )  # fmt: skip
-            if size is None:
+            actions = self._env.action_layout.names
+            if actions != ("steering", "throttle"):
                 raise RobotRefused(
-                    f"{welcome.robot} has no camera, which a policy with waypoints needs."
+                    f"{welcome.robot} has the actions {', '.join(actions)}, and waypoints become "
+                    "steering and throttle."
                 )
-            pitch = pitch if pitch is not None and math.isfinite(pitch) else None
-            fovy = fovy if fovy is not None and 0.0 < fovy < 180.0 else None
-            rectifier = rectifier_of(welcome.robot, pitch, fovy, size, RobotRefused)
-            self._state_at = _state_places(welcome, self.response is None)
+            rectifier = rectifier_of(
+                welcome.robot,
+                welcome.camera_pitch_deg,
+                welcome.camera_fovy_deg,
+                welcome.image_size,
+                RobotRefused,
+            )
+            sensors = ("speed", "yaw_rate")[: 1 + (self.response is None)]
+            self._motion_at = places_of_motion(self._env, sensors, welcome.robot, RobotRefused)
         except BaseException:
             self._env.close()
             raise
         # Only tracks turn a vehicle on the spot.
-        self._see(rectifier, turns_on_the_spot=welcome.body == "tank")
+        self._see(rectifier, self._motion_at[0], turns_on_the_spot=welcome.body == "tank")
         self.render_mode, self.metadata = self._env.render_mode, self._env.metadata
 
     @property
@@ -102,38 +102,5 @@ class RemoteWaypointEnv(WaypointView):
             LinkError: If the robot cannot be reached in time.
         """
         if self.response is None:
-            self.response = measure_response(_Numbers(self._env), *self._state_at)
+            self.response = measure_response(self._env, *self._motion_at)
         return super().reset(seed=seed, options=options)
-
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the newest frame as the camera took it; see `RemoteVehicleEnv.render`."""
-        return self._env.render()
-
-    def _split(self, seen: dict[str, Any]) -> tuple[float, NDArray[np.uint8]]:
-        return float(np.nan_to_num(seen["state"][self._state_at[0]])), seen["image"]
-
-
-class _Numbers(gym.ObservationWrapper[Any, Any, Any]):
-    """The numbers of the state, without the picture."""
-
-    def observation(self, observation: dict[str, Any]) -> NDArray[np.float32]:
-        return observation["state"]
-
-
-def _state_places(welcome: Welcome, measures: bool) -> tuple[int, int]:
-    """Return the places of the speed and the rate of turn in the state."""
-    actions = Layout.from_json(welcome.action_layout).names
-    if actions != ("steering", "throttle"):
-        raise RobotRefused(
-            f"{welcome.robot} has the actions {', '.join(actions)}, and waypoints become steering "
-            "and throttle."
-        )
-    places = Layout.from_json(welcome.state_layout).slices
-    needed = _SENSORS if measures else _SENSORS[:1]
-    missing = [name for name in needed if name not in places]
-    if missing:
-        raise RobotRefused(
-            f"{welcome.robot} has no sensor of {' and '.join(missing)}, which waypoints need"
-            + (": pass response=(RAD_PER_M, RAD_PER_S)." if missing == ["yaw_rate"] else ".")
-        )
-    return places["speed"].start, places["yaw_rate"].start if "yaw_rate" in places else 0

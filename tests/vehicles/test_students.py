@@ -16,7 +16,7 @@ from shapechanger.policy import save_policy
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
-from shapechanger.vehicles.learning import STUDENT_CLONING, train_student
+from shapechanger.vehicles.cloning import STUDENT_CLONING, train_student
 
 _CAR = EnvRef("shapechanger/Car-v1", {"put_back": True})
 _TINY = PpoSettings(
