@@ -42,8 +42,7 @@ from shapechanger.vehicles.cameras.rectify import CanonicalView
 from shapechanger.vehicles.cloning import CloningSettings, record_demonstrations, state_actions
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
-from shapechanger.vehicles.envs.demonstrators import CLONES
-from shapechanger.vehicles.envs.waypoints import waypoint_demonstrator
+from shapechanger.vehicles.envs.demonstrators import CLONES, waypoint_demonstrator
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 from shapechanger.vehicles.waypoints import as_waypoints
 

@@ -278,7 +278,7 @@ class ExportPolicy:
 
 def _learned_with(card: CloneCard) -> tuple[str, float | None]:
     """Return the body and the rate of a clone's demonstrations, as far as its card tells."""
-    from shapechanger.vehicles.expert.traits import PERIOD_S
+    from shapechanger.vehicles.expert.driver import PERIOD_S
 
     env = card.data.get("env")
     if env is None:

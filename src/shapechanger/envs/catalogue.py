@@ -227,7 +227,7 @@ def register_all() -> None:
     for envs, kind, limit in (
         (VEHICLE_ENVS, "vehicle:VehicleEnv", _EPISODE_STEPS),
         (RANGES_ENVS, "ranges:RangesEnv", _RANGES_STEPS),
-        (WAYPOINT_ENVS, "waypoints:WaypointEnv", _EPISODE_STEPS),
+        (WAYPOINT_ENVS, "vehicle:WaypointEnv", _EPISODE_STEPS),
     ):
         for env_id, (vehicle, _) in envs.items():
             entry_point = f"shapechanger.vehicles.envs.{kind}"

@@ -16,9 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.world import STANDING_MPS, STANDING_RADPS
-from shapechanger.errors import DemosError, ShapechangerError, SpaceMismatch, StudyError
+from shapechanger.errors import DemosError, ShapechangerError, SpaceMismatch, StudyError, WorldError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, HALF_WIDTH_RAD, Rectifier
+from shapechanger.vehicles.cameras.rectify import (
+    CANONICAL_SIZE,
+    HALF_WIDTH_RAD,
+    CameraGeometry,
+    Rectifier,
+)
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
@@ -47,8 +52,6 @@ _ROUNDING: Final = 1e-9
 _SECONDS: Final = 5.0
 _HOLD: Final = 6
 
-# Ways out of a missing sensor: of the speed, and of the rate of turn alone.
-_WITHOUT: Final = ("leave out sensed", "pass response=(RAD_PER_M, RAD_PER_S)")
 _COMMANDS: Final = ("steering", "throttle")
 _MOTION: Final = ("steering/applied", "speed", "yaw_rate")
 
@@ -93,24 +96,21 @@ class SteeringResponse:
         return max(-1.0, min(1.0, rate / (self.per_metre * speed + self.per_second)))
 
 
-def measure_response(
-    env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int, seed: int = 0
-) -> SteeringResponse:
+def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) -> SteeringResponse:
     """Measure how a vehicle turns, from 5 s of its own motion at random commands.
 
     Args:
         env: A vehicle with steering and throttle as its action. It is reset.
         speed_at: Place of the speed, m/s, in the numbers that it observes.
         yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
-        seed: Seed of the start and the commands.
 
     Raises:
         StudyError: If it does not turn as it steers.
     """
     from scipy.optimize import nnls  # Not there on a robot, which does not measure itself.
 
-    rng = np.random.default_rng(seed)
-    env.reset(seed=seed)
+    rng = np.random.default_rng(0)
+    env.reset(seed=0)
     command = np.zeros(2, np.float32)
     turning: list[tuple[float, float]] = []
     rates: list[float] = []
@@ -135,7 +135,7 @@ def fit_response(
     steering: NDArray[np.floating],
     speed: NDArray[np.floating],
     yaw_rate: NDArray[np.floating],
-    times_s: NDArray[np.floating] | None = None,
+    times_s: NDArray[np.floating],
 ) -> SteeringResponse:
     """Fit how a vehicle turns to one or more drives.
 
@@ -148,15 +148,13 @@ def fit_response(
         speed: Speed along the heading, m/s, shape (n,).
         yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
         times_s: Time of each step since the start of its episode, s, shape (n,); an episode begins
-            where time does not go on. None for one episode in steps of 1/20 s.
+            where time does not go on.
 
     Raises:
         StudyError: If the drive does not tell it.
     """
     from scipy.optimize import nnls
 
-    if times_s is None:
-        times_s = np.arange(len(steering)) / 20.0
     rows = np.stack((steering * speed, steering, -yaw_rate), axis=1).astype(np.float64)
     steady = np.isfinite(rows).all(axis=1) & _is_steady(steering, times_s)
     turning, rates = rows[steady, :2], rows[steady, 2]
@@ -237,29 +235,7 @@ def command(
 
 def _numbers(seen: Any) -> NDArray[np.float32]:
     """Return the numbers of an observation, which may have a frame, too."""
-    return seen["state"] if isinstance(seen, dict) else seen
-
-
-def places_of_motion(
-    env: gym.Env[Any, Any], names: Sequence[str], robot: str, error: type[ShapechangerError]
-) -> list[int]:
-    """Return the places of a vehicle's motion in the numbers that it observes.
-
-    Args:
-        env: The vehicle.
-        names: Quantities, such as "speed".
-        robot: Name of the robot or its profile, for errors.
-        error: Error to raise if a quantity is not measured.
-    """
-    slices: dict[str, slice] = env.get_wrapper_attr("observation_layout").slices
-    missing = [name for name in names if name not in slices]
-    if missing:
-        raise error(
-            f"{robot} has no sensor of {' and '.join(missing)}, which waypoints need: add it to "
-            f"the profile, or {_WITHOUT[missing == ['yaw_rate']]}."
-        )
-    pixels = slices["camera/image"].stop if "camera/image" in slices else 0
-    return [slices[name].start - pixels for name in names]
+    return cast("Any", seen)["state"] if isinstance(seen, dict) else seen
 
 
 class WaypointView(gym.Env[Any, NDArray[np.float32]]):
@@ -272,11 +248,54 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
     response: SteeringResponse | None
     _env: Any
 
-    def _see(self, rectifier: Rectifier, speed_at: int, *, turns_on_the_spot: bool) -> None:
-        """Set the spaces and layouts."""
-        self._rectifier, self._speed_at = rectifier, speed_at
-        self._turns_on_the_spot = turns_on_the_spot
+    def _see(
+        self,
+        env: Any,
+        robot: str,
+        camera: tuple[float | None, float | None, tuple[int, int] | None],
+        sensors: Sequence[str],
+        error: type[ShapechangerError],
+        *,
+        turns_on_the_spot: bool,
+    ) -> None:
+        """See another env, with steering and throttle, through waypoints.
+
+        Args:
+            env: The env.
+            robot: Name of its robot or profile, for errors.
+            camera: Pitch and vertical field of view of its camera, degrees, and width and height of
+                its frames, pixels; None if unknown.
+            sensors: Quantities that it must measure, "speed" first.
+            error: Error to raise if something is unknown, or the camera sees too little.
+            turns_on_the_spot: Whether the vehicle turns by its tracks.
+        """
+        pitch, fovy, size = camera
+        slices = env.observation_layout.slices
+        if size is None:
+            raise error(f"{robot} has no camera, which a policy with waypoints needs.")
+        if pitch is None or fovy is None:
+            unknown = zip(("pitch_deg", "fovy_deg"), camera, strict=False)
+            missing = " and ".join(name for name, value in unknown if value is None)
+            raise error(
+                f"{robot}: [camera] does not state {missing}, which waypoints need: `shapechanger "
+                "robot camera` measures them from one picture of a checkerboard, and writes a "
+                "profile to use."
+            )
+        if missing := " and ".join(name for name in sensors if name not in slices):
+            raise error(
+                f"{robot} has no sensor of {missing}, which waypoints need: add it to the profile. "
+                "In a simulation leave out sensed; a robot without yaw_rate takes "
+                "response=(RAD_PER_M, RAD_PER_S)."
+            )
+        try:
+            self._rectifier = Rectifier(CameraGeometry(pitch, fovy), size)
+        except WorldError as reason:
+            raise error(f"{robot}: {reason}") from reason
+        pixels = slices["camera/image"].stop if "camera/image" in slices else 0
+        self._env, self._turns_on_the_spot = env, turns_on_the_spot
+        self._motion_at = tuple(slices[name].start - pixels for name in sensors)
         self._speed = 0.0
+        self.render_mode, self.metadata = env.render_mode, env.metadata
         self.observation_space = gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
@@ -313,9 +332,9 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
         self._env.close()
 
     def _rectified(self, seen: Any) -> NDArray[np.uint8]:
-        self._speed = float(np.nan_to_num(_numbers(seen)[self._speed_at]))
-        has_image = isinstance(seen, dict)
-        return self._rectifier(seen["image"] if has_image else self._env.world.picture())
+        self._speed = float(np.nan_to_num(_numbers(seen)[self._motion_at[0]]))
+        image = cast("Any", seen)["image"] if isinstance(seen, dict) else self._env.world.picture()
+        return self._rectifier(image)
 
 
 class WaypointLabels(NamedTuple):
@@ -415,8 +434,7 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     kept = labels.usable
     if not kept.any():
         raise DemosError("In no step of these demonstrations does the vehicle drive forward.")
-    ends = np.cumsum(data.episodes)
-    lengths = [int(part.sum()) for part in np.split(kept, ends[:-1])]
+    lengths = [int(part.sum()) for part in np.split(kept, np.cumsum(data.episodes)[:-1])]
     beside = np.abs(labels.actions[kept, 0]) * WIDEST_RAD > HALF_WIDTH_RAD
     notes = (
         f"The vehicle turns {response.per_metre:.2f} rad for each metre and "
@@ -446,19 +464,17 @@ def _fitted(data: Dataset) -> SteeringResponse:
     """Fit the response to the recorded motion."""
     motion = [_column(data, name) for name in _MOTION]
     missing = [name for name, column in zip(_MOTION, motion, strict=True) if column is None]
-    try:
-        if missing:
-            raise StudyError(
-                "How the vehicle turns is unknown, because the recording lacks "
-                f"{', '.join(missing)}."
-            )
+    why = f"How the vehicle turns is unknown, because the recording lacks {', '.join(missing)}"
+    if not missing:
         steering, speed, yaw_rate = cast("list[NDArray[np.float64]]", motion)
-        return fit_response(steering, speed, yaw_rate, data.times_s)
-    except StudyError as error:
-        raise DemosError(
-            f"{str(error).rstrip('.')}: give --response RAD_PER_M RAD_PER_S, the `response` of "
-            "RemoteWaypoint-v1 after its first reset."
-        ) from error
+        try:
+            return fit_response(steering, speed, yaw_rate, data.times_s)
+        except StudyError as error:
+            why = str(error).rstrip(".")
+    raise DemosError(
+        f"{why}: give --response RAD_PER_M RAD_PER_S, the `response` of RemoteWaypoint-v1 after "
+        "its first reset."
+    )
 
 
 def _speed(data: Dataset, response: SteeringResponse) -> NDArray[np.float64]:

@@ -108,7 +108,7 @@ class MujocoWorld:
             # Cameras are only loaded for images, and SciPy for their faults.
             from shapechanger.vehicles.cameras.camera import OnboardCamera
 
-            self._camera = OnboardCamera(size)
+            self._camera = OnboardCamera(size, _CAMERA)
         self._outside: OutsideCamera | None = None
         self.lenses = tuple(lenses)
         self._distortions: list[Corruption] = []
@@ -189,10 +189,6 @@ class MujocoWorld:
         self._chassis = self.model.body(_CHASSIS).id
         self._solid = np.zeros(mujoco.mjNGROUP, np.uint8)
         self._solid[_SOLID_GROUP] = 1
-        if self._camera is not None:
-            self._camera.look_through(self.model, _CAMERA)
-        if self._outside is not None:
-            self._outside.look_at(self.model)
         self.place(seed)
 
     def place(self, seed: int) -> None:
@@ -349,7 +345,6 @@ class MujocoWorld:
             if self._outside is not None:
                 self._outside.close()
             self._outside = camera
-            camera.look_at(self.model)
         x, y, heading = self._motion[:3]
         ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
         middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
@@ -453,7 +448,6 @@ def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
 @lru_cache(maxsize=_KEPT_COURSES)
 def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
     """Return a path around a course for a vehicle."""
-    from shapechanger.vehicles.expert.path import plan_path_for
-    from shapechanger.vehicles.expert.traits import traits_of
+    from shapechanger.vehicles.expert.driver import plan_path_for, traits_of
 
     return plan_path_for(lay_out(world, seed), traits_of(vehicle))

@@ -36,9 +36,8 @@ def _draw(
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    camera = OnboardCamera((_WIDTH, _HEIGHT))
+    camera = OnboardCamera((_WIDTH, _HEIGHT), "eye")
     try:
-        camera.look_through(model, "eye")
         return camera.picture(model, data)
     finally:
         camera.close()

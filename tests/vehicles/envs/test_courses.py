@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -9,65 +10,55 @@ import pytest
 
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
-from shapechanger.vehicles.envs.drive import CourseSampler
+from shapechanger.vehicles.envs import RangesEnv
 
 
-def _courses(draw: CourseSampler, n: int = 500) -> list[int]:
-    rng = np.random.default_rng(1)
-    return [draw.draw(rng, "corridor", {}).course for _ in range(n)]
+def _courses(courses: Any, n: int = 6, *, held_out: bool = False) -> list[int]:
+    with closing(RangesEnv("car", courses=courses)) as env:
+        if held_out:
+            env.hold_out()
+        return [env.reset(seed=1 if i == 0 else None)[1]["course"] for i in range(n)]
 
 
-@pytest.mark.parametrize(("name", "seeds"), [("training", TRAINING), ("held-out", HELD_OUT)])
-def test_training_and_held_out_courses_are_disjoint(name: Any, seeds: range) -> None:
-    """Each kind draws from its own range of seeds, and covers it."""
-    drawn = _courses(CourseSampler(name, randomise=False))
+@pytest.mark.parametrize(
+    ("courses", "held_out", "seeds"),
+    [
+        ("training", False, TRAINING),
+        ("held-out", False, HELD_OUT),
+        ("training", True, HELD_OUT),
+        ((3, 4), True, HELD_OUT),
+        ((7, np.int64(9)), False, {7, 9}),
+    ],
+)
+def test_courses_are_drawn_from_their_seeds(courses: Any, held_out: bool, seeds: Any) -> None:
+    drawn = _courses(courses, held_out=held_out)
     assert all(course in seeds for course in drawn)
-    assert max(drawn) - min(drawn) > 0.9 * len(seeds)
-
-
-def test_hold_out_draws_held_out_courses_only() -> None:
-    for courses in ("training", "held-out", (3, 4)):
-        draw = CourseSampler(courses, randomise=False)
-        draw.hold_out()
-        assert not set(_courses(draw)) & set(TRAINING)
-        assert all(course in HELD_OUT for course in _courses(draw))
-
-
-def test_given_courses_are_drawn() -> None:
-    draw = CourseSampler((7, np.int64(9), 8), randomise=False)
-    assert set(_courses(draw)) == {7, 8, 9}
-    assert draw.first == 7
+    assert len(set(drawn)) > 1
+    assert not set(TRAINING) & set(HELD_OUT)
 
 
 def test_options_do_not_change_other_draws() -> None:
     """A given course or start leaves the other random choices unchanged."""
-    draw = CourseSampler("training", randomise=True)
-    free = draw.draw(np.random.default_rng(5), "corridor", {})
-    asked = draw.draw(np.random.default_rng(5), "corridor", {"course": 3})
-    assert asked.course == 3
-    assert (asked.start, asked.look, asked.camera) == (free.start, free.look, free.camera)
-    assert draw.draw(np.random.default_rng(5), "corridor", {"start": 4}).course == free.course
+    with closing(RangesEnv("car", randomise=True)) as env:
+
+        def drawn(**options: int) -> tuple[int, Any, Any]:
+            info = env.reset(seed=5, options=options)[1]
+            return info["course"], env.world.look, info["pose"]
+
+        course, look, pose = drawn()
+        assert drawn(course=course) == (course, look, pose)
+        assert drawn(start=4)[:2] == (course, look)
+        assert drawn(start=4)[2] == drawn(start=4)[2] != pose
+        other = drawn(course=course + 1)
+        assert other[:2] == (course + 1, look)
+        env.reset()
+        assert env.world.look != look
 
 
-def test_looks_are_random_only_if_requested() -> None:
-    """Without `randomise`, look and camera are None."""
-    plain = CourseSampler("training", randomise=False).draw(np.random.default_rng(5), "yard", {})
-    assert (plain.look, plain.camera) == (None, None)
-    draw, rng = CourseSampler("training", randomise=True), np.random.default_rng(5)
-    one, two = (draw.draw(rng, "yard", {}) for _ in range(2))
-    assert one.look != two.look
-    assert one.camera != two.camera
-
-
-def test_invalid_courses_are_refused() -> None:
-    """Invalid courses raise errors that state what is valid."""
-    with pytest.raises(UnknownName, match=r"No kind of courses matches 'hold-out'. Did you mean"):
-        CourseSampler("hold-out", randomise=False)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(WorldError, match="no courses to draw from: give at least one seed"):
-        CourseSampler((), randomise=False)
-    for seed in (-1, 1.5, "a", None):
-        with pytest.raises(WorldError, match="The seed of a course must be a whole number from 0"):
-            CourseSampler((seed,), randomise=False)  # pyright: ignore[reportArgumentType]
+@pytest.mark.parametrize("courses", [(-1,), (1.5,), ("a",), (None,)])
+def test_invalid_seeds_of_courses_are_refused(courses: Any) -> None:
+    with pytest.raises(WorldError, match="The seed of a course must be a whole number from 0"):
+        RangesEnv("car", courses=courses)
 
 
 @pytest.mark.parametrize(
@@ -83,6 +74,8 @@ def test_invalid_courses_are_refused() -> None:
 )
 def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:
     """Unknown or invalid options raise errors."""
-    draw = CourseSampler("training", randomise=False)
-    with pytest.raises((UnknownName, WorldError), match=sentence):
-        draw.draw(np.random.default_rng(5), "corridor", options)
+    with (
+        closing(RangesEnv("car", courses=(0,))) as env,
+        pytest.raises((UnknownName, WorldError), match=sentence),
+    ):
+        env.reset(options=options)

@@ -6,12 +6,11 @@ import math
 from contextlib import closing
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
-from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
+from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles.courses.course import HELD_OUT, HOME
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
 from shapechanger.vehicles.envs.ranges import (
@@ -136,8 +135,6 @@ def test_outputs_follow_the_guards_limits() -> None:
     blocked = [shaper.outputs((1.0,), bumped, 5)["wheels"] for bumped in (True, False, False)]
     assert blocked[1] == pytest.approx(0.0)
     assert blocked[2] == pytest.approx(0.08)
-    shaper.reset()
-    assert shaper.applied == (0.0,)
 
 
 def test_invalid_use_is_refused() -> None:
@@ -146,16 +143,11 @@ def test_invalid_use_is_refused() -> None:
         RangesEnv("carr")
     with pytest.raises(UnknownName, match="No weight of the reward matches 'colision'"):
         RangesEnv("car", reward={"colision": -1.0})
-    with closing(RangesEnv("car", courses=HELD_OUT)) as env:
-        with pytest.raises(gym.error.ResetNeeded):
-            env.step(np.zeros(2, np.float32))
-        env.reset(seed=0)
-        with pytest.raises(SpaceMismatch, match="steering and throttle"):
-            env.step(np.zeros(3, np.float32))
-        with pytest.raises(SpaceMismatch, match="steering and throttle"):
-            env.step(np.array([np.nan, 0.0], np.float32))
-        with pytest.raises(WorldError, match="has no camera"):
-            env.world.picture()
+    with (
+        closing(RangesEnv("car", courses=HELD_OUT)) as env,
+        pytest.raises(WorldError, match="has no camera"),
+    ):
+        env.world.picture()
 
 
 def test_a_vehicle_that_stands_is_moved() -> None:

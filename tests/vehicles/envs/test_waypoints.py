@@ -119,7 +119,7 @@ def test_the_response_is_fitted_to_a_drive(body: str) -> None:
     lags = np.abs(steering - np.roll(steering, 1)) > 0.1
     yaw_rate[lags] += 3.0 * rng.normal(size=lags.sum())
     yaw_rate[10] = np.nan
-    found = fit_response(steering, speed, yaw_rate)
+    found = fit_response(steering, speed, yaw_rate, np.arange(360) / 20.0)
     assert found.per_metre == pytest.approx(_BODIES[body].per_metre, abs=0.05)
     assert found.per_second == pytest.approx(_BODIES[body].per_second, abs=0.05)
 
@@ -157,23 +157,16 @@ def test_lags_do_not_cross_borders_of_episodes(
     assert found.per_metre + found.per_second == pytest.approx(2.0)
 
 
-def test_the_first_steps_of_a_drive_do_not_follow_its_last() -> None:
-    """Without times a drive is one episode, whose first 0.1 s say nothing."""
-    yaw_rate = np.full(40, -1.0)
-    yaw_rate[:2] = 0.0
-    found = fit_response(np.full(40, 0.5), np.ones(40), yaw_rate)
-    assert found.per_metre + found.per_second == pytest.approx(2.0)
-
-
 def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
     """Straight driving, turning against the steering, and no measurement are refused."""
     rng = np.random.default_rng(0)
     steering, speed = np.repeat(rng.uniform(-0.6, 0.6, 40), 5), np.ones(200)
+    times_s = np.arange(200) / 20.0
     for yaw_rate in (rng.normal(0.0, 0.3, 200), 2.0 * steering, np.full(200, np.nan)):
         with pytest.raises(StudyError, match=r"steering explains .* drive curves to both sides"):
-            fit_response(steering, speed, yaw_rate)
+            fit_response(steering, speed, yaw_rate, times_s)
     with pytest.raises(StudyError, match="drive curves to both sides"):
-        fit_response(np.zeros(200), speed, rng.normal(0.0, 0.3, 200))
+        fit_response(np.zeros(200), speed, rng.normal(0.0, 0.3, 200), times_s)
 
 
 @pytest.mark.parametrize("vehicle", HOME)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from contextlib import closing
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,90 +13,45 @@ import pytest
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName
 from shapechanger.vehicles.bodies import VEHICLES
-from shapechanger.vehicles.courses import lay_out, start_pose
-from shapechanger.vehicles.courses.course import Course
+from shapechanger.vehicles.courses.course import HOME
+from shapechanger.vehicles.envs import RangesEnv
 from shapechanger.vehicles.envs.demonstrators import Disturbance
-from shapechanger.vehicles.expert.driver import CourseExpert
-from shapechanger.vehicles.expert.line import CourseProgress
-from shapechanger.vehicles.expert.traits import TRAITS
+from shapechanger.vehicles.expert.driver import TRAITS, CourseExpert
 from tests.vehicles.expert.courses import ring
-from tests.vehicles.expert.kinematic import SIZES, TOP, Kinematic
-
-_HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
 
 
-def _drive(
-    vehicle: Kinematic,
-    expert: CourseExpert,
-    course: Course,
-    seconds: float,
-    disturbance: Disturbance | None = None,
-) -> float:
-    """Return the net progress after some time, m."""
-    progress = CourseProgress(course)
-    progress.reset(vehicle.pose.x, vehicle.pose.y)
-    for _ in range(round(seconds / 0.05)):
-        action = expert.act(vehicle.pose, vehicle.speed, vehicle.yaw_rate)
-        assert action.shape == (2,)
-        assert action.dtype == np.float32
-        assert np.abs(action).max() <= 1.0
-        vehicle.advance(disturbance.applied(action) if disturbance else action)
-        progress.update(vehicle.pose.x, vehicle.pose.y)
-    return progress.update(vehicle.pose.x, vehicle.pose.y)
+def _progress_m(env: RangesEnv, seconds: float) -> float:
+    """Let the expert drive for a time, and return the net progress, m."""
+    expert, info = env.expert(), dict[str, Any]()
+    for _ in range(round(seconds * 20)):
+        *_, info = env.step(expert(None))
+    return info["progress"]
 
 
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("name", _HOMES)
-def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
-    """The expert is fast and has no contact."""
-    course = lay_out(_HOMES[name], seed)
-    vehicle = Kinematic(name, course, start_pose(course, seed))
-    metres = _drive(vehicle, CourseExpert(course, name), course, 30.0)
-    assert vehicle.touches == 0
-    assert metres > 0.7 * 30.0 * TOP[name]
+@pytest.mark.parametrize("name", HOME)
+def test_each_vehicle_drives_round_its_world(name: str) -> None:
+    """The expert is fast and has no contact; the current of harbours does not push it aside."""
+    with closing(RangesEnv(name)) as env:
+        env.reset(options={"course": 1, "start": 1})
+        metres = _progress_m(env, 20.0)
+        world = env.world
+        assert metres > 0.7 * 20.0 * world.vehicle.top_speed_mps
+        assert world.collisions == 0
+        assert abs(world.path().nearest(world.pose.x, world.pose.y).lateral) < 0.35
 
 
-@pytest.mark.parametrize("name", _HOMES)
-def test_disturbances_are_corrected(name: str) -> None:
-    """The expert corrects wandering and jerks with at most one collision."""
-    course = lay_out(_HOMES[name], 6)
-    vehicle = Kinematic(name, course, start_pose(course, 6))
-    expert = CourseExpert(course, name)
-    assert (
-        _drive(vehicle, expert, course, 40.0, Disturbance(1, TRAITS[name].sway))
-        > 0.5 * 40.0 * TOP[name]
-    )
-    assert vehicle.touches <= 1
-
-
-def test_a_boat_compensates_for_the_current() -> None:
-    """A current of a fifth of its speed displaces it by less than 0.35 m."""
-    course = ring(2, half_width=2.5, radius=10.0, gap=1.8, current=(0.2, -0.1))
-    x, y = course.route[0]
-    ahead = course.route[1] - course.route[0]
-    vehicle = Kinematic("boat", course, Pose(x, y, math.atan2(ahead[1], ahead[0])))
-    expert = CourseExpert(course, "boat")
-    _drive(vehicle, expert, course, 20.0)
-    worst = 0.0
-    for _ in range(40):
-        _drive(vehicle, expert, course, 1.0)
-        worst = max(worst, abs(expert.path.nearest(vehicle.pose.x, vehicle.pose.y).lateral))
-    assert worst < 0.35
-    assert vehicle.touches == 0
-
-
-@pytest.mark.parametrize("name", _HOMES)
+@pytest.mark.parametrize("name", HOME)
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_vehicle_recovers_from_a_wall(name: str, side: int) -> None:
     """A vehicle that faces a wall backs up, turns and drives on."""
-    half_width = 1.2 if name in ("car", "tank") else 2.5
-    course = ring(7, half_width=half_width, radius=10.0, obstacles=0)
-    ahead = course.route[31] - course.route[30]
-    heading = math.atan2(ahead[1], ahead[0]) + side * math.pi / 2
-    near = half_width - SIZES[name][0] / 2 - 0.1
-    x, y = course.route[30] + near * np.array((math.cos(heading), math.sin(heading)))
-    vehicle = Kinematic(name, course, Pose(float(x), float(y), heading))
-    assert _drive(vehicle, CourseExpert(course, name), course, 30.0) > 0.4 * 30.0 * TOP[name]
+    with closing(RangesEnv(name, put_back=True)) as env:
+        env.reset(options={"course": 7, "start": 7})
+        x, y, heading = dataclasses.astuple(env.world.pose)
+        heading += side * math.pi / 2
+        env.world.put(Pose(x, y, heading))
+        near = float(env.world.ranges_m(np.zeros(1))[0]) - 0.1
+        env.world.put(Pose(x + near * math.cos(heading), y + near * math.sin(heading), heading))
+        assert _progress_m(env, 20.0) > 0.4 * 20.0 * env.world.vehicle.top_speed_mps
 
 
 def pose_on(expert: CourseExpert, i: int) -> Pose:

@@ -12,9 +12,9 @@ from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Obstacle
 from shapechanger.vehicles.courses.geometry import FAR_M, ClearanceField
+from shapechanger.vehicles.expert.driver import TRAITS, plan_path_for
 from shapechanger.vehicles.expert.line import ClosedLine
-from shapechanger.vehicles.expert.path import CoursePath, plan_path, plan_path_for
-from shapechanger.vehicles.expert.traits import TRAITS
+from shapechanger.vehicles.expert.path import CoursePath, plan_path
 from tests.vehicles.expert.courses import ring
 
 _HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
@@ -63,7 +63,7 @@ def test_a_path_can_be_driven(vehicle: str) -> None:
 
 
 def test_planning_twice_gives_the_same_path() -> None:
-    first, second = (plan_path(ring(3), 0.1, 0.12) for _ in range(2))
+    first, second = (plan_path(ring(3), 0.1, 0.12, comfort_m=0.36) for _ in range(2))
     np.testing.assert_array_equal(first.points, second.points)
 
 
@@ -71,7 +71,10 @@ def test_the_start_of_a_path_does_not_matter() -> None:
     """The start of the route leaves no kink in the path."""
     course = ring(4)
     turned = dataclasses.replace(course, route=np.roll(course.route, 137, axis=0))
-    first, second = plan_path(course, 0.1, 0.12), plan_path(turned, 0.1, 0.12)
+    first, second = (
+        plan_path(course, 0.1, 0.12, comfort_m=0.36),
+        plan_path(turned, 0.1, 0.12, comfort_m=0.36),
+    )
     assert first.length == pytest.approx(second.length, rel=0.01)
     assert np.abs(second.curvature).max() < 1.5 * np.abs(first.curvature).max()
 
@@ -88,15 +91,15 @@ def _plug(course: Course, size: float) -> Course:
 def test_a_blocked_lane_is_refused() -> None:
     """The message names the width, the place and alternatives."""
     with pytest.raises(WorldError, match=r"blocked for anything 0\.40 m wide .* another seed"):
-        plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1)
+        plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1, comfort_m=0.3)
 
 
 def test_a_gap_is_found_until_it_is_too_narrow() -> None:
     """A passage of 0.6 m fits a width of 0.5 m, not one of 0.7 m."""
     course = _plug(ring(0, obstacles=0), 0.8)
-    assert plan_path(course, 0.1, 0.15).clearance.min() >= 0.25
+    assert plan_path(course, 0.1, 0.15, comfort_m=0.45).clearance.min() >= 0.25
     with pytest.raises(WorldError):
-        plan_path(course, 0.1, 0.25)
+        plan_path(course, 0.1, 0.25, comfort_m=0.75)
 
 
 @pytest.mark.parametrize("seed", [480, 889, 1_000_074])
@@ -123,7 +126,7 @@ def test_other_courses_keep_the_whole_clearance() -> None:
 
 
 def test_stations_wrap_around() -> None:
-    path = plan_path(ring(5), 0.1, 0.12)
+    path = plan_path(ring(5), 0.1, 0.12, comfort_m=0.36)
     assert path.at(3.0 + path.length) == pytest.approx(path.at(3.0))
     spot = path.nearest(*path.at(4.0), hint=3.0)
     assert spot.station == pytest.approx(4.0)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from shapechanger.vehicles.remote.pilot import Origin, require_fit
+from shapechanger.vehicles.remote.pilot import require_fit
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 from tests.robot.twin.robots import until
 
@@ -54,34 +55,34 @@ _WAYPOINTS = CloneCard(framing=Framing(), channels=(1,), features=1, action_layo
 
 def test_policies_that_fit() -> None:
     """A clone of the same body and rate, and waypoints from any body."""
-    require_fit(_CLONE, Origin("car", 20.0), _CAR, measures=False)
-    require_fit(_CLONE, Origin(), _CAR, measures=False)
-    require_fit(_WAYPOINTS, Origin("", 20.0), _CAR, measures=False)
-    require_fit(_WAYPOINTS, Origin(), replace(_CAR, turning=None), measures=True)
+    require_fit(_CLONE, _CAR, measures=False, body="car", control_hz=20.0)
+    require_fit(_CLONE, _CAR, measures=False)
+    require_fit(_WAYPOINTS, _CAR, measures=False, control_hz=20.0)
+    require_fit(_WAYPOINTS, replace(_CAR, turning=None), measures=True)
 
 
 @pytest.mark.parametrize(
     ("card", "origin", "robot", "words"),
     [
-        (_CLONE, Origin("tank"), _CAR, "learned to steer a tank, and my-car is a car"),
-        (_CLONE, Origin("car", 10.0), _CAR, "10 actions a second, and my-car has control_hz = 20"),
-        (_CLONE, Origin(), replace(_CAR, image_size=None), "my-car has no camera"),
+        (_CLONE, {"body": "tank"}, _CAR, "learned to steer a tank, and my-car is a car"),
+        (_CLONE, {"control_hz": 10.0}, _CAR, "10 actions a second, and my-car has control_hz = 20"),
+        (_CLONE, {}, replace(_CAR, image_size=None), "my-car has no camera"),
         (
             _CLONE,
-            Origin(),
+            {},
             replace(_CAR, action_layout=_STATE.to_json()),
             "those required here are speed",
         ),
-        (_WAYPOINTS, Origin(), replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
-        (_WAYPOINTS, Origin(), replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
+        (_WAYPOINTS, {}, replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
+        (_WAYPOINTS, {}, replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
     ],
 )
 def test_policies_that_do_not_fit(
-    card: CloneCard, origin: Origin, robot: RobotCard, words: str
+    card: CloneCard, origin: dict[str, Any], robot: RobotCard, words: str
 ) -> None:
     """The sentence names what differs."""
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
-        require_fit(card, origin, robot, measures=False)
+        require_fit(card, robot, measures=False, **origin)
     assert words in str(refusal.value)
 
 
@@ -101,7 +102,7 @@ def test_a_rate_within_the_jitter_of_the_recording_fits(
     """A policy's own demonstrations say how exactly its rate is known."""
     card = replace(_CLONE, data={"rate_jitter": jitter})
     with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
-        require_fit(card, Origin("car", hz), _CAR, measures=False)
+        require_fit(card, _CAR, measures=False, control_hz=hz)
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,10 @@ from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, He
 from shapechanger.robot.link.messages import Observation
 
 if TYPE_CHECKING:
+    from shapechanger.demos.cloning.onnx_policy import OnnxClone
+    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.robot.client.client import RobotClient
-    from shapechanger.vehicles.remote.pilot import DrivingPolicy, PolicyDriver
+    from shapechanger.vehicles.remote.pilot import PolicyDriver
 
 _LOOK_EVERY_S: Final = 0.2
 
@@ -315,19 +317,19 @@ class Driving:
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
     from shapechanger.robot.client.client import RobotClient
-    from shapechanger.vehicles.remote.pilot import Origin, PolicyDriver, require_fit
+    from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
 
-    policy: DrivingPolicy
-    origin = Origin()
+    policy: CameraPolicy | OnnxClone
+    body, hz = "", None
     if path.suffix == ".onnx":
         from shapechanger.demos.cloning.onnx_policy import OnnxClone
 
         policy = exported = OnnxClone(path)
-        origin = Origin(exported.body, exported.control_hz)
+        body, hz = exported.body, exported.control_hz
     else:
         from shapechanger.demos.cloning.policy import CameraPolicy
 
         policy = CameraPolicy.load(path)
     with RobotClient.connect(robot, frames=False) as there:
-        require_fit(policy.card, origin, there.welcome, measures=True)
+        require_fit(policy.card, there.welcome, measures=True, body=body, control_hz=hz)
     return PolicyDriver(policy, path.stem, robot)

@@ -105,7 +105,7 @@ class Serve(Service):
         if self.policy is None:
             return
         from shapechanger.demos.cloning.onnx_policy import OnnxClone
-        from shapechanger.vehicles.remote.pilot import Origin, require_fit
+        from shapechanger.vehicles.remote.pilot import require_fit
 
         files = [self.policy]
         if self.policy.is_dir():
@@ -124,9 +124,9 @@ class Serve(Service):
             )
         for file in files:
             policy = OnnxClone(file)
-            origin = Origin(policy.body, policy.control_hz)
+            body, hz = policy.body, policy.control_hz
             try:
-                require_fit(policy.card, origin, plan.card, measures=False)
+                require_fit(policy.card, plan.card, measures=False, body=body, control_hz=hz)
             except (PolicyError, RobotRefused) as error:
                 raise PolicyError(f"{file} cannot drive {plan.card.robot}: {error}") from error
 

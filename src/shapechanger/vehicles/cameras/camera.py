@@ -24,29 +24,34 @@ _BEHIND_ALL_M: Final = 1000.0
 _drawing: set[int] = set()
 
 
+# Pixels of an outside view are the means of squares this wide, so that edges are smooth.
+_SUPERSAMPLED: Final = 2
+_LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
+
+
 class _Renderer:
-    """Renders views of a model.
+    """Renders views of models.
 
     The OpenGL context is opened for the first picture, so that a process that has only built a
-    camera, such as the parent of an `AsyncVectorEnv`, can be forked.
+    camera, such as the parent of an `AsyncVectorEnv`, can be forked. A model's textures are loaded
+    for its first picture after another model's.
     """
 
-    def __init__(self, size: tuple[int, int], hidden: int) -> None:
-        self._width, self._height = size
-        _require_pixels(size)
+    def __init__(self, size: tuple[int, int], hidden: int, supersampled: int = 1) -> None:
+        if min(size) < 1:
+            raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
+        self._width, self._height = (supersampled * side for side in size)
         self._gl: Any = None
-        self._wanted: mujoco.MjModel | None = None
-        self._rect = mujoco.MjrRect(0, 0, *size)
+        self._model: mujoco.MjModel | None = None
+        self._rect = mujoco.MjrRect(0, 0, self._width, self._height)
         self._picture = np.empty((self._height, self._width, 3), np.uint8)
-        self._context: mujoco.MjrContext | None = None
-        self._scene: mujoco.MjvScene | None = None
         self._camera = mujoco.MjvCamera()
         self._option = mujoco.MjvOption()
         self._option.geomgroup[hidden] = 0
         self._draws_shadows = hidden == OWN_VIEW
 
     def _open(self, model: mujoco.MjModel) -> None:
-        """Create the rendering context of a model."""
+        """Create the rendering context of a model, whose offscreen buffer is resized."""
         if self._gl is None:
             if _drawing - {os.getpid()}:
                 raise RenderError(
@@ -59,7 +64,7 @@ class _Renderer:
             self._finalizer = weakref.finalize(self, self._gl.free)
             self._finalizer.atexit = False
         self._gl.make_current()
-        if self._context is not None:
+        if self._model is not None:
             self._context.free()
         model.vis.global_.offwidth, model.vis.global_.offheight = self._width, self._height
         model.vis.quality.offsamples = model.vis.quality.shadowsize = 0
@@ -68,14 +73,12 @@ class _Renderer:
         self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
         for flag in _COSTLY:
             self._scene.flags[flag] = 0
+        self._model = model
 
     def _render(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """Return the picture of a state, (height, width, 3), upside down; it is overwritten."""
-        if self._wanted is not None:
-            self._open(self._wanted)
-            self._wanted = None
-        if self._scene is None or self._context is None:
-            raise RenderError("The camera has no model: call `look_through` first.")
+        """Return the picture of a state, (height, width, 3); it is overwritten."""
+        if model is not self._model:
+            self._open(model)
         self._gl.make_current()
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(
@@ -88,62 +91,56 @@ class _Renderer:
                 geom.modelrbound = -_BEHIND_ALL_M
         mujoco.mjr_render(self._rect, self._scene, self._context)
         mujoco.mjr_readPixels(self._picture, None, self._rect, self._context)
-        return self._picture
+        return self._picture[::-1]
 
     def close(self) -> None:
-        """Free the OpenGL context and forget the model."""
-        self._wanted = None
-        if self._context is not None:
+        """Free the OpenGL context; the next picture opens another one."""
+        if self._model is not None:
             self._gl.make_current()
             self._context.free()
-            self._context = self._scene = None
+            self._model = None
         if self._gl is not None:
             self._finalizer()
             self._gl = None
 
 
 class OnboardCamera(_Renderer):
-    """Renders the view of a camera in a model, without what is only seen from outside."""
+    """Renders the view of a camera in a model, without what is only seen from outside.
 
-    def __init__(self, size: tuple[int, int]) -> None:
+    Args:
+        size: Width and height in pixels.
+        name: Name of the camera.
+
+    Raises:
+        RenderError: If the size is out of range.
+    """
+
+    def __init__(self, size: tuple[int, int], name: str) -> None:
         super().__init__(size, OUTSIDE_VIEW)
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
-
-    def look_through(self, model: mujoco.MjModel, camera: str) -> None:
-        """Select the compiled model, whose offscreen buffer is resized, and the camera's name."""
-        self._wanted = model
-        self._camera.fixedcamid = model.camera(camera).id
+        self._name = name
 
     def picture(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """Render a state of the selected model: RGB, shape (height, width, 3), in a new array.
+        """Render a state: RGB, shape (height, width, 3), in a new array.
 
-        Raises a `RenderError` if no model was selected, or no OpenGL context can be opened.
+        Raises a `RenderError` if no OpenGL context can be opened.
         """
-        return self._render(model, data)[::-1].copy()
-
-
-# Pixels of an outside view are the means of squares this wide, so that edges are smooth.
-_SUPERSAMPLED: Final = 2
-_LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
+        self._camera.fixedcamid = model.camera(self._name).id
+        return self._render(model, data).copy()
 
 
 class OutsideCamera(_Renderer):
     """Renders a model from outside, with smooth edges."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        _require_pixels(size)  # Before it is supersampled, so that the error has the asked size.
-        if max(size) > _LARGEST:
+        if max(size) > _LARGEST and min(size) > 0:
             raise RenderError(
                 f"A view from outside has at most {_LARGEST} pixels a side, got "
                 f"{size[0]} x {size[1]}."
             )
-        super().__init__((_SUPERSAMPLED * size[0], _SUPERSAMPLED * size[1]), OWN_VIEW)
+        super().__init__(size, OWN_VIEW, _SUPERSAMPLED)
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE.value
         self.size = size
-
-    def look_at(self, model: mujoco.MjModel) -> None:
-        """Select the compiled model, whose offscreen buffer is resized."""
-        self._wanted = model
 
     def picture(
         self,
@@ -157,7 +154,7 @@ class OutsideCamera(_Renderer):
         """Render a state.
 
         Args:
-            model: The selected model.
+            model: The model.
             data: Its state.
             middle: Point in the middle of the picture, m, (3,).
             distance_m: Distance from it.
@@ -168,11 +165,6 @@ class OutsideCamera(_Renderer):
         self._camera.distance = distance_m
         self._camera.azimuth = math.degrees(azimuth_rad)
         self._camera.elevation = math.degrees(elevation_rad)
-        fine = self._render(model, data)[::-1]
+        fine = self._render(model, data)
         squares = fine.reshape(self.size[1], _SUPERSAMPLED, self.size[0], _SUPERSAMPLED, 3)
         return (squares.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
-
-
-def _require_pixels(size: tuple[int, int]) -> None:
-    if min(size) < 1:
-        raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")

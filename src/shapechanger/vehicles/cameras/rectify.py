@@ -8,13 +8,13 @@ same field of view for all, and sees no part of the vehicle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import DemosError, MissingExtra, ShapechangerError, WorldError
+from shapechanger.errors import DemosError, MissingExtra, WorldError
 from shapechanger.layout import Layout
 
 if TYPE_CHECKING:
@@ -128,39 +128,6 @@ class Rectifier:
         return mean.astype(np.uint8).reshape(CANONICAL_SIZE[1], CANONICAL_SIZE[0], 3)
 
 
-def rectifier_of(
-    robot: str,
-    pitch_deg: float | None,
-    fovy_deg: float | None,
-    size: tuple[int, int] | None,
-    error: type[ShapechangerError],
-) -> Rectifier:
-    """Return the rectifier of a robot's camera.
-
-    Args:
-        robot: Name of the robot or its profile, for errors.
-        pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
-        fovy_deg: Vertical field of view, degrees; None if unknown.
-        size: Width and height of its frames, pixels; None without a camera.
-        error: Error to raise if something is unknown, or the camera sees too little.
-    """
-    if size is None:
-        raise error(f"{robot} has no camera, which a policy with waypoints needs.")
-    if pitch_deg is None or fovy_deg is None:
-        numbers = {"pitch_deg": pitch_deg, "fovy_deg": fovy_deg}
-        missing = " and ".join(key for key, value in numbers.items() if value is None)
-        raise error(
-            f"{robot}: [camera] does not state {missing}, which waypoints need: `shapechanger "
-            "robot camera` measures them from one picture of a checkerboard, and writes a profile "
-            "to use."
-        )
-    try:
-        return Rectifier(CameraGeometry(pitch_deg, fovy_deg), size)
-    except WorldError as reason:
-        raise error(f"{robot}: {reason}") from reason
-
-
-@dataclass
 class CanonicalView:
     """Warps pictures to the virtual camera of all vehicles.
 
@@ -171,11 +138,10 @@ class CanonicalView:
         bodies: Bodies of the episodes.
     """
 
-    camera: CameraGeometry | None = None
-    rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = field(
-        default_factory=dict[tuple[CameraGeometry, tuple[int, int]], Rectifier]
-    )
-    bodies: set[str] = field(default_factory=set[str])
+    def __init__(self, camera: CameraGeometry | None = None) -> None:
+        self.camera = camera
+        self.rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = {}
+        self.bodies: set[str] = set()
 
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
         """Return a picture of an episode as the virtual camera would have taken it.
@@ -307,7 +273,7 @@ def measure_camera(
     fovy = math.degrees(2.0 * math.atan(0.5 * height / focal))
     # d fovy / d focal = -sin(fovy) / focal.
     fovy_sd = scale * float(lens_sd[1, 0]) * math.degrees(math.sin(math.radians(fovy))) / focal
-    turn, slopes = cv2.Rodrigues(turns[0])
+    turn, slopes = cast("tuple[NDArray[np.float64], ...]", cv2.Rodrigues(turns[0]))
     # The side of the board that is nearer to the vertical of the picture points down.
     side = int(np.argmax(np.abs(turn[1, :2])))
     sign = math.copysign(1.0, turn[1, side])

@@ -12,8 +12,7 @@ from shapechanger.errors import MissingExtra
 
 if TYPE_CHECKING:
     from shapechanger.vehicles.envs.ranges import RangesEnv
-    from shapechanger.vehicles.envs.vehicle import VehicleEnv
-    from shapechanger.vehicles.envs.waypoints import WaypointEnv
+    from shapechanger.vehicles.envs.vehicle import VehicleEnv, WaypointEnv
 
 try:
     import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
@@ -22,7 +21,7 @@ except ModuleNotFoundError as error:
 
 __all__ = ["RangesEnv", "VehicleEnv", "WaypointEnv"]
 
-_MODULES: Final = {"RangesEnv": "ranges", "VehicleEnv": "vehicle", "WaypointEnv": "waypoints"}
+_MODULES: Final = {"RangesEnv": "ranges", "VehicleEnv": "vehicle", "WaypointEnv": "vehicle"}
 
 
 def __getattr__(name: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import ProfileError, WorldError, check_seed
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.expert.driver import CourseExpert
-from shapechanger.vehicles.expert.traits import PERIOD_S, traits_of
+from shapechanger.vehicles.expert.driver import PERIOD_S, CourseExpert, traits_of
+from shapechanger.vehicles.waypoints import AHEAD_M, WIDEST_RAD
 from shapechanger.vehicles.world import MujocoWorld
 
 _FOLDER: Final = Path(__file__).parent / "clones"
@@ -120,11 +121,6 @@ def require_rate(control_hz: float) -> None:
         )
 
 
-def course_expert(world: MujocoWorld) -> CourseExpert:
-    """Make the expert for the present course of a world."""
-    return CourseExpert(world.course, world.vehicle.name, path=world.path())
-
-
 class ExpertDriver:
     """Expert that drives on the present course of a world.
 
@@ -141,8 +137,33 @@ class ExpertDriver:
         seen = self._world.inputs()
         if self._world.course is not self._course:
             self._course = self._world.course
-            self._expert = course_expert(self._world)
+            world = self._world
+            self._expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
         if self._world.placed != self._placed:
             self._placed = self._world.placed
             self._expert.reset(seen.pose)
         return self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
+
+
+# Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
+_BEARING_SWAY: Final = 0.18
+
+
+def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
+    """Return an expert whose actions are waypoints: the bearing of the free way, and the speed."""
+
+    def begin() -> Callable[[], NDArray[np.float32]]:
+        expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
+        return partial(_point, world, expert)
+
+    return Demonstrator(world, begin, seed, _BEARING_SWAY)
+
+
+def _point(world: MujocoWorld, expert: CourseExpert) -> NDArray[np.float32]:
+    """Return the waypoint on the expert's path."""
+    pose, path = world.pose, expert.path
+    station = path.nearest(pose.x, pose.y).station
+    x, y = path.at(station + AHEAD_M)
+    left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
+    share = expert.speeds[path.index(station)] / world.vehicle.top_speed_mps
+    return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, Self, cast
 
 import gymnasium as gym
 import msgspec
@@ -173,6 +173,12 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     parts: frozenset[str]
     action_layout: Layout
     _world: MujocoWorld
+
+    def __new__(cls, *arguments: Any, **options: Any) -> Self:
+        """Keep the arguments, with which a copy is pickled."""
+        env = super().__new__(cls)
+        EzPickle.__init__(env, *arguments, **options)
+        return env
 
     def _set_up(
         self,

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
-from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.limits import Bump, aimed, forward_actions, slewed
@@ -41,7 +40,7 @@ _COURSES: Final = range(48)
 
 
 class MeanOutputs:
-    """Mean outputs of a control period, without sensors and without the steps of outputs.
+    """Mean outputs of control periods, from rest, without sensors and the steps of outputs.
 
     It leaves out deadlines, which a simulated command never misses, and stalls.
 
@@ -50,21 +49,16 @@ class MeanOutputs:
 
     Attributes:
         applied: Value of each action at the end of the last period.
-        tick_s: Period of the guard, s.
     """
 
     def __init__(self, plan: GuardPlan) -> None:
         self._plan = plan
-        self.tick_s = 1.0 / plan.tick_hz
+        self._tick_s = 1.0 / plan.tick_hz
         self._tick_ns = round(1e9 / plan.tick_hz)
         self._forward = forward_actions(plan.actions)
-        self.reset()
-
-    def reset(self) -> None:
-        """Bring all actions to rest."""
-        self.applied = tuple(action.rest for action in self._plan.actions)
         self._now_ns = 0
-        self._bump = Bump(self._plan.limits.bump_hold_ms)
+        self._bump = Bump(plan.limits.bump_hold_ms)
+        self.applied = tuple(action.rest for action in plan.actions)
 
     def outputs(
         self, values: tuple[float, ...], bumped: bool, ticks: int
@@ -88,7 +82,7 @@ class MeanOutputs:
             total = [one + alike * now for one, now in zip(total, values_now, strict=True)]
             if alike == 1:
                 self.applied = tuple(
-                    slewed(action, now, aim, self.tick_s)
+                    slewed(action, now, aim, self._tick_s)
                     for action, now, aim in zip(actions, self.applied, target, strict=True)
                 )
         outputs = self._plan.outputs
@@ -188,16 +182,14 @@ class RangesEnv(DriveEnv):
         camera: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
-        EzPickle.__init__(self, vehicle, **arguments)
         profile = simulated_robot(vehicle, robot)
         self._set_up(
             profile, vehicle, world, courses, {"collision": COLLISION_REWARD, **(reward or {})},
             randomise=randomise, put_back=put_back, has_camera=camera, render_mode=render_mode,
             coarse=True,
         )  # fmt: skip
-        self._shaper = MeanOutputs(profile.plan)
-        self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
+        self._plan = profile.plan
+        self._ticks = round(1.0 / (profile.control_hz * (1.0 / self._plan.tick_hz)))
         self._period_s = 1.0 / profile.control_hz
         bearings = (f"range/{bearing:+d}deg" for bearing in BEARINGS_DEG)
         self.observation_layout = Layout(
@@ -211,7 +203,7 @@ class RangesEnv(DriveEnv):
         self._low, self._high = space.low, space.high
 
     def _begin(self) -> None:
-        self._shaper.reset()
+        self._shaper = MeanOutputs(self._plan)
         self._bumped = False
         self._progress_m = 0.0
 

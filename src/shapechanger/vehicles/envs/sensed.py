@@ -104,67 +104,67 @@ class WheelEncoder:
         return moved_m / (edges[-1][0] - edges[0][0])
 
 
-class _Sonar:
-    """Distance ahead; the echo of a ping is there at a later reading."""
+def _sonar(settings: dict[str, Any], world: MujocoWorld) -> _Read:
+    """Measure the distance ahead; the echo of a ping is there at a later reading."""
+    pinged_ns: int | None = None
+    echo: tuple[int, float] | None = None
+    measured: dict[str, float] = {}
 
-    def __init__(self, most_m: float, distance_m: Callable[[], float]) -> None:
-        self._most_m = most_m
-        self._distance_m = distance_m
-        self._pinged_ns: int | None = None
-        self._echo: tuple[int, float] | None = None
-        self._measured: dict[str, float] = {}
-
-    def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        if self._echo is not None and now_ns >= self._echo[0]:
-            self._measured = {"distance": min(self._echo[1] * _SOUND_M_PER_S / 2.0, self._most_m)}
-            self._echo = None
-        if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
-            self._pinged_ns = now_ns
-            distance_m = self._distance_m()
+    def read(now_ns: int, direction: float) -> dict[str, float]:
+        nonlocal pinged_ns, echo, measured
+        if echo is not None and now_ns >= echo[0]:
+            measured = {"distance": min(echo[1] * _SOUND_M_PER_S / 2.0, settings["max_m"])}
+            echo = None
+        if pinged_ns is None or now_ns - pinged_ns >= _CYCLE_NS:
+            pinged_ns = now_ns
+            distance_m = world.distance_m()
             echo_s = _NO_ECHO_S
             if distance_m <= _FARTHEST_M:
                 echo_s = 2.0 * max(distance_m, _NEAREST_M) / _SOUND_M_PER_S
-            self._echo = now_ns + _PING_NS + round(echo_s * 1e9), echo_s
-        return self._measured
+            echo = now_ns + _PING_NS + round(echo_s * 1e9), echo_s
+        return measured
+
+    return read
 
 
-class _Inertia:
-    def __init__(self, world: MujocoWorld) -> None:
-        self._world = world
-        self._zero: float | None = None
+def _inertia(settings: dict[str, Any], world: MujocoWorld) -> _Read:
+    zero: float | None = None
 
-    def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        seen = self._world.inputs()
+    def read(now_ns: int, direction: float) -> dict[str, float]:
+        nonlocal zero
+        seen = world.inputs()
         rate = _stepped(seen.yaw_rate, _RAD_PER_S)
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
-            zero = rate if self._zero is None else self._zero
-            self._zero = zero + (rate - zero) * _ZERO_SHARE
+            zero = rate if zero is None else zero + (rate - zero) * _ZERO_SHARE
         return {
             "acceleration_x": _stepped(seen.acceleration_x, _M_PER_S2),
             "acceleration_y": _stepped(seen.acceleration_y, _M_PER_S2),
-            "yaw_rate": rate - (self._zero or 0.0),
+            "yaw_rate": rate - (zero or 0.0),
         }
 
+    return read
 
-class _Battery:
-    def __init__(self, world: MujocoWorld) -> None:
-        self._world = world
-        self._read_ns: int | None = None
-        self._volts = 0.0
 
-    def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        if self._read_ns is None or now_ns - self._read_ns >= _BATTERY_NS:
-            self._read_ns = now_ns
-            self._volts = round(self._world.inputs().battery_v / _V_PER_STEP) * _V_PER_STEP
-        return {"battery": self._volts}
+def _battery(settings: dict[str, Any], world: MujocoWorld) -> _Read:
+    read_ns: int | None = None
+    volts = 0.0
+
+    def read(now_ns: int, direction: float) -> dict[str, float]:
+        nonlocal read_ns, volts
+        if read_ns is None or now_ns - read_ns >= _BATTERY_NS:
+            read_ns = now_ns
+            volts = round(world.inputs().battery_v / _V_PER_STEP) * _V_PER_STEP
+        return {"battery": volts}
+
+    return read
 
 
 _SENSORS: Final[dict[str, Callable[[dict[str, Any], MujocoWorld], _Read]]] = {
     "encoder": lambda settings, world: WheelEncoder(settings, world).read,
     "switch": lambda _, world: lambda _ns, _direction: {"bump": float(world.bumped)},
-    "hcsr04": lambda settings, world: _Sonar(settings["max_m"], world.distance_m).read,
-    "mpu6050": lambda _, world: _Inertia(world).read,
-    "ina219": lambda _, world: _Battery(world).read,
+    "hcsr04": _sonar,
+    "mpu6050": _inertia,
+    "ina219": _battery,
 }
 """Simulations of the sensors by the name of their driver."""
 
@@ -182,7 +182,7 @@ _COUNTS: Final = 4096  # Of its period.
 
 
 class SensedVehicle:
-    """A vehicle that moves within a robot's limits and senses what the robot would.
+    """A vehicle that moves within a robot's limits and senses what the robot would, from rest.
 
     It is the robot without pins, chips, link and emergency stops: a robot's twin simulates
     those, and drives to the same place.
@@ -204,22 +204,18 @@ class SensedVehicle:
         self._world = world
         self._tick_ns = round(1e9 / plan.tick_hz)
         self._steps = [_stepper(output) for output in plan.outputs]
-        self.start()
-
-    def start(self) -> None:
-        """Bring all actions to rest, and begin to sense."""
         self.now_ns = 0
-        self.applied = tuple(action.rest for action in self._plan.actions)
+        self.applied = tuple(action.rest for action in plan.actions)
         self.reason = ""
         self.quantities: dict[str, float] = {}
         self.sources: dict[str, str] = {}
         self._parts = self._outputs()
-        self._reflexes = MotionReflexes(self._plan)
+        self._reflexes = MotionReflexes(plan)
         self._measured_by: dict[str, str] = {}
         opened = [
-            (plan, _SENSORS[plan.driver](plan.settings, self._world))
-            for plan in self._plan.sensors
-            if plan.driver in _SENSORS
+            (one, _SENSORS[one.driver](one.settings, world))
+            for one in plan.sensors
+            if one.driver in _SENSORS
         ]
         self._fast, self._slow = (
             [(one.name, read) for one, read in opened if (one.measures in _AT_EACH_TICK) == fast]

@@ -1,17 +1,21 @@
-"""Car, tank, boat and truck as Gymnasium envs that see a camera's image and a robot's sensors."""
+"""Car, tank, boat and truck as Gymnasium envs of a camera: with steering, and with waypoints."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
+from shapechanger.errors import ProfileError
 from shapechanger.layout import Element, Feature, Layout
+from shapechanger.vehicles.bodies import vehicle_model
+from shapechanger.vehicles.courses.course import FLOODED
 from shapechanger.vehicles.envs.drive import (
     Courses,
     DriveEnv,
@@ -19,14 +23,15 @@ from shapechanger.vehicles.envs.drive import (
     simulated_robot,
     space_of,
 )
-from shapechanger.vehicles.envs.ranges import leave_rest, observe_ranges
+from shapechanger.vehicles.envs.ranges import RangesEnv, leave_rest, observe_ranges
 from shapechanger.vehicles.envs.sensed import SensedVehicle
 from shapechanger.vehicles.envs.shift import certify_vehicles
+from shapechanger.vehicles.waypoints import SteeringResponse, WaypointView, measure_response
 
 if TYPE_CHECKING:
     from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
-_ABSENT: Final = "absent"
+_REWARDED: Final = ("speed", "stall", "collision")  # Quantities that the reward needs.
 
 
 class VehicleEnv(DriveEnv):
@@ -115,21 +120,16 @@ class VehicleEnv(DriveEnv):
         lenses: Sequence[str] = (),
         render_mode: str | None = None,
     ) -> None:
-        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
-        EzPickle.__init__(self, vehicle, **arguments)
         self.welcome = profile = simulated_robot(vehicle, robot, size, steering)
         self._set_up(
             profile, vehicle, world, courses, {**profile.reward, **(reward or {})},
             randomise=randomise, put_back=put_back, has_camera=image, render_mode=render_mode,
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )  # fmt: skip
-        self._vehicle = SensedVehicle(profile.plan, self._world)
         self._period_ns = round(1e9 / profile.control_hz)
         self._has_image, self._has_state = image, state or not image
         self._state = profile.state_layout
-        self._applied_at = {
-            f"{action.name}/applied": i for i, action in enumerate(profile.plan.actions)
-        }
+        self._applied = [f"{action.name}/applied" for action in profile.plan.actions]
         shape = (*profile.size[::-1], 3)
         pixels = Feature("camera/image", "1", 0.0, 255, Element("camera", "camera"), shape)
         self.observation_layout = Layout(
@@ -143,10 +143,10 @@ class VehicleEnv(DriveEnv):
             self.observation_space = gym.spaces.Dict(spaces)
 
     def _begin(self) -> None:
-        self._vehicle.start()
+        self._vehicle = SensedVehicle(self.welcome.plan, self._world)
         # A robot sends its first observation after one period, too.
         self._vehicle.advance(self._period_ns, None)
-        self._touched = bool(self._touches())
+        self._touched = bool(self._vehicle.quantities.get("collision"))
 
     def _advance(
         self, values: NDArray[np.float64]
@@ -154,11 +154,10 @@ class VehicleEnv(DriveEnv):
         vehicle, world = self._vehicle, self._world
         collisions, bumps = world.collisions, vehicle.bumps
         vehicle.advance(self._period_ns, values.tolist())
-        touches = self._touches()
+        speed, touches, stall = map(vehicle.quantities.get, ("speed", "collision", "stall"))
         hits = bool(touches) or vehicle.bumps > bumps
         collided = None if touches is None else hits and not self._touched
         self._touched = hits
-        speed, stall = (vehicle.quantities.get(name) for name in ("speed", "stall"))
         stalled = None if stall is None else bool(stall)
         terms = self._reward.terms(speed, collided, stalled, self._period_ns / 1e9)
         seen, info = self._observe()
@@ -192,36 +191,134 @@ class VehicleEnv(DriveEnv):
 
         return Demonstrator(self._world, lambda: teach, seed)
 
-    def _touches(self) -> float | None:
-        """Return whether sensors say that it touches something, 0 or 1; None if none can say."""
-        quantities = self._vehicle.quantities
-        return quantities.get("collision", quantities.get("bump"))
-
     def _observe(self) -> tuple[Any, dict[str, Any]]:
         vehicle, world = self._vehicle, self._world
-        state, absent = np.empty(self._state.size, np.float32), list[str]()
-        for i, feature in enumerate(self._state.features):
-            place = self._applied_at.get(feature.name)
-            value = (
-                vehicle.quantities.get(feature.name) if place is None else vehicle.applied[place]
-            )
-            if value is None:
-                absent.append(feature.name)
-            state[i] = feature.middle if value is None else value
+        numbers = vehicle.quantities | dict(zip(self._applied, vehicle.applied, strict=True))
+        features = self._state.features
+        state = np.array([numbers.get(one.name, one.middle) for one in features], np.float32)
         seen: Any = state
         if self._has_image:
             image = world.picture()
             seen = {"image": image, "state": state} if self._has_state else image
-        sources = {name: vehicle.sources.get(name, _ABSENT) for name in ("speed", "stall")}
-        touch = vehicle.sources.get("collision", vehicle.sources.get("bump", _ABSENT))
         return seen, self._truth(world.progress_m) | {
             "action_applied": np.array(vehicle.applied, np.float32),
             "stop_reason": vehicle.reason,
             "refused": "",
             "armed": True,
             "emergency": False,
-            "absent": tuple(absent),
-            "reward_sources": sources | {"collision": touch},
+            "absent": tuple(one.name for one in features if one.name not in numbers),
+            "reward_sources": {name: vehicle.sources.get(name, "absent") for name in _REWARDED},
             "captured_ns": vehicle.now_ns,
             "decided_ns": vehicle.now_ns - self._period_ns,
         }
+
+
+@lru_cache(maxsize=32)
+def _response_of(
+    vehicle: str,
+    world: str,
+    robot: str | os.PathLike[str] | None,
+    sensed: bool,
+    motion_at: tuple[int, int],
+) -> SteeringResponse:
+    """Measure the response of a simulated vehicle, once in a process."""
+    common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
+    env = VehicleEnv(vehicle, image=False, **common) if sensed else RangesEnv(vehicle, **common)
+    with closing(env):
+        return measure_response(env, *motion_at)
+
+
+class WaypointEnv(WaypointView, DriveEnv):
+    """The driving task with a camera and an action that are the same for all vehicles.
+
+    Networks that predict steering learn the body with it: full left is another circle in each
+    vehicle. A waypoint means the same in all of them, so a policy that learned in one vehicle
+    drives another one as it is: pictures are warped to one
+    virtual camera (`shapechanger.vehicles.cameras.rectify`), and the action is a waypoint, which
+    the vehicle turns into steering by its own `SteeringResponse`, measured when the env is made.
+
+    ## Action space
+    `Box(-1, 1, (2,), float32)`: bearing of the free way `AHEAD_M` ahead, in `WIDEST_RAD`, positive
+    to the right; and the speed, -1 for standing and 1 for full throttle. It acts for one control
+    period, 1/20 s.
+
+    ## Observation space
+    The rectified frame, RGB, `uint8`, shape (48, 80, 3).
+
+    ## Reward, start, end and info
+    Those of `RangesEnv`, or of `VehicleEnv` with `sensed`.
+
+    Args:
+        vehicle: "car", "tank", "boat" or "truck".
+        world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
+            for a boat, so that vehicles differ in their bodies alone.
+        robot: Path or name of a profile; None for `lab-` followed by the vehicle.
+        sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
+            of the true ones; its physics takes shorter steps, too.
+        courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
+        randomise: Whether `reset` samples light, textures and the camera's pose too. Pictures are
+            warped as if the camera were in its place, so a policy sees the error of the pose.
+        put_back: Whether to put the vehicle back on the lane after a collision. A collision then
+            does not end the episode.
+        render_mode: "rgb_array" for `render` to return the camera's picture as it is.
+
+    Attributes:
+        parts: The parts that the robot's outputs move.
+        response: How the vehicle turns.
+
+    Raises:
+        UnknownName: If there is no such vehicle, world, profile or kind of courses.
+        ProfileError: If the profile moves other parts than the vehicle has, or has no camera that
+            sees what policies for all vehicles look at.
+        WorldError: If the vehicle cannot drive in the world.
+    """
+
+    certify_shift = staticmethod(certify_vehicles)
+
+    def __init__(
+        self,
+        vehicle: str,
+        *,
+        world: str | None = None,
+        robot: str | os.PathLike[str] | None = None,
+        sensed: bool = False,
+        courses: Courses = "training",
+        randomise: bool = False,
+        put_back: bool = False,
+        render_mode: str | None = None,
+    ) -> None:
+        body, profile = vehicle_model(vehicle), simulated_robot(vehicle, robot)
+        world = world or (FLOODED if body.floats else "corridor")
+        common: dict[str, Any] = {
+            "world": world, "robot": robot, "courses": courses, "randomise": randomise,
+            "put_back": put_back, "render_mode": render_mode,
+        }  # fmt: skip
+        env = (
+            VehicleEnv(vehicle, state=True, **common)
+            if sensed
+            else RangesEnv(vehicle, camera=True, **common)
+        )
+        self.parts, self._world = env.parts, env.world
+        self._see(
+            env, profile.path, (profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size),
+            ("speed", "yaw_rate"), ProfileError, turns_on_the_spot=body.turning_radius_m == 0.0,
+        )  # fmt: skip
+        self.response = _response_of(vehicle, world, robot, sensed, self._motion_at)
+
+    def hold_out(self) -> None:
+        """Sample held-out courses from the next reset on."""
+        self._env.hold_out()
+
+    def demonstrator(self, seed: int) -> Demonstrator:
+        """Return an expert that knows the whole course and recovers from its own mistakes.
+
+        Args:
+            seed: Seed of the mistakes.
+
+        Raises:
+            ProfileError: If the robot has another control rate than the expert.
+        """
+        from shapechanger.vehicles.envs.demonstrators import require_rate, waypoint_demonstrator
+
+        require_rate(self.metadata["render_fps"])
+        return waypoint_demonstrator(self.world, seed)

@@ -10,21 +10,126 @@ Control", 2011, chapter 10), with its drift angle subtracted.
 from __future__ import annotations
 
 import math
+import tomllib
 from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
+from shapechanger.errors import WorldError
+from shapechanger.vehicles.bodies import VEHICLES, VehicleModel, vehicle_model
 from shapechanger.vehicles.courses.course import Course
 from shapechanger.vehicles.courses.geometry import ClearanceField
-from shapechanger.vehicles.expert.path import (
-    CoursePath,
-    plan_path_for,
-    speed_profile,
+from shapechanger.vehicles.expert.line import Spot
+from shapechanger.vehicles.expert.path import CoursePath, plan_path
+
+PERIOD_S: Final = 0.05
+"""Control period of the experts, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """Driving properties of a vehicle.
+
+    All but the body was tuned on training courses.
+
+    Attributes:
+        body: Model of the vehicle.
+        drive: Kind of steering: front wheels, two tracks, or a rudder.
+        margin_m: Smallest clearance on each side of its path: for the corners of its hull, a
+            trailer that cuts corners, and errors.
+        comfort_m: Preferred clearance.
+        cruise: Share of the top speed on free, straight lanes.
+        lateral_limit: Largest lateral acceleration, m/s2.
+        braking: Reliable deceleration, m/s2.
+        look_m: Look-ahead distance at standstill.
+        look_s: Additional look-ahead distance per speed.
+        turn: Effect of one unit of steering: for wheels the tangent of the full lock over the
+            wheelbase, a curvature, 1/m; for tracks the rate of turn, rad/s; for a rudder the rate
+            of turn over the speed, rad/m.
+        dead: Dead band of a tank's steering, from friction of the tracks.
+        sway: Standard deviation of steering noise that it can correct.
+        least_throttle: Smallest throttle while driving forward; below 0 brakes with the motor.
+    """
+
+    body: VehicleModel
+    drive: Literal["wheels", "tracks", "rudder"]
+    margin_m: float
+    comfort_m: float
+    cruise: float
+    lateral_limit: float
+    braking: float
+    look_m: float
+    look_s: float
+    turn: float
+    dead: float = 0.0
+    sway: float = 0.25
+    least_throttle: float = 0.0
+
+    @property
+    def half_width_m(self) -> float:
+        """Half of the vehicle's largest width, m."""
+        return self.body.width_m / 2
+
+    @property
+    def top_speed(self) -> float:
+        """Speed at full throttle on level ground, m/s."""
+        return self.body.top_speed_mps
+
+
+TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
+    {
+        name: Traits(body=VEHICLES[name], **numbers)
+        for name, numbers in tomllib.loads(
+            Path(__file__).with_name("traits.toml").read_text("utf-8")
+        ).items()
+    }
 )
-from shapechanger.vehicles.expert.traits import PERIOD_S, Traits, traits_of
+"""Driving properties by the name of the vehicle."""
+
+
+def traits_of(name: str) -> Traits:
+    """Find driving properties by the name of the vehicle."""
+    return TRAITS[vehicle_model(name).name]
+
+
+def plan_path_for(course: Course, traits: Traits) -> CoursePath:
+    """Plan a path for a vehicle, with less clearance if its own does not fit.
+
+    Passages are as wide as the vehicles of a world need, and a boat in a flooded corridor would
+    need more: 6 of the first 1,300 training courses are too narrow for its clearance.
+    """
+    try:
+        return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
+    except WorldError:
+        narrow = 2.0 / 3.0 * traits.margin_m
+        return plan_path(course, traits.half_width_m, narrow, comfort_m=traits.comfort_m)
+
+
+def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
+    """Speed at each point of a path, m/s, (N,).
+
+    It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
+    both.
+    """
+    least = traits.half_width_m + traits.margin_m
+    comfort = traits.half_width_m + traits.comfort_m
+    room = np.clip((path.clearance - least) / (comfort - least), 0.0, 1.0)
+    speed = traits.top_speed * traits.cruise * (0.65 + 0.35 * room)
+    bend = np.maximum(np.abs(path.curvature), 1e-6)
+    speed = np.minimum(speed, np.sqrt(traits.lateral_limit / bend))
+    step = path.length / len(speed)
+    for i in range(2 * len(speed) - 1, -1, -1):  # Two laps, because the path is closed.
+        here, after = i % len(speed), (i + 1) % len(speed)
+        can_brake_from = np.sqrt(speed[after] ** 2 + 2 * traits.braking * step)
+        speed[here] = min(speed[here], can_brake_from)
+    return speed
 
 
 def _wrap_angle(angle: float) -> float:
@@ -85,13 +190,8 @@ class Pursuit:
             now = 0.0
         self._drift += (now - self._drift) * PERIOD_S / _DRIFT_S
 
-    def steering(
-        self, pose: Pose, speed: float, yaw_rate: float, target: tuple[float, float]
-    ) -> float:
-        """Steering towards a point, x and y in m, from -1, left, to 1."""
-        dx, dy = target[0] - pose.x, target[1] - pose.y
-        distance = max(math.hypot(dx, dy), 0.1)
-        angle = _wrap_angle(math.atan2(dy, dx) - pose.heading)
+    def steering(self, angle: float, distance: float, speed: float, yaw_rate: float) -> float:
+        """Steering towards a point, at an angle from the heading, rad, from -1, left, to 1."""
         match self._traits.drive:
             case "wheels":
                 return _clipped(-self._curvature(angle, distance) / self._traits.turn)
@@ -207,12 +307,7 @@ class CourseExpert:
     """
 
     def __init__(
-        self,
-        course: Course,
-        vehicle: str,
-        seed: int = 0,
-        *,
-        path: CoursePath | None = None,
+        self, course: Course, vehicle: str, seed: int = 0, *, path: CoursePath | None = None
     ) -> None:
         traits = self._traits = traits_of(vehicle)
         self.path = path or plan_path_for(course, traits)
@@ -244,14 +339,13 @@ class CourseExpert:
         spot = self.path.nearest(soon.x, soon.y, self._station)
         self._station = spot.station
         look = self._traits.look_m + self._traits.look_s * max(speed, 0.0)
-        target = self.path.at(spot.station + look)
-        angle = _wrap_angle(math.atan2(target[1] - soon.y, target[0] - soon.x) - soon.heading)
-        back = self._recovery.action(angle)
-        if back is None:
-            steering = self._pursuit.steering(soon, speed, yaw_rate, target)
-            action = self._driven(steering, spot.station, spot.lateral, angle, speed)
-        else:
-            action = back
+        x, y = self.path.at(spot.station + look)
+        angle = _wrap_angle(math.atan2(y - soon.y, x - soon.x) - soon.heading)
+        action = self._recovery.action(angle)
+        if action is None:
+            distance = max(math.hypot(x - soon.x, y - soon.y), 0.1)
+            steering = self._pursuit.steering(angle, distance, speed, yaw_rate)
+            action = self._driven(steering, spot, angle, speed)
         blocked = abs(angle) > _ASIDE and self._ahead(pose) < _BLOCKED_M
         self._recovery.watch(action, speed, yaw_rate, blocked=blocked)
         return np.array(action, np.float32)
@@ -259,10 +353,7 @@ class CourseExpert:
     def _ahead(self, pose: Pose) -> float:
         """Clearance at `_BLOCKED_M` ahead of the nose, m."""
         reach = self._traits.body.nose_m + _BLOCKED_M
-        nose = (
-            pose.x + reach * math.cos(pose.heading),
-            pose.y + reach * math.sin(pose.heading),
-        )
+        nose = pose.x + reach * math.cos(pose.heading), pose.y + reach * math.sin(pose.heading)
         return float(self._obstacles.distance(np.array([nose]))[0])
 
     def _soon(self, pose: Pose, speed: float, yaw_rate: float) -> Pose:
@@ -276,14 +367,14 @@ class CourseExpert:
         )
 
     def _driven(
-        self, steering: float, station: float, lateral: float, angle: float, speed: float
+        self, steering: float, spot: Spot, angle: float, speed: float
     ) -> tuple[float, float]:
         """Steering and throttle for driving forward."""
         traits = self._traits
-        here = self.path.index(station)
+        here = self.path.index(spot.station)
         wanted = float(self.speeds[here])
         # Off the path there is less room than planned, and a wrong heading must be corrected.
-        room = float(self.path.clearance[here]) - abs(lateral) - traits.half_width_m
+        room = float(self.path.clearance[here]) - abs(spot.lateral) - traits.half_width_m
         if room < traits.margin_m:
             wanted *= 0.5 + 0.5 * max(room, 0.0) / traits.margin_m
         slowest = 0.1 if traits.drive == "tracks" else 0.4

@@ -1,4 +1,4 @@
-"""Planning of a smooth, collision-free path around a course, and its speed profile.
+"""Planning of a smooth, collision-free path around a course.
 
 The cheapest way over a lattice decides on which side to pass each obstacle; the path is then the
 least bent line between bounds around that way. Its points are `middle + offset * left`, so the sum
@@ -10,7 +10,6 @@ planning", Vehicle System Dynamics 58 (2020).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -21,7 +20,6 @@ from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses.course import Course
 from shapechanger.vehicles.courses.geometry import ClearanceField, arc_lengths
 from shapechanger.vehicles.expert.line import ClosedLine
-from shapechanger.vehicles.expert.traits import Traits
 
 _STATION_M: Final = 0.2
 _OFFSET_M: Final = 0.1
@@ -31,7 +29,6 @@ _SLOPES: Final = np.arange(-2, 3)  # Changes of the offset between stations, in 
 _BEND_COST: Final = 0.15
 _SLANT_COST: Final = 0.02
 _NARROW_COST: Final = 1.0
-_NARROW_SHARE: Final = 2.0 / 3.0
 # Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
 # that a lap cut from the middle is closed.
 _OVERLAP_M: Final = 12.0
@@ -44,9 +41,10 @@ _PULL: Final = 0.02  # Weight of the preferred offsets, 1/m^4; see `_least_bent`
 _ATTEMPTS: Final = 8  # To push a line away from obstacles.
 
 
-@dataclass(frozen=True, slots=True)
-class Lattice:
-    """Rows of points across the lane, at stations along it.
+class _Lattice:
+    """Rows of points across the lane of a course, at stations along it, and ways through them.
+
+    A vehicle's path has a clearance of at least `least_m`, and prefers `comfort_m`.
 
     Attributes:
         middle: Middle of the lane, m, (N, 2).
@@ -55,58 +53,103 @@ class Lattice:
         clearance: Clearance of each point, m, (N, K); 0 outside the lane.
     """
 
-    middle: NDArray[np.float64]
-    left: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    clearance: NDArray[np.float64]
+    def __init__(self, course: Course, least_m: float, comfort_m: float) -> None:
+        self._least_m, self._comfort_m = least_m, comfort_m
+        self._obstacles = obstacles = ClearanceField(course)
+        line = ClosedLine(course.route)
+        count = max(round(line.length / _STATION_M), 8)
+        middle = np.array([line.at(line.length * i / count) for i in range(count)])
+        half_width = np.interp(
+            np.arange(count) * line.length / count,
+            line.stations,
+            course.half_width,
+            period=line.length,
+        )
+        step = line.length / count
+        # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
+        ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
+        ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+        left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
+        side = int(np.floor(half_width.max() / _OFFSET_M))
+        offsets = np.linspace(-side, side, 2 * side + 1) * _OFFSET_M
+        points = middle[:, None] + offsets[None, :, None] * left[:, None]
+        clearance = obstacles.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
+        clearance[np.abs(offsets)[None, :] > half_width[:, None]] = 0.0
+        # Beyond the centre of a corner, rows run backward; such points are outside the lane.
+        gained = np.einsum("ikj,ij->ik", np.roll(points, -1, axis=0) - points, ahead)
+        backward = gained < 0.2 * step
+        clearance[backward | np.roll(backward, 1, axis=0)] = 0.0
+        self.middle, self.left = middle, left
+        self.offsets, self.clearance = offsets, clearance
 
+    def cheapest_way(self, spare_m: float) -> NDArray[np.int64]:
+        """Index of the offset at each station, (N,), of the closed way with the least cost.
 
-def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
-    """Lay a lattice over the lane of a course."""
-    line = ClosedLine(course.route)
-    count = max(round(line.length / _STATION_M), 8)
-    middle = np.array([line.at(line.length * i / count) for i in range(count)])
-    half_width = np.interp(
-        np.arange(count) * line.length / count,
-        line.stations,
-        course.half_width,
-        period=line.length,
-    )
-    step = line.length / count
-    # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
-    ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
-    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-    left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
-    side = int(np.floor(half_width.max() / _OFFSET_M))
-    offsets = np.linspace(-side, side, 2 * side + 1) * _OFFSET_M
-    points = middle[:, None] + offsets[None, :, None] * left[:, None]
-    clearance = obstacles.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
-    clearance[np.abs(offsets)[None, :] > half_width[:, None]] = 0.0
-    # Beyond the centre of a corner, rows run backward; such points are outside the lane.
-    gained = np.einsum("ikj,ij->ik", np.roll(points, -1, axis=0) - points, ahead)
-    backward = gained < 0.2 * step
-    clearance[backward | np.roll(backward, 1, axis=0)] = 0.0
-    return Lattice(middle, left, offsets, clearance)
+        It is found by dynamic programming over stations, with offset and slope as the state. Points
+        with less than the least clearance and a spare are forbidden. Raises a `WorldError` if there
+        is no such way.
+        """
+        least_m = self._least_m + spare_m
+        comfort_m = max(self._comfort_m, self._least_m + 0.05)
+        missing = np.clip((comfort_m - self.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
+        cost = np.where(self.clearance >= least_m, _NARROW_COST * missing**2, np.inf)
+        count = len(cost)
+        overlap = min(round(_OVERLAP_M / _STATION_M), count)
+        way = _search(cost, np.arange(count + overlap) % count, None, least_m)
+        seam = overlap // 2
+        if way[seam] != way[seam + count]:
+            stations = (np.arange(count + 1) + seam) % count
+            closed = _search(cost, stations, int(way[seam + count]), least_m)
+            return np.roll(closed[:-1], seam)
+        return np.roll(way[seam : seam + count], seam)
 
+    def smoothed(self, way: NDArray[np.int64]) -> CoursePath | None:
+        """A smooth path that passes all obstacles on the same sides as a way, or None."""
+        extra = np.zeros(len(way))
+        for _ in range(_ATTEMPTS):
+            low, high = self._room(way, extra)
+            offsets = _least_bent(self.middle, self.left, low, high, self.offsets[way], _PULL)
+            path = CoursePath(self.middle + offsets[:, None] * self.left, self._obstacles)
+            short = self._least_m - path.clearance
+            if short.max() <= 0:
+                return path
+            # Ask for more clearance wherever it is missing, and try again.
+            knots = np.arange(len(path.points)) * len(way) // len(path.points)
+            need = np.zeros(len(way))
+            np.maximum.at(need, knots, np.maximum(short, 0.0))
+            for shift in (-2, -1, 1, 2):
+                need = np.maximum(need, np.roll(need, shift))
+            extra += 1.2 * need + 0.005 * (need > 0)
+        return None
 
-def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[np.int64]:
-    """Index of the offset at each station, (N,), of the closed way with the least cost.
+    def _room(
+        self, way: NDArray[np.int64], extra: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
+        low, high = np.empty(len(way)), np.empty(len(way))
+        for i, k in enumerate(way):
+            # They always include the way, so bounds of neighbours overlap.
+            clear = float(self.clearance[i, k])
+            least = self._least_m + extra[i]
+            wanted = min(max(self._comfort_m, least), clear - 0.02 + extra[i])
+            wanted = min(max(wanted, least), clear)
+            low[i], high[i] = (self._edge(i, int(k), side, wanted) for side in (-1, 1))
+        return low, high
 
-    It is found by dynamic programming over stations, with offset and slope as the state. Points
-    below `least_m` are forbidden; a clearance above `comfort_m` is worth nothing more. Raises a
-    `WorldError` if there is no such way.
-    """
-    missing = np.clip((comfort_m - lattice.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
-    cost = np.where(lattice.clearance >= least_m, _NARROW_COST * missing**2, np.inf)
-    count = len(cost)
-    overlap = min(round(_OVERLAP_M / _STATION_M), count)
-    way = _search(cost, np.arange(count + overlap) % count, None, least_m)
-    seam = overlap // 2
-    if way[seam] != way[seam + count]:
-        stations = (np.arange(count + 1) + seam) % count
-        closed = _search(cost, stations, int(way[seam + count]), least_m)
-        return np.roll(closed[:-1], seam)
-    return np.roll(way[seam : seam + count], seam)
+    def _edge(self, i: int, k: int, side: int, wanted: float) -> float:
+        """Offset to one side of point k at which the clearance falls below `wanted`, m."""
+        clearance, offsets = self.clearance[i], self.offsets
+        beyond = k + side
+        while 0 <= beyond < len(offsets) and clearance[beyond] >= wanted:
+            k, beyond = beyond, beyond + side
+        here = float(offsets[k])
+        if not 0 <= beyond < len(offsets):
+            return here
+        inside, outside = float(clearance[k]), float(clearance[beyond])
+        if outside == 0.0 or inside <= wanted or outside >= inside:
+            return here  # 0 may mark a point outside the lane.
+        share = (inside - wanted) / (inside - outside)
+        return here + min(share, 1.0) * (float(offsets[beyond]) - here)
 
 
 def _search(
@@ -168,19 +211,9 @@ def _least_bent(
     """Offsets of the least bent closed line between bounds.
 
     The alternating direction method approximates the solution, and an active-set step refines it.
-    SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size.
-
-    Args:
-        middle: Evenly spaced points, m, (N, 2).
-        left: Direction in which each point may move, (N, 2).
-        low: Smallest offset of each point, m, (N,).
-        high: Largest offset of each point, m, (N,).
-        wish: Preferred offset of each point, m, (N,).
-        pull: Weight of the preferred offsets, 1/m^4: a curvature of 1/m costs as much as an offset
-            of `1 / sqrt(pull)` m from them.
-
-    Returns:
-        Offsets within the bounds, m, (N,).
+    SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size. The preferred offsets
+    `wish` pull with a weight, 1/m^4: a curvature of 1/m costs as much as an offset of
+    `1 / sqrt(pull)` m from them.
     """
     count = len(middle)
     step = float(np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1).mean())
@@ -210,7 +243,11 @@ def _least_bent(
 
 
 class CoursePath(ClosedLine):
-    """A closed path around a course.
+    """A closed, evenly spaced path around a course: a periodic cubic spline through points.
+
+    Args:
+        knots: The points, m, (n, 2).
+        obstacles: Distances to the walls and obstacles of the course.
 
     Attributes:
         heading: Direction at each point, rad, counter-clockwise from the x axis, (N,).
@@ -218,21 +255,27 @@ class CoursePath(ClosedLine):
         clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
     """
 
-    def __init__(
-        self,
-        points: NDArray[np.float64],
-        heading: NDArray[np.float64],
-        curvature: NDArray[np.float64],
-        clearance: NDArray[np.float64],
-    ) -> None:
+    def __init__(self, knots: NDArray[np.float64], obstacles: ClearanceField) -> None:
+        chords = arc_lengths(knots)
+        spline = CubicSpline(chords, np.vstack((knots, knots[:1])), bc_type="periodic")
+        # Even steps of the parameter are only approximately even along the line.
+        around = float(chords[-1])
+        count = max(round(around / _SPACING_M), 8)
+        fine = np.linspace(0.0, around, 4 * count + 1)
+        arcs = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))))
+        even = np.linspace(0.0, float(arcs[-1]), count, endpoint=False)
+        where = np.interp(even, arcs, fine)
+        points, first, second = spline(where), spline(where, 1), spline(where, 2)
         super().__init__(points)
-        self.heading = heading
-        self.curvature = curvature
-        self.clearance = clearance
+        speed = np.hypot(first[:, 0], first[:, 1])
+        cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        self.heading: NDArray[np.float64] = np.arctan2(first[:, 1], first[:, 0])
+        self.curvature: NDArray[np.float64] = cross / speed**3
+        self.clearance = obstacles.distance(points)
 
 
 def plan_path(
-    course: Course, half_width_m: float, margin_m: float, *, comfort_m: float | None = None
+    course: Course, half_width_m: float, margin_m: float, *, comfort_m: float
 ) -> CoursePath:
     """Plan a smooth path around a course.
 
@@ -240,24 +283,23 @@ def plan_path(
         course: The course.
         half_width_m: Half width of the vehicle, m.
         margin_m: Smallest clearance beside the vehicle, m.
-        comfort_m: Preferred clearance, m; None for three times the margin.
+        comfort_m: Preferred clearance beside the vehicle, m.
 
     Returns:
         A path with a clearance of at least `half_width_m + margin_m` at every point.
+
+    Raises:
+        WorldError: If there is none.
     """
-    least = half_width_m + margin_m
-    comfort = half_width_m + (3 * margin_m if comfort_m is None else comfort_m)
-    obstacles = ClearanceField(course)
-    lattice = lay_lattice(course, obstacles)
+    lattice = _Lattice(course, half_width_m + margin_m, half_width_m + comfort_m)
     # Between two lattice points the line may come closer to obstacles, so ask for a spare first.
     for spare in (0.03, 0.0):
         try:
-            way = cheapest_way(lattice, least + spare, max(comfort, least + 0.05))
+            path = lattice.smoothed(lattice.cheapest_way(spare))
         except WorldError:
             if not spare:
                 raise
             continue
-        path = _smoothed(lattice, way, obstacles, least, comfort)
         if path is not None:
             return path
     raise WorldError(
@@ -265,122 +307,3 @@ def plan_path(
         f"{margin_m:.2f} m on each side of a vehicle {2 * half_width_m:.2f} m wide. Use a smaller "
         "margin, or another seed."
     )
-
-
-def _smoothed(
-    lattice: Lattice,
-    way: NDArray[np.int64],
-    obstacles: ClearanceField,
-    least: float,
-    comfort: float,
-) -> CoursePath | None:
-    """A smooth path that passes all obstacles on the same sides as a way, or None."""
-    extra = np.zeros(len(way))
-    for _ in range(_ATTEMPTS):
-        low, high = _room(lattice, way, least, comfort, extra)
-        offsets = _least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], _PULL)
-        path = _splined(lattice.middle + offsets[:, None] * lattice.left, obstacles)
-        short = least - path.clearance
-        if short.max() <= 0:
-            return path
-        # Ask for more clearance wherever it is missing, and try again.
-        knots = np.arange(len(path.points)) * len(way) // len(path.points)
-        need = np.zeros(len(way))
-        np.maximum.at(need, knots, np.maximum(short, 0.0))
-        for shift in (-2, -1, 1, 2):
-            need = np.maximum(need, np.roll(need, shift))
-        extra += 1.2 * need + 0.005 * (need > 0)
-    return None
-
-
-def _room(
-    lattice: Lattice,
-    way: NDArray[np.int64],
-    least: float,
-    comfort: float,
-    extra: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
-    low, high = np.empty(len(way)), np.empty(len(way))
-    for i, k in enumerate(way):
-        # They always include the way, so bounds of neighbours overlap.
-        clear = float(lattice.clearance[i, k])
-        wanted = min(max(comfort, least + extra[i]), clear - 0.02 + extra[i])
-        wanted = min(max(wanted, least + extra[i]), clear)
-        first, last = _run(lattice.clearance[i] >= wanted, int(k))
-        low[i] = _edge(lattice, i, first, -1, wanted)
-        high[i] = _edge(lattice, i, last, +1, wanted)
-    return low, high
-
-
-def _run(mask: NDArray[np.bool_], k: int) -> tuple[int, int]:
-    """First and last index of the run of true values around an index."""
-    false = np.flatnonzero(~mask)
-    after = np.searchsorted(false, k)
-    first = int(false[after - 1]) + 1 if after else 0
-    last = int(false[after]) - 1 if after < len(false) else len(mask) - 1
-    return first, last
-
-
-def _edge(lattice: Lattice, i: int, k: int, side: int, wanted: float) -> float:
-    """Offset beyond point k at which the clearance falls below `wanted`, m."""
-    here = float(lattice.offsets[k])
-    beyond = k + side
-    if not 0 <= beyond < len(lattice.offsets):
-        return here
-    inside, outside = float(lattice.clearance[i, k]), float(lattice.clearance[i, beyond])
-    if outside == 0.0 or inside <= wanted or outside >= inside:
-        return here  # 0 may mark a point outside the lane.
-    share = (inside - wanted) / (inside - outside)
-    return here + min(share, 1.0) * (float(lattice.offsets[beyond]) - here)
-
-
-def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePath:
-    """An evenly spaced path through points, by a periodic cubic spline."""
-    chords = arc_lengths(knots)
-    spline = CubicSpline(chords, np.vstack((knots, knots[:1])), bc_type="periodic")
-    # Even steps of the parameter are only approximately even along the line.
-    around = float(chords[-1])
-    count = max(round(around / _SPACING_M), 8)
-    fine = np.linspace(0.0, around, 4 * count + 1)
-    arcs = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))))
-    even = np.linspace(0.0, float(arcs[-1]), count, endpoint=False)
-    where = np.interp(even, arcs, fine)
-    points, first, second = spline(where), spline(where, 1), spline(where, 2)
-    speed = np.hypot(first[:, 0], first[:, 1])
-    curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3
-    heading = np.arctan2(first[:, 1], first[:, 0])
-    return CoursePath(points, heading, curvature, obstacles.distance(points))
-
-
-def plan_path_for(course: Course, traits: Traits) -> CoursePath:
-    """Plan a path for a vehicle, with less clearance where its own does not fit.
-
-    Passages are as wide as the vehicles of a world need, and a boat in a flooded corridor would
-    need more: 6 of the first 1,300 training courses are too narrow for its clearance.
-    """
-    try:
-        return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
-    except WorldError:
-        narrow = _NARROW_SHARE * traits.margin_m
-        return plan_path(course, traits.half_width_m, narrow, comfort_m=traits.comfort_m)
-
-
-def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
-    """Speed at each point of a path, m/s, (N,).
-
-    It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
-    both.
-    """
-    least = traits.half_width_m + traits.margin_m
-    comfort = traits.half_width_m + traits.comfort_m
-    room = np.clip((path.clearance - least) / (comfort - least), 0.0, 1.0)
-    speed = traits.top_speed * traits.cruise * (0.65 + 0.35 * room)
-    bend = np.maximum(np.abs(path.curvature), 1e-6)
-    speed = np.minimum(speed, np.sqrt(traits.lateral_limit / bend))
-    step = path.length / len(speed)
-    for i in range(2 * len(speed) - 1, -1, -1):  # Two laps, because the path is closed.
-        here, after = i % len(speed), (i + 1) % len(speed)
-        can_brake_from = np.sqrt(speed[after] ** 2 + 2 * traits.braking * step)
-        speed[here] = min(speed[here], can_brake_from)
-    return speed

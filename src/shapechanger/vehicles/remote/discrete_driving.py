@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import operator
-from contextlib import suppress
 from typing import Any, Final
 
 import gymnasium as gym
@@ -62,10 +60,7 @@ class DiscreteDriving(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
         Raises:
             SpaceMismatch: If the action is not 0, 1, 2 or 3.
         """
-        key = -1
-        with suppress(TypeError):  # For 1.5, a list or text.
-            key = operator.index(action)
-        if not 0 <= key < len(FOUR_WAYS):
+        if not self.action_space.contains(action):
             keys = ", ".join(f"{number} ({way})" for number, way in enumerate(FOUR_WAYS))
             raise SpaceMismatch(f"The four keys are {keys}; got {action!r}.")
-        return self._actions[key].copy()
+        return self._actions[int(action)].copy()

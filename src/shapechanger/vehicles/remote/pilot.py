@@ -13,10 +13,9 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.statistics import is_same_rate
@@ -31,6 +30,8 @@ from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
+    from shapechanger.demos.cloning.onnx_policy import OnnxClone
+    from shapechanger.demos.cloning.policy import CameraPolicy
 
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _LOOK_EVERY_S: Final = 1.0
@@ -38,85 +39,60 @@ _END_S: Final = 10.0
 _WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
 
 
-class DrivingPolicy(Protocol):
-    """A policy cloned from demonstrations: `CameraPolicy` with PyTorch, `OnnxClone` without."""
-
-    @property
-    def card(self) -> CloneCard:
-        """Card of the policy."""
-        ...
-
-    def predict(
-        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
-    ) -> NDArray[np.float32]:
-        """Return the action, shape (m,), for a picture, shape (H, W, 3), and a state, (k,)."""
-        ...
-
-
-class Origin(NamedTuple):
-    """What a policy learned with, besides its layouts.
-
-    Attributes:
-        body: Kind of robot, such as "car"; "" for any.
-        control_hz: Actions per second; None if unknown.
-    """
-
-    body: str = ""
-    control_hz: float | None = None
-
-
-def points_ways(card: CloneCard) -> bool:
-    """Return whether a policy gives waypoints, which any vehicle can follow."""
-    return card.action_layout is not None and card.action_layout.names == ACTION_LAYOUT.names
-
-
-def require_fit(card: CloneCard, origin: Origin, robot: RobotCard, *, measures: bool) -> None:
+def require_fit(
+    card: CloneCard,
+    robot: RobotCard,
+    *,
+    measures: bool,
+    body: str = "",
+    control_hz: float | None = None,
+) -> None:
     """Refuse a policy that does not fit a robot; the message names what differs.
 
     Args:
         card: Card of the policy.
-        origin: What it learned with.
         robot: The robot.
         measures: Whether the vehicle's turning may be measured before it drives.
+        body: Kind of robot that the policy learned to steer, such as "car"; "" for any.
+        control_hz: Actions per second that it learned with; None if unknown.
 
     Raises:
         PolicyError: If body, rate, actions or state differ.
-        RobotRefused: If the robot has no camera, or does not say how it looks or turns.
+        RobotRefused: If the robot has no camera, or its card lacks how the camera looks or how the
+            vehicle turns.
     """
-    if origin.body and origin.body != robot.body:
+    if body and body != robot.body:
         raise PolicyError(
-            f"The policy learned to steer a {origin.body}, and {robot.robot} is a {robot.body}: "
-            "only policies of waypoints move from one body to another."
+            f"The policy learned to steer a {body}, and {robot.robot} is a {robot.body}: only "
+            "policies of waypoints move from one body to another."
         )
-    rate = origin.control_hz
     jitter = card.data.get("rate_jitter", 0.0)
     jitter = float(jitter) if isinstance(jitter, int | float) else 0.0
-    if rate is not None and not is_same_rate(rate, robot.control_hz, jitter):
+    if control_hz is not None and not is_same_rate(control_hz, robot.control_hz, jitter):
         within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
         raise PolicyError(
-            f"The policy learned at {rate:g} actions a second{within}, and {robot.robot} has "
+            f"The policy learned at {control_hz:g} actions a second{within}, and {robot.robot} has "
             f"control_hz = {robot.control_hz:g}."
         )
-    has_waypoints = points_ways(card)
-    if not has_waypoints:
-        actions, state = (
-            Layout.from_json(one) for one in (robot.action_layout, robot.state_layout)
-        )
-        card.require_layouts(actions, state)
     if card.eyes != "none" and robot.image_size is None:
         raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by pictures.")
-    if not has_waypoints:
-        return
-    if not robot.has_geometry:
+    if not _has_waypoints(card):
+        actions, state = map(Layout.from_json, (robot.action_layout, robot.state_layout))
+        card.require_layouts(actions, state)
+    elif not robot.has_geometry:
         raise RobotRefused(
             f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
             "which waypoints need: measure them with `shapechanger robot camera`."
         )
-    if robot.turning is None and not measures:
+    elif robot.turning is None and not measures:
         raise RobotRefused(
             f"The profile of {robot.robot} does not state turn_deg_per_m or turn_deg_per_s, which "
             "waypoints need on board: `shapechanger robot drive --policy` measures them."
         )
+
+
+def _has_waypoints(card: CloneCard) -> bool:
+    return card.action_layout is not None and card.action_layout.names == ACTION_LAYOUT.names
 
 
 class PolicyDriver:
@@ -138,7 +114,7 @@ class PolicyDriver:
 
     def __init__(
         self,
-        policy: DrivingPolicy,
+        policy: CameraPolicy | OnnxClone,
         name: str,
         robot: KnownRobot,
         on_note: Callable[[str], object] = lambda _: None,
@@ -207,7 +183,7 @@ class PolicyDriver:
             "reset_timeout_s": _LOOK_EVERY_S,
             "name": self._name,
         }
-        if points_ways(self._policy.card):
+        if _has_waypoints(self._policy.card):
             return RemoteWaypointEnv(response=welcome.turning, **options)
         return RemoteVehicleEnv(
             size=welcome.image_size or (160, 120), image=self._sees, state=self._feels, **options
@@ -263,8 +239,9 @@ def main() -> int:
         policy = OnnxClone(file)
         with RobotClient.connect(robot, frames=False) as there:
             card = there.welcome
-        origin = Origin(policy.body, policy.control_hz)
-        require_fit(policy.card, origin, card, measures=False)
+        require_fit(
+            policy.card, card, measures=False, body=policy.body, control_hz=policy.control_hz
+        )
         driver = PolicyDriver(
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from shapechanger.errors import RobotRefused
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.link.messages import Welcome
-from shapechanger.vehicles.cameras.rectify import rectifier_of
 from shapechanger.vehicles.waypoints import (
     SteeringResponse,
     WaypointView,
     measure_response,
-    places_of_motion,
 )
 
 
@@ -59,32 +57,25 @@ class RemoteWaypointEnv(WaypointView):
         self, robot: str, *, response: tuple[float, float] | None = None, **options: Any
     ) -> None:
         self.response = None if response is None else SteeringResponse(*response)
-        self._env = RemoteVehicleEnv(robot, size=None, image=True, state=True, **options)
+        self._env = env = RemoteVehicleEnv(robot, size=None, image=True, state=True, **options)
         try:
-            welcome = self._env.welcome
+            welcome = env.welcome
             if self.response is None and welcome.turning is not None:
                 self.response = SteeringResponse(*welcome.turning)
-            actions = self._env.action_layout.names
-            if actions != ("steering", "throttle"):
+            if env.action_layout.names != ("steering", "throttle"):
                 raise RobotRefused(
-                    f"{welcome.robot} has the actions {', '.join(actions)}, and waypoints become "
-                    "steering and throttle."
+                    f"{welcome.robot} has the actions {', '.join(env.action_layout.names)}, and "
+                    "waypoints become steering and throttle."
                 )
-            rectifier = rectifier_of(
-                welcome.robot,
-                welcome.camera_pitch_deg,
-                welcome.camera_fovy_deg,
-                welcome.image_size,
-                RobotRefused,
-            )
             sensors = ("speed", "yaw_rate")[: 1 + (self.response is None)]
-            self._motion_at = places_of_motion(self._env, sensors, welcome.robot, RobotRefused)
+            camera = welcome.camera_pitch_deg, welcome.camera_fovy_deg, welcome.image_size
+            on_the_spot = welcome.body == "tank"  # Only tracks turn a vehicle on the spot.
+            self._see(
+                env, welcome.robot, camera, sensors, RobotRefused, turns_on_the_spot=on_the_spot
+            )
         except BaseException:
-            self._env.close()
+            env.close()
             raise
-        # Only tracks turn a vehicle on the spot.
-        self._see(rectifier, self._motion_at[0], turns_on_the_spot=welcome.body == "tank")
-        self.render_mode, self.metadata = self._env.render_mode, self._env.metadata
 
     @property
     def welcome(self) -> Welcome:
