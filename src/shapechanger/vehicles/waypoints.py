@@ -81,20 +81,6 @@ class SteeringResponse:
                 f"{self.per_metre:.2f} rad/m and {self.per_second:.2f} rad/s."
             )
 
-    def steering(self, bearing: float, speed: float) -> float:
-        """Return the steering, from -1 to 1, that leads to a waypoint `AHEAD_M` ahead.
-
-        Pure pursuit: the circle through a point at the distance L and the bearing b has the
-        curvature 2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
-
-        Args:
-            bearing: Bearing of the waypoint, rad, positive to the right.
-            speed: Speed along the heading, m/s.
-        """
-        speed = max(speed, _SLOWEST_MPS)
-        rate = 2.0 * math.sin(bearing) / AHEAD_M * speed
-        return max(-1.0, min(1.0, rate / (self.per_metre * speed + self.per_second)))
-
 
 def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) -> SteeringResponse:
     """Measure how a vehicle turns, from 5 s of its own motion at random commands.
@@ -209,7 +195,10 @@ ACTION_LAYOUT: Final = Layout(
 def command(
     action: NDArray[np.float32], response: SteeringResponse, speed: float, *, on_the_spot: bool
 ) -> NDArray[np.float32]:
-    """Return the steering and throttle that lead a vehicle to a waypoint.
+    """Return the steering and throttle that lead a vehicle to a waypoint `AHEAD_M` ahead.
+
+    Pure pursuit: the circle through a point at the distance L and the bearing b has the curvature
+    2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
     Args:
         action: Bearing and speed, each from -1 to 1; values beyond are clipped.
@@ -226,7 +215,10 @@ def command(
             f"A waypoint is a bearing and a speed, each from -1 to 1, got {values.tolist()}."
         )
     bearing, share = np.clip(values, -1.0, 1.0).tolist()
-    steering = response.steering(bearing * WIDEST_RAD, speed)
+    fast = max(speed, _SLOWEST_MPS)
+    rate = 2.0 * math.sin(bearing * WIDEST_RAD) / AHEAD_M * fast
+    steering = rate / (response.per_metre * fast + response.per_second)
+    steering = max(-1.0, min(1.0, steering))
     throttle = max(LEAST_THROTTLE, 0.5 * (share + 1.0))
     if on_the_spot:
         throttle = min(throttle, max(LEAST_THROTTLE, 1.0 - abs(steering)))

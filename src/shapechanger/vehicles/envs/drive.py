@@ -167,12 +167,13 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     Attributes:
         parts: The parts that the robot's outputs move, such as "wheels" and "steering".
+        world: The simulated world, with its ground truth.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
     parts: frozenset[str]
     action_layout: Layout
-    _world: MujocoWorld
+    world: MujocoWorld
 
     def __new__(cls, *arguments: Any, **options: Any) -> Self:
         """Keep the arguments, with which a copy is pickled."""
@@ -200,7 +201,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             raise UnknownName("render mode", render_mode, self.metadata["render_modes"])
         self.render_mode, self._puts_back = render_mode, put_back
         self._seeds, self._randomise = _course_seeds(courses), randomise
-        self._world = MujocoWorld(
+        self.world = MujocoWorld(
             vehicle,
             world,
             self._seeds[0],
@@ -217,11 +218,6 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.action_space = space_of(self.action_layout)
         self.metadata = {**self.metadata, "render_fps": robot.control_hz}
         self._needs_reset = True
-
-    @property
-    def world(self) -> MujocoWorld:
-        """The simulated world, with its ground truth."""
-        return self._world
 
     def hold_out(self) -> None:
         """Sample held-out courses from the next reset on."""
@@ -247,7 +243,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         for name in options:
             if name not in _OPTIONS:
                 raise UnknownName("option of reset", name, _OPTIONS)
-        world, rng = self._world, self.np_random
+        world, rng = self.world, self.np_random
         # Given values are drawn, too, so that the others do not depend on the options.
         course = self._seeds[int(rng.integers(len(self._seeds)))]
         start = int(rng.integers(2**31))
@@ -311,7 +307,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         from shapechanger.vehicles.envs.demonstrators import ExpertDriver, require_rate
 
         require_rate(self.metadata["render_fps"])
-        return ExpertDriver(self._world)
+        return ExpertDriver(self.world)
 
     def demonstrator(self, seed: int) -> Demonstrator:
         """Return an expert that knows the whole course and recovers from its own mistakes.
@@ -325,7 +321,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
         self.expert()  # Checks the control rate.
-        return Demonstrator(self._world, lambda: partial(self.expert(), None), seed)
+        return Demonstrator(self.world, lambda: partial(self.expert(), None), seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's frame, shape (height, width, 3); None without a render mode.
@@ -337,26 +333,26 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             return None
         if self._needs_reset:
             raise RenderError("Call reset() before render().")
-        return self._world.picture()
+        return self.world.picture()
 
     @property
     def reach(self) -> float:
         """Distance from the middle of the vehicle to its farthest point, m."""
-        return self._world.reach
+        return self.world.reach
 
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
         """Return a picture of the vehicle in its world from outside; see `MujocoWorld.outside`."""
-        return self._world.outside(width, height, reach)
+        return self.world.outside(width, height, reach)
 
     def close(self) -> None:
         """Release the renderer, if there is one."""
-        self._world.close()
+        self.world.close()
 
     def _truth(self, progress_m: float) -> dict[str, Any]:
         """Return the entries of `info` that no sensor measures, given the progress, m."""
-        world, pose = self._world, self._world.pose
+        world, pose = self.world, self.world.pose
         return {
             "progress": progress_m,
             "collisions": world.collisions,

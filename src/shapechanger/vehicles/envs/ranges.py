@@ -210,7 +210,7 @@ class RangesEnv(DriveEnv):
     def _advance(
         self, values: NDArray[np.float64]
     ) -> tuple[bool, dict[str, float], NDArray[np.float32], dict[str, Any]]:
-        world, shaper = self._world, self._shaper
+        world, shaper = self.world, self._shaper
         progress, collisions = self._progress_m, world.collisions
         command = tuple(leave_rest(values, world.inputs().stands).tolist())
         world.advance(self._period_s, shaper.outputs(command, self._bumped, self._ticks))
@@ -230,6 +230,6 @@ class RangesEnv(DriveEnv):
         return collided, terms, seen, info
 
     def _observe(self) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        seen = observe_ranges(self._world)
+        seen = observe_ranges(self.world)
         seen = np.minimum(np.maximum(seen, self._low, out=seen), self._high, out=seen)
         return seen, self._truth(self._progress_m)

@@ -143,7 +143,7 @@ class VehicleEnv(DriveEnv):
             self.observation_space = gym.spaces.Dict(spaces)
 
     def _begin(self) -> None:
-        self._vehicle = SensedVehicle(self.welcome.plan, self._world)
+        self._vehicle = SensedVehicle(self.welcome.plan, self.world)
         # A robot sends its first observation after one period, too.
         self._vehicle.advance(self._period_ns, None)
         self._touched = bool(self._vehicle.quantities.get("collision"))
@@ -151,7 +151,7 @@ class VehicleEnv(DriveEnv):
     def _advance(
         self, values: NDArray[np.float64]
     ) -> tuple[bool | None, dict[str, float], Any, dict[str, Any]]:
-        vehicle, world = self._vehicle, self._world
+        vehicle, world = self._vehicle, self.world
         collisions, bumps = world.collisions, vehicle.bumps
         vehicle.advance(self._period_ns, values.tolist())
         speed, touches, stall = map(vehicle.quantities.get, ("speed", "collision", "stall"))
@@ -169,7 +169,7 @@ class VehicleEnv(DriveEnv):
     @property
     def teacher_env(self) -> str:
         """Id of the env in which a teacher for this vehicle learns; see `RangesEnv`."""
-        return f"shapechanger/{self._world.vehicle.name.capitalize()}Ranges-v1"
+        return f"shapechanger/{self.world.vehicle.name.capitalize()}Ranges-v1"
 
     def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> Demonstrator:
         """Return a teacher as the demonstrator of this env.
@@ -186,13 +186,13 @@ class VehicleEnv(DriveEnv):
         require_rate(self.metadata["render_fps"])
 
         def teach() -> NDArray[np.float32]:
-            action = act(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
-            return leave_rest(action, self._world.inputs().stands)
+            action = act(observe_ranges(self.world)[np.newaxis])[0].astype(np.float32)
+            return leave_rest(action, self.world.inputs().stands)
 
-        return Demonstrator(self._world, lambda: teach, seed)
+        return Demonstrator(self.world, lambda: teach, seed)
 
     def _observe(self) -> tuple[Any, dict[str, Any]]:
-        vehicle, world = self._vehicle, self._world
+        vehicle, world = self._vehicle, self.world
         numbers = vehicle.quantities | dict(zip(self._applied, vehicle.applied, strict=True))
         features = self._state.features
         state = np.array([numbers.get(one.name, one.middle) for one in features], np.float32)
@@ -298,7 +298,7 @@ class WaypointEnv(WaypointView, DriveEnv):
             if sensed
             else RangesEnv(vehicle, camera=True, **common)
         )
-        self.parts, self._world = env.parts, env.world
+        self.parts, self.world = env.parts, env.world
         self._see(
             env, profile.path, (profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size),
             ("speed", "yaw_rate"), ProfileError, turns_on_the_spot=body.turning_radius_m == 0.0,
