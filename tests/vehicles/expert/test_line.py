@@ -59,13 +59,3 @@ def test_progress_counts_laps_and_counts_down() -> None:
     for station in np.arange(5.0 + 3 * line.length, 4.0, -0.1):
         metres = progress.update(*line.at(float(station)))
     assert metres == pytest.approx(-1.0, abs=0.2)
-
-
-def test_standing_still_makes_no_progress() -> None:
-    course = ring(1)
-    progress = CourseProgress(course)
-    x, y = course.route[7]
-    progress.reset(x, y)
-    for _ in range(50):
-        progress.update(x, y)
-    assert progress.update(x, y) == 0.0
