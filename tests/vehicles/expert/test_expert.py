@@ -15,7 +15,7 @@ from shapechanger.errors import UnknownName
 from shapechanger.vehicles.bodies import VEHICLES
 from shapechanger.vehicles.courses.course import HOME
 from shapechanger.vehicles.envs import RangesEnv
-from shapechanger.vehicles.envs.demonstrators import Disturbance
+from shapechanger.vehicles.envs.demonstrators import Demonstrator
 from shapechanger.vehicles.expert.driver import TRAITS, CourseExpert
 from tests.vehicles.expert.courses import ring
 
@@ -118,8 +118,8 @@ def test_disturbances_are_reproducible_and_bounded() -> None:
     action = np.array((0.2, 0.8), np.float32)
 
     def run(seed: int) -> np.ndarray:
-        disturbance = Disturbance(seed, 0.25)
-        return np.array([disturbance.applied(action) for _ in range(2000)])
+        demonstrator = Demonstrator(lambda: lambda: action, seed, 0.25)
+        return np.array([demonstrator.act()[1] for _ in range(2000)])
 
     first = run(3)
     np.testing.assert_array_equal(first, run(3))

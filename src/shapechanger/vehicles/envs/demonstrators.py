@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import ProfileError, WorldError, check_seed
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.expert.driver import PERIOD_S, CourseExpert, traits_of
+from shapechanger.vehicles.expert.driver import PERIOD_S, CourseExpert
 from shapechanger.vehicles.waypoints import AHEAD_M, WIDEST_RAD
 from shapechanger.vehicles.world import MujocoWorld
 
@@ -34,34 +34,50 @@ _JERK_S: Final = (0.15, 0.5)  # Shortest and longest duration of a jerk.
 _THROTTLE_SD: Final = 0.1  # Standard deviation of the wandering of the throttle.
 
 
-class Disturbance:
-    """Noise on a demonstrator's actions, so that demonstrations show how to correct errors.
+class Demonstrator:
+    """Driver that makes mistakes and recovers from them, so that demonstrations show corrections.
 
-    The vehicle executes the result of `applied`, and the demonstrator's own action is recorded (M.
-    Laskey et al., "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two
-    kinds: slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
+    The vehicle executes the disturbed action, and the driver's own is recorded (M. Laskey et al.,
+    "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two kinds of noise:
+    slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
     Physical Review 36, 1930) and rare jerks of the steering.
 
     Args:
-        seed: Seed of the noise.
+        begin: Called at the beginning of an episode; returns the driver, whose calls return
+            actions, (2,).
+        seed: Seed of the mistakes.
         sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
             as much.
+
+    Raises:
+        WorldError: If the seed is not a whole number from 0.
     """
 
-    def __init__(self, seed: int, sway: float) -> None:
+    def __init__(
+        self, begin: Callable[[], Callable[[], NDArray[np.float32]]], seed: int, sway: float
+    ) -> None:
+        self._begin = begin
         self._size = np.array((sway, _THROTTLE_SD))
-        self._rng = np.random.default_rng(seed)
+        kind = "The seed of a driver must be"
+        self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        self._rng = np.random.default_rng(int(self._seeds.integers(2**31)))
         self._wander = np.zeros(2)
         self._jerk, self._jerk_s = 0.0, 0.0
+        self._action = self._begin()
 
-    def applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Add noise to an action, (2,), and clip it to -1 to 1."""
+    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the driver's action, to learn from, and the disturbed one, to take, each (2,)."""
+        action = self._action()
         # The exact discretization, for any period.
         keep = math.exp(-PERIOD_S / _WANDER_S)
         fresh = self._size * math.sqrt(1 - keep**2)
         self._wander = keep * self._wander + fresh * self._rng.standard_normal(2)
         noise = self._wander + np.array((self._jerked(), 0.0))
-        return np.clip(action + noise, -1.0, 1.0).astype(np.float32)
+        return action, np.clip(action + noise, -1.0, 1.0).astype(np.float32)
 
     def _jerked(self) -> float:
         """Steering of the current jerk; 0 without one."""
@@ -72,44 +88,6 @@ class Disturbance:
             self._jerk = float(3 * self._size[0] * self._rng.uniform(-1, 1))
             self._jerk_s = float(self._rng.uniform(*_JERK_S))
         return self._jerk
-
-
-class Demonstrator:
-    """Driver that makes mistakes and recovers from them, for demonstrations.
-
-    Args:
-        world: The world of the vehicle.
-        begin: Called at the beginning of an episode; returns the driver, whose calls return
-            actions, (2,).
-        seed: Seed of the mistakes.
-        sway: Size of the mistakes, see `Disturbance`; None for what the expert can correct.
-
-    Raises:
-        WorldError: If the seed is not a whole number from 0.
-    """
-
-    def __init__(
-        self,
-        world: MujocoWorld,
-        begin: Callable[[], Callable[[], NDArray[np.float32]]],
-        seed: int,
-        sway: float | None = None,
-    ) -> None:
-        self._begin = begin
-        self._sway = traits_of(world.vehicle.name).sway if sway is None else sway
-        kind = "The seed of a driver must be"
-        self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
-        self.begin()
-
-    def begin(self) -> None:
-        """Begin an episode."""
-        self._disturbance = Disturbance(int(self._seeds.integers(2**31)), self._sway)
-        self._action = self._begin()
-
-    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the driver's action, to learn from, and the disturbed one, to take, each (2,)."""
-        action = self._action()
-        return action, self._disturbance.applied(action)
 
 
 def require_rate(control_hz: float) -> None:
@@ -156,7 +134,7 @@ def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
         expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
         return partial(_point, world, expert)
 
-    return Demonstrator(world, begin, seed, _BEARING_SWAY)
+    return Demonstrator(begin, seed, _BEARING_SWAY)
 
 
 def _point(world: MujocoWorld, expert: CourseExpert) -> NDArray[np.float32]:

@@ -319,9 +319,11 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             ProfileError: If the robot has another control rate than the expert.
         """
         from shapechanger.vehicles.envs.demonstrators import Demonstrator
+        from shapechanger.vehicles.expert.driver import traits_of
 
         self.expert()  # Checks the control rate.
-        return Demonstrator(self.world, lambda: partial(self.expert(), None), seed)
+        sway = traits_of(self.world.vehicle.name).sway
+        return Demonstrator(lambda: partial(self.expert(), None), seed, sway)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's frame, shape (height, width, 3); None without a render mode.

@@ -182,6 +182,7 @@ class VehicleEnv(DriveEnv):
             ProfileError: If the robot has another control rate than the teacher.
         """
         from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate
+        from shapechanger.vehicles.expert.driver import traits_of
 
         require_rate(self.metadata["render_fps"])
 
@@ -189,7 +190,7 @@ class VehicleEnv(DriveEnv):
             action = act(observe_ranges(self.world)[np.newaxis])[0].astype(np.float32)
             return leave_rest(action, self.world.inputs().stands)
 
-        return Demonstrator(self.world, lambda: teach, seed)
+        return Demonstrator(lambda: teach, seed, traits_of(self.world.vehicle.name).sway)
 
     def _observe(self) -> tuple[Any, dict[str, Any]]:
         vehicle, world = self._vehicle, self.world

@@ -170,51 +170,6 @@ _ASIDE: Final = 0.7
 _BLOCKED_M: Final = 0.15
 
 
-class Pursuit:
-    """Steering towards a point ahead."""
-
-    def __init__(self, traits: Traits) -> None:
-        self._traits = traits
-        self._before: Pose | None = None
-        self._drift = 0.0
-
-    def moved(self, pose: Pose) -> None:
-        """Update the drift estimate; call it once per period."""
-        before, self._before = self._before, pose
-        if before is None:
-            return
-        dx, dy = pose.x - before.x, pose.y - before.y
-        going = math.hypot(dx, dy) / PERIOD_S > 0.2 * self._traits.top_speed
-        now = _wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
-        if abs(now) > math.pi / 3:  # Astern, or moved by hand.
-            now = 0.0
-        self._drift += (now - self._drift) * PERIOD_S / _DRIFT_S
-
-    def steering(self, angle: float, distance: float, speed: float, yaw_rate: float) -> float:
-        """Steering towards a point, at an angle from the heading, rad, from -1, left, to 1."""
-        match self._traits.drive:
-            case "wheels":
-                return _clipped(-self._curvature(angle, distance) / self._traits.turn)
-            case "tracks":
-                rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
-                if abs(angle) > _ABOUT:
-                    rate = _ABOUT_RATE * angle
-                # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
-                value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
-                value += self._traits.dead * _clipped(rate / _STICKING)
-                return _clipped(-value)
-            case "rudder":
-                angle = _wrap_angle(angle - self._drift)
-                rate = 1.6 * angle
-                water = max(speed, 0.3 * self._traits.top_speed)
-                return _clipped(-(2.0 * rate - 1.0 * yaw_rate) / (self._traits.turn * water))
-
-    def _curvature(self, angle: float, distance: float) -> float:
-        """Curvature of the circle to the target, 1/m; targets behind count as abeam."""
-        side = math.sin(angle) if abs(angle) < math.pi / 2 else math.copysign(1.0, angle)
-        return 2 * side / distance
-
-
 class Recovery:
     """Detects that a vehicle is stuck, and takes over until it is free."""
 
@@ -319,7 +274,9 @@ class CourseExpert:
     def reset(self, pose: Pose) -> None:
         """Start at a pose."""
         self._station = self.path.nearest(pose.x, pose.y).station
-        self._pursuit, self._recovery = Pursuit(self._traits), Recovery(self._traits, self._rng)
+        self._before: Pose | None = None
+        self._drift = 0.0
+        self._recovery = Recovery(self._traits, self._rng)
 
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
         """Choose an action; call it once per period.
@@ -334,7 +291,7 @@ class CourseExpert:
         """
         if self._station is None:
             self.reset(pose)
-        self._pursuit.moved(pose)
+        self._follow_drift(pose)
         soon = self._soon(pose, speed, yaw_rate)
         spot = self.path.nearest(soon.x, soon.y, self._station)
         self._station = spot.station
@@ -344,11 +301,47 @@ class CourseExpert:
         action = self._recovery.action(angle)
         if action is None:
             distance = max(math.hypot(x - soon.x, y - soon.y), 0.1)
-            steering = self._pursuit.steering(angle, distance, speed, yaw_rate)
+            steering = self._steering(angle, distance, speed, yaw_rate)
             action = self._driven(steering, spot, angle, speed)
         blocked = abs(angle) > _ASIDE and self._ahead(pose) < _BLOCKED_M
         self._recovery.watch(action, speed, yaw_rate, blocked=blocked)
         return np.array(action, np.float32)
+
+    def _follow_drift(self, pose: Pose) -> None:
+        """Update the drift estimate; call it once per period."""
+        before, self._before = self._before, pose
+        if before is None:
+            return
+        dx, dy = pose.x - before.x, pose.y - before.y
+        going = math.hypot(dx, dy) / PERIOD_S > 0.2 * self._traits.top_speed
+        now = _wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
+        if abs(now) > math.pi / 3:  # Astern, or moved by hand.
+            now = 0.0
+        self._drift += (now - self._drift) * PERIOD_S / _DRIFT_S
+
+    def _steering(self, angle: float, distance: float, speed: float, yaw_rate: float) -> float:
+        """Steering towards a point, at an angle from the heading, rad, from -1, left, to 1."""
+        match self._traits.drive:
+            case "wheels":
+                return _clipped(-self._curvature(angle, distance) / self._traits.turn)
+            case "tracks":
+                rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
+                if abs(angle) > _ABOUT:
+                    rate = _ABOUT_RATE * angle
+                # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
+                value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
+                value += self._traits.dead * _clipped(rate / _STICKING)
+                return _clipped(-value)
+            case "rudder":
+                angle = _wrap_angle(angle - self._drift)
+                rate = 1.6 * angle
+                water = max(speed, 0.3 * self._traits.top_speed)
+                return _clipped(-(2.0 * rate - 1.0 * yaw_rate) / (self._traits.turn * water))
+
+    def _curvature(self, angle: float, distance: float) -> float:
+        """Curvature of the circle to the target, 1/m; targets behind count as abeam."""
+        side = math.sin(angle) if abs(angle) < math.pi / 2 else math.copysign(1.0, angle)
+        return 2 * side / distance
 
     def _ahead(self, pose: Pose) -> float:
         """Clearance at `_BLOCKED_M` ahead of the nose, m."""

@@ -289,7 +289,7 @@ def plan_path(
         A path with a clearance of at least `half_width_m + margin_m` at every point.
 
     Raises:
-        WorldError: If there is none.
+        WorldError: If there is no such path.
     """
     lattice = _Lattice(course, half_width_m + margin_m, half_width_m + comfort_m)
     # Between two lattice points the line may come closer to obstacles, so ask for a spare first.
