@@ -258,9 +258,8 @@ def measure_camera(
     fits: list[tuple[Any, ...]] = []
     for first in _FIRST_FOVY_DEG if fovy_deg is None else (fovy_deg,):
         focal = 0.5 * height / math.tan(0.5 * math.radians(first))
-        lens = np.array(
-            ((focal, 0.0, 0.5 * (width - 1)), (0.0, focal, 0.5 * (height - 1)), (0.0, 0.0, 1.0))
-        )
+        lens = np.diag((focal, focal, 1.0))
+        lens[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
         fits.append(
             cv2.calibrateCameraExtended(
                 [board], [points], (width, height), lens, np.zeros(5), flags=flags
