@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from shapechanger.demos.exchange import ImportContext
-from shapechanger.demos.exchange.lerobot import read_lerobot
+from shapechanger.demos.exchange.lerobot import FORMAT
 from shapechanger.demos.jpeg import decode_picture
 
 SIZE = 32
@@ -142,7 +142,7 @@ def pairs_of(folder: Path, camera: str = "") -> tuple[list[list[tuple[int, int]]
     """
     context = ImportContext(camera=camera)
     found: list[list[tuple[int, int]]] = []
-    for episode in read_lerobot(folder, context):
+    for episode in FORMAT.read(folder, context):
         picture = -1
         steps: list[tuple[int, int]] = []
         for row in episode.rows:

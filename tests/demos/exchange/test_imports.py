@@ -59,7 +59,6 @@ def test_a_table_of_others(tmp_path: Path) -> None:
 
 
 def test_a_table_of_others_is_split_where_time_jumps(tmp_path: Path) -> None:
-    """A pause and a clock that was set back each begin an episode, and are reported by size."""
     (tmp_path / "table").mkdir()
     times = [100.0, 100.1, 100.2, 103.5, 103.6, 90.0, 90.1]
     lines = "".join(f"{n / 10},{at}\n\n" for n, at in enumerate(times))  # And blank lines.
@@ -75,7 +74,6 @@ def test_a_table_of_others_is_split_where_time_jumps(tmp_path: Path) -> None:
 
 
 def test_a_table_of_others_with_states(tmp_path: Path) -> None:
-    """A prefix says which columns are the state; others are named."""
     (tmp_path / "table").mkdir()
     (tmp_path / "table/steps.csv").write_text(
         "Angle;throttle;state/speed;lap;done\n0,5;1;2,25;7;0\n-1;0;nan;8;1\n0;oops;1;8;0\n"
@@ -224,7 +222,6 @@ def _foreign(
 
 
 def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A Dict of Boxes and a Discrete action become a state and a scalar action."""
     path = _foreign(
         tmp_path,
         monkeypatch,
@@ -248,7 +245,6 @@ def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.Mon
 def test_images_of_other_minari_datasets(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jpeg: bool
 ) -> None:
-    """Stored JPEGs are kept; raw pixels are encoded with little loss."""
     pixels = np.zeros((3, 40, 48, 3), np.uint8)
     pixels[:, :, :, 0] = np.arange(48) * 5
     pixels[:, :, :, 2] = 120
@@ -274,7 +270,6 @@ def test_images_of_other_minari_datasets(
 
 
 def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
-    """Each step comes with its picture, and no file is created."""
     keys_folder(tmp_path / "keys")
     before = snapshot(tmp_path)
     ((head, steps),) = list(import_episodes(tmp_path / "keys"))
@@ -284,7 +279,6 @@ def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
 
 
 def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> None:
-    """Readers without a report are strict, and so is learning from a tub directly."""
     records = [r | {"_timestamp_ms": 1000 + 50 * n} for n, r in enumerate(_RECORDS[:3] * 4)]
     folder = tub_folder(tmp_path / "tub", records)
     (folder / "images/4_cam_image_array_.jpg").write_bytes(b"")

@@ -102,7 +102,6 @@ def test_a_round_trip(tmp_path: Path, images: bool) -> None:
 
 
 def test_long_episodes_and_many_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps are not lost between chunks, and each episode is found in its own file."""
     monkeypatch.setattr(lerobot_export, "_VIDEO_FILE_S", 1.0)
     monkeypatch.setattr(lerobot_export, "_DATA_FILE_MB", 0)
     monkeypatch.setattr(lerobot_export, "_FILES_PER_CHUNK", 2)
@@ -154,7 +153,6 @@ def test_the_metadata(tmp_path: Path) -> None:
 
 
 def test_missing_values_and_odd_rates(tmp_path: Path) -> None:
-    """An unmeasured state is the middle of its range; rewards are written if all steps have one."""
     layout = Layout((Feature("far", "m", 0.0, 4.0), Feature("map", "1", shape=(3,))))
     steps = [
         (Step(action=(0.0, 0.0), driver="person", state=(np.nan, 1.0, np.inf, 3.0)), None),

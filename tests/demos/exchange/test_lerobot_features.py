@@ -13,7 +13,7 @@ from PIL import Image
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
-from shapechanger.demos.exchange.lerobot import read_lerobot
+from shapechanger.demos.exchange.lerobot import FORMAT
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.lerobot_set import CAMERA, SIZE, VIDEO, pairs_of, write_set, write_video
@@ -53,7 +53,6 @@ def stored(images: list[Any], feature: dict[str, Any] | None = None) -> dict[str
     ],
 )
 def test_images_of_8_bits_keep_their_brightness(tmp_path: Path, draw: Any) -> None:
-    """Colour, grey, opaque and with a palette."""
     folder = write_set(tmp_path / "set", **stored([draw(n) for n in range(COUNT)]))
     pairs, context = pairs_of(folder)
     assert pairs == [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
@@ -71,10 +70,10 @@ FADED = np.dstack([plain(5), np.full((SIZE, SIZE), 128, np.uint8)])
         (png(DEPTH.astype(np.float32), "TIFF"), "not JPEG, PNG or BMP"),
         (png(plain(5), "WEBP"), "not JPEG, PNG or BMP"),
         (png(FADED), "partly transparent"),
-        (png(np.zeros((8, 16, 3), np.uint8)), "has 16 x 8 pixels, and not 32 x 32"),
+        (png(np.zeros((8, 16, 3), np.uint8)), "of 16 x 8 pixels, and not 32 x 32"),
         pytest.param(png(plain(5))[:60], "a damaged picture", id="cut PNG"),
-        (picture(0, SIZE, SIZE)[:200], "cannot be taken"),
-        (picture(0, 16, 8), "cannot be taken.*16 x 8"),
+        (picture(0, SIZE, SIZE)[:200], "a damaged picture"),
+        (picture(0, 16, 8), "of 16 x 8 pixels, and not 32 x 32"),
         (b"", "not in the table"),
         (None, "not in the table"),
     ],
@@ -93,7 +92,6 @@ def test_other_images_are_named(tmp_path: Path, image: bytes | None, reason: str
 
 
 def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
-    """Also if the first of the steps is left out."""
     images = [png(plain(n // 4)) for n in range(COUNT)]
 
     def spoil(rows: list[dict[str, Any]]) -> None:
@@ -101,7 +99,7 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
 
     folder = write_set(tmp_path / "set", rows=spoil, **stored(images))
     context = ImportContext()
-    rows = [list(episode.rows) for episode in read_lerobot(folder, context)]
+    rows = [list(episode.rows) for episode in FORMAT.read(folder, context)]
     assert [[row.jpeg is not None for row in episode] for episode in rows] == [
         [True, False, False, False, True, False, False],
         [True, False, False, False] * 2,
@@ -123,7 +121,6 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
 def test_axes_are_found_by_their_names(
     tmp_path: Path, shape: list[int], named: list[str] | None
 ) -> None:
-    """Or else by the number of colours; the pictures must agree."""
     images = [png(plain(n)[:, :16]) for n in range(COUNT)]
     options = stored(images, {"shape": shape, "names": named})
     import_recording(write_set(tmp_path / "set", **options), tmp_path / "back")
@@ -159,7 +156,6 @@ def test_other_features_are_named(tmp_path: Path) -> None:
 
 
 def test_columns_without_a_feature_are_named(tmp_path: Path) -> None:
-    """Nothing says what they are."""
     images = pa.array([{"bytes": png(DEPTH.astype(np.uint16)), "path": "x.png"}] * COUNT)
     folder = write_set(tmp_path / "set", columns={"observation.images.depth": images})
     pairs, context = pairs_of(folder)
@@ -171,7 +167,6 @@ def test_columns_without_a_feature_are_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("flag", ["video.is_depth_map", "is_depth_map"])
 def test_a_camera_of_depth_is_not_chosen(tmp_path: Path, flag: str) -> None:
-    """It is named, and the other camera is the only one."""
     depth = {"dtype": "video", "shape": [SIZE, SIZE, 1], "names": AXES, "info": {flag: True}}
     folder = write_set(tmp_path / "set", features={"observation.images.depth": depth})
     _, context = pairs_of(folder)
@@ -181,7 +176,6 @@ def test_a_camera_of_depth_is_not_chosen(tmp_path: Path, flag: str) -> None:
 
 
 def test_a_video_of_depth_is_refused(tmp_path: Path) -> None:
-    """Grey values of more than 8 bits would become dark pictures."""
     folder = write_set(tmp_path / "set")
     write_video(folder / VIDEO, range(COUNT), 20, "-c:v", "ffv1", "-pix_fmt", "gray16le")
     with pytest.raises(DemosError, match=r"more than 8 bits \(gray16le\)"):
@@ -202,7 +196,6 @@ def test_a_video_of_depth_is_refused(tmp_path: Path) -> None:
 def test_names_and_units_of_values(
     tmp_path: Path, named: Any, expected: tuple[str, ...], noted: bool
 ) -> None:
-    """Names come from the feature if they fit, and the report says if they do not."""
     action = {"dtype": "float32", "shape": [2], "names": named, "units": ["rad", "deg"]}
     folder = write_set(tmp_path / "set", video=False, features={"action": action})
     done = import_recording(folder, tmp_path / "back")
@@ -212,7 +205,6 @@ def test_names_and_units_of_values(
 
 
 def test_the_start_of_our_own_episodes_comes_back(tmp_path: Path) -> None:
-    """A dataset of others has no start."""
     record(
         tmp_path / "data",
         header(image_size=None),

@@ -68,7 +68,6 @@ def without(*steps: int) -> list[list[tuple[int, int]]]:
 def test_pictures_are_found_by_their_time(
     tmp_path: Path, options: dict[str, Any], expected: list[list[tuple[int, int]]]
 ) -> None:
-    """No step has the picture of another one, and steps without a picture are reported."""
     pairs, context = pairs_of(write_set(tmp_path / "set", **options))
     assert pairs == expected
     lost = sum(options.get("lengths", (8, 8))) - sum(map(len, expected))
@@ -85,7 +84,6 @@ def test_pictures_are_found_by_their_time(
 def test_no_lost_picture_shifts_the_others(
     tmp_path_factory: pytest.TempPathFactory, lost: set[int], rate: int, key: int
 ) -> None:
-    """Whichever pictures are lost: a step has its own picture or is left out."""
     numbers = [n // rate for n in range(16 * rate)]
     gone = "+".join(f"eq(n\\,{n * rate})" for n in lost) or "0"
     folder = write_set(
@@ -189,7 +187,6 @@ def test_contradictions_are_left_out(
 def test_contradictions_that_change_no_step_are_reported(
     tmp_path: Path, options: dict[str, Any], warning: str
 ) -> None:
-    """All is imported, and the report states the difference; `strict` refuses."""
     folder = write_set(tmp_path / "set", **options)
     pairs, context = pairs_of(folder)
     assert pairs == BOTH
@@ -219,7 +216,6 @@ def test_rows_in_any_order_and_in_several_files(tmp_path: Path) -> None:
 
 
 def test_a_missing_row_is_a_missing_step(tmp_path: Path) -> None:
-    """The other steps keep their times, and a gap stays a gap."""
     folder = write_set(tmp_path / "set", rows=lambda rows: [*rows[:3], *rows[4:]])
     pairs, context = pairs_of(folder)
     assert pairs == without(3)
@@ -255,7 +251,6 @@ def test_irregular_times_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_video_that_is_cut_off(tmp_path: Path) -> None:
-    """Episodes before the cut are imported."""
     folder = write_set(
         tmp_path / "set", lengths=(8, 8), options=["-g", "1", "-movflags", "+faststart"]
     )
@@ -267,7 +262,6 @@ def test_a_video_that_is_cut_off(tmp_path: Path) -> None:
 
 
 def test_one_damaged_file_of_several(tmp_path: Path) -> None:
-    """Only its episodes are left out."""
     folder = write_set(tmp_path / "set")
     entries = pq.read_table(folder / EPISODES).to_pylist()
     second = VIDEO.replace("file-000", "file-001")

@@ -116,7 +116,6 @@ def test_every_value_is_there(exported: Path) -> None:
 def test_unknown_times_fit_the_known_ones(
     tmp_path: Path, clock_ns: list[int | None], expected_ns: list[int]
 ) -> None:
-    """Known times are not changed; in milliseconds, at 10 Hz."""
     with EpisodeWriter.create(
         tmp_path / "data", header(state_layout="", image_size=None, control_hz=10.0)
     ) as writer:
@@ -159,7 +158,6 @@ def test_damage_is_noticed(exported: Path) -> None:
 
 
 def test_a_file_for_each_episode_and_no_import(tmp_path: Path) -> None:
-    """Episodes have files of their own; MCAP cannot be imported."""
     for count in (3, 2):
         drive(tmp_path / "data", count)
     assert export_recording(tmp_path / "data", tmp_path / "out", "mcap").steps == 5

@@ -14,7 +14,7 @@ import pytest
 from minari.serialization import serialize_space
 
 from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
-from shapechanger.demos.exchange.minari import read_minari
+from shapechanger.demos.exchange.minari import FORMAT
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from tests.demos.exchange.small import all_of, drive
@@ -71,7 +71,7 @@ def _observe(group: h5py.Group, name: str, space: gym.Space[Any]) -> None:
 def actions_of(folder: Path) -> tuple[list[list[int]], ImportContext]:
     """Return the actions of each episode, and the findings."""
     context = ImportContext()
-    episodes = [list(episode.rows) for episode in read_minari(folder, context)]
+    episodes = [list(episode.rows) for episode in FORMAT.read(folder, context)]
     return [[int(row.step.action[0]) for row in rows] for rows in episodes], context
 
 
@@ -111,13 +111,16 @@ def endless(file: h5py.File) -> None:
             "episode_1 has 4 steps, and its total_steps says 9",
         ),
         (lambda file: file.__delitem__("episode_1"), BOTH[:1], "episode that cannot be read"),
-        (endless, [[0, 1, 2, 3], [4, 5, 7]], r"1 step that .*not finite\): 2 of episode_1"),
+        (
+            endless,
+            [[0, 1, 2, 3], [4, 5, 7]],
+            r"1 step with an action that is not finite: 2 of episode_1",
+        ),
     ],
 )
 def test_episodes_that_are_whole_are_imported(
     tmp_path: Path, change: Callable[[h5py.File], object], expected: list[list[int]], finding: str
 ) -> None:
-    """The others are named, with what is missing and by how much columns differ."""
     folder = write_set(tmp_path / "set", change=change)
     found, context = actions_of(folder)
     assert found == expected
@@ -136,13 +139,11 @@ def test_missing_rewards_are_unknown(tmp_path: Path) -> None:
 
 
 def test_episodes_beyond_the_stated_number_are_reported(tmp_path: Path) -> None:
-    """They may be left over from another dataset."""
     _, context = actions_of(write_set(tmp_path / "set", total_episodes=1))
     assert context.warnings == ["total_episodes is 1, and main_data.hdf5 has 2 episodes."]
 
 
 def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
-    """Numbers become the state, and images that are no pictures are left out by name."""
     observed = gym.spaces.Dict(
         {
             "depth": gym.spaces.Box(0, 65535, (16, 24, 1), np.uint16),
@@ -164,7 +165,6 @@ def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
 
 
 def test_a_damaged_picture_of_our_own_is_left_out(tmp_path: Path) -> None:
-    """The steps around it are kept."""
     drive(tmp_path / "data", 5)
     export_recording(tmp_path / "data", tmp_path / "set-v0", "minari")
     with h5py.File(tmp_path / "set-v0/data/main_data.hdf5", "a") as file:
@@ -172,6 +172,6 @@ def test_a_damaged_picture_of_our_own_is_left_out(tmp_path: Path) -> None:
         pictures[2] = pictures[2][:-300]
     done = import_recording(tmp_path / "set-v0", tmp_path / "back")
     assert (done.steps, done.pictures) == (4, 4)
-    assert done.left_out[0].startswith("1 step that cannot be read (The picture in the file")
+    assert done.left_out[0].startswith("1 step with a damaged picture: 2 of episode_0")
     (episode,) = all_of(tmp_path / "back")
     assert [round(10 * step.action[0]) for step in episode.steps] == [0, 1, 3, 4]

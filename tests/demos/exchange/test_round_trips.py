@@ -106,7 +106,6 @@ def test_any_recording_round_trips(
 
 @pytest.mark.parametrize("name", ["csv", "minari"])
 def test_many_episodes_keep_their_order(tmp_path: Path, name: str) -> None:
-    """The order is kept, also across several chunks."""
     for count in (3, 1, 300):  # More than fit into one chunk.
         drive(tmp_path / "data", count)
     export_recording(tmp_path / "data", tmp_path / "x-v0", name)
@@ -124,7 +123,6 @@ def test_many_episodes_keep_their_order(tmp_path: Path, name: str) -> None:
 def test_every_kind_of_observation_round_trips(
     tmp_path: Path, name: str, image: tuple[int, int] | None, state: bool, grey: bool
 ) -> None:
-    """Without state, camera or colour, and with images too small for Minari's JPEG."""
     what = header(image_size=image, **({} if state else {"state_layout": ""}))
     steps = [
         (
@@ -175,7 +173,6 @@ def test_a_tub_round_trips(tmp_path: Path) -> None:
 
 
 def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
-    """Later steps keep a frame shared with a dropped one."""
     steps = [
         (Step(action=(float(n), 0.0), driver="person", state=(0.0, 0.0)), jpeg)
         for n, jpeg in enumerate((picture(0), None, None, picture(3)))
@@ -206,7 +203,6 @@ def with_a_pause(data: Path) -> Path:
 def test_steps_that_do_not_follow_each_other_are_separate_episodes(
     tmp_path: Path, name: str, folder: str
 ) -> None:
-    """An export to a format without gaps splits episodes there, and says so."""
     drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
     done = export_recording(tmp_path / "data", tmp_path / folder, name)
     assert (done.episodes, done.steps, done.left_out) == (3, 7, 1)
@@ -229,7 +225,6 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
 
 
 def test_a_whole_episode_is_not_split(tmp_path: Path) -> None:
-    """With the excluded steps, or in a format with times."""
     drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
     assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
     done = export_recording(tmp_path / "data", tmp_path / "all-v0", "minari", dropped=True)
@@ -239,7 +234,6 @@ def test_a_whole_episode_is_not_split(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("clock", ["twin", "none"])
 def test_a_simulated_drive_keeps_its_rate(tmp_path: Path, clock: Any) -> None:
-    """Times follow the control rate, not the wall clock."""
     steps = [
         Step(
             action=(0.0, 0.5),
@@ -263,7 +257,6 @@ def test_a_simulated_drive_keeps_its_rate(tmp_path: Path, clock: Any) -> None:
 
 
 def test_times_of_a_tub_never_run_backwards(tmp_path: Path) -> None:
-    """A step without a time, or one before the last, follows at the rate of the episode."""
     begun = 10**18
     wall = [begun, begun + 50_000_000, None, begun + 60_000_000, begun + 200_000_000]
     steps = [

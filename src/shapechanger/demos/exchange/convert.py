@@ -26,15 +26,13 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
+from shapechanger.demos.exchange.exports import consecutive_parts, exchange_episode, kept_steps
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
     ExportContext,
     Format,
     ImportContext,
-    consecutive_parts,
-    exchange_episode,
-    kept_steps,
 )
 from shapechanger.errors import DemosError, OutputError, UnknownName
 from shapechanger.files import cannot_write
@@ -143,13 +141,14 @@ def export_recording(
             f"Tasks and the choice of images are of {_with_option('task')}, and not of {format}."
         )
     read = [read_episode(path) for path in episodes_of(data)]
-    if not any(episode.steps if dropped else episode.kept for episode in read):
+    chosen = [(episode, episode.steps if dropped else episode.kept) for episode in read]
+    if not any(steps for _, steps in chosen):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
     notes: list[str] = []
     if form.consecutive:
-        episodes, notes = consecutive_parts(read, form, dropped=dropped)
+        episodes, notes = consecutive_parts(chosen, form)
     else:
-        episodes = [exchange_episode(episode, dropped=dropped) for episode in read]
+        episodes = [exchange_episode(episode, steps) for episode, steps in chosen]
     rewarded = all(step.reward is not None for one in read for step in one.kept)
     context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
     with new_folder(out, data) as folder:

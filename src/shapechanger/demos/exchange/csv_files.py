@@ -5,7 +5,7 @@ value that nothing measured. Texts are written as JSON with its quotes, so that 
 one for a formula, and line ends and other special characters survive.
 
 Without a header, `steps.csv` is a table of others: its columns are known by their names or aliases
-in `columns`, and its pictures lie beside it.
+in `COLUMNS`, and its pictures lie in the same folder.
 """
 
 from __future__ import annotations
@@ -13,59 +13,59 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from itertools import chain
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar, cast
+from typing import Any, Final, cast
 
-from msgspec import structs
-
-from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
-from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
+from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.exchange.drives import (
+    Record,
+    as_json,
+    episode_of,
+    features_of,
+    stretches,
+    with_pictures,
+)
+from shapechanger.demos.exchange.exports import value_names
 from shapechanger.demos.exchange.files import (
-    UNIT_UNKNOWN,
     cannot_read,
-    inside,
-    parse_json,
-    read_bytes,
+    is_inside,
     read_json_object,
     read_table,
 )
 from shapechanger.demos.exchange.format import (
-    BY_FIELD,
     COLUMNS,
     COMMANDS,
+    Column,
     ExchangeEpisode,
-    ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
     fields_of,
     name_in,
-    value_names,
 )
-from shapechanger.demos.exchange.pictures import Pictures
-from shapechanger.demos.exchange.times import TimedDrive, choose_rates, split_at_jumps
-from shapechanger.demos.jpeg import picture_size
-from shapechanger.errors import DemosError, LayoutError, UnknownName
-from shapechanger.layout import Feature, Layout
+from shapechanger.errors import DemosError, LayoutError
+from shapechanger.layout import Layout
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
-_JSON_TYPES: Final[dict[str, tuple[type, str]]] = {
-    "terms": (dict, "object"),
-    "marks": (list, "array"),
-    "stop_reason": (str, "string"),
-    "dropped": (str, "string"),
+_VECTORS: Final = fields_of("action", "state")
+_NAMES: Final = {column.field: column.names["csv"] for column in COLUMNS}
+_MUST_BE: Final = {
+    "index": "an integer",
+    "time": "a time",
+    "flag": "true or false",
+    "text": "a JSON string",
+    "terms": "a JSON object",
+    "marks": "a JSON array",
 }
+_FLAGS: Final = {"true": True, "1": True, "false": False, "0": False}
 _MAX_NAMED: Final = 5
 _MAX_QUOTED: Final = 60
-_MAX_TIME: Final = 4e9  # In the unit of the column, of which ns fit into 64 bits.
-
-_N = TypeVar("_N", int, float)
+_MAX_TIME: Final = 1 << 62  # ns, as in a step.
 
 
 def _tables_of(folder: Path) -> list[Path]:
@@ -115,7 +115,7 @@ def _write_episode(episode: ExchangeEpisode, folder: Path) -> int:
             cells = [str(number - 1), frame, row.step.driver]
             for field, names in list(columns.items())[3:]:
                 value = getattr(row if field in {"marks", "dropped"} else row.step, field)
-                if BY_FIELD[field].kind in {"action", "state"}:
+                if field in _VECTORS:
                     cells += [""] * len(names) if value is None else map(_cell, value)
                 elif field == "dropped" and value is not None:
                     cells.append(json.dumps(value))
@@ -132,8 +132,6 @@ def _cell(value: Any) -> str:
             return str(value).lower()
         case int() | float():
             return repr(value)
-        case tuple():
-            value = list(cast("tuple[str, ...]", value))
         case dict():  # JSON has neither NaN nor infinity.
             numbers = cast("dict[str, float]", value)
             value = {n: v if math.isfinite(v) else repr(v) for n, v in numbers.items()}
@@ -146,280 +144,211 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a folder."""
     for place in _tables_of(folder):
         path = place / _HEADER
-        if not path.is_file():
-            yield from _read_others(place, context)
-            continue
-        if context.hz is not None:
-            raise DemosError("The format csv states the rate itself: leave out --hz.")
-        fields = read_json_object(path)
-        try:
-            header = EpisodeHeader.from_json(fields)
-            columns = _columns(header)
-        except (DemosError, LayoutError) as error:
-            raise DemosError(f"{path}: {error}") from error
-        names = list(chain.from_iterable(columns.values()))
-        lines = _lines(place, columns, names, None, context)
-        yield ExchangeEpisode(
-            header=header,
-            rows=_with_pictures(lines, place / _FRAMES, header, context),
-            name=str(place),
-            outcome=str(fields.get("outcome", "")),
-        )
+        if path.is_file():
+            yield _own(place, path, context)
+        else:
+            yield from _others(place, context)
 
 
-def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    """Yield the episode of a table without a header, unless it is empty."""
-    path = folder / _TABLE
-    _, lines = read_table(path)
-    named = [_known_name(name) for name in (lines[0][1] if lines else [])]
-    found = [name for name, _ in named]
-    prefix = {field: name_in("csv", field) for field in fields_of("action", "state")}
-    values = {
-        field: [name for name in found if name.startswith(start)] for field, start in prefix.items()
-    }
-    if not values["action"]:
-        raise DemosError(
-            f"There is no {_HEADER} beside {path}, and no column of an action: restore it, or name "
-            f"columns action/NAME, or {', '.join(COMMANDS)}."
-        )
-    columns = {c.field: values.get(c.field, [c.names["csv"]]) for c in COLUMNS}
-    known = set(chain.from_iterable(columns.values()))
-    if others := [name for name in found if name not in known]:
-        context.note(f"Columns that are not imported: {', '.join(others)}.")
-    if len(set(found)) < len(found):
-        raise DemosError(f"{path} has two columns of one name: rename one of them.")
-    parsed = list(_lines(folder, columns, found, dict(named), context))
-    if not parsed:
-        return
-    times = [line.step.captured_ns for line in parsed if line.step.captured_ns is not None]
-    timed = len(times) == len(parsed)
-    drive = TimedDrive(times if timed else (), [line.number for line in parsed], "line 2")
-    (hz,), believed = choose_rates([drive], context)
-    if not (timed and believed):
-        drive = replace(drive, times_ns=())
-        parsed = [one._replace(step=structs.replace(one.step, captured_ns=None)) for one in parsed]
-    size = None
-    if shown := next((line.frame for line in parsed if line.frame), ""):
-        size = picture_size(read_bytes(inside(folder, shown, path), MAX_PICTURE_BYTES), shown)
-
-    def layout(field: str) -> str:
-        names = [name.removeprefix(prefix[field]) for name in values[field]]
-        features = (COMMANDS.get(name, Feature(name, UNIT_UNKNOWN)) for name in names)
-        return Layout(tuple(features)).to_json() if names else ""
-
-    header = EpisodeHeader(
-        action_layout=layout("action"),
-        state_layout=layout("state"),
-        image_size=size,
-        control_hz=hz,
-        clock="real" if timed and believed else "none",
-        source="csv",
-    )
-    names = [line.where.rpartition(", ")[2] for line in parsed]
-    (places,) = split_at_jumps([drive], [names], [hz], context)
-    for place in places:
-        rows = _with_pictures(parsed[place], folder, header, context)
-        name = f"{folder}, from {names[place.start]}"
-        yield ExchangeEpisode(header=header, rows=rows, name=name)
-
-
-def _known_name(name: str) -> tuple[str, float]:
-    """Return the name of a column of others as in `steps.csv`, and its factor to that unit."""
-    plain = name.strip().lower()
-    if plain in COMMANDS:
-        return name_in("csv", "action") + COMMANDS[plain].name, 1.0
-    for column in COLUMNS:
-        if plain in column.aliases:
-            return column.names["csv"], column.aliases[plain]
-    return name.strip(), 1.0
-
-
-class _Line(NamedTuple):
-    """A line of a table, its number among them, and how to name it in errors."""
-
-    number: int
-    step: Step
-    frame: str
-    where: str
-    marks: tuple[str, ...]
-    dropped: str | None
-
-
-def _with_pictures(
-    lines: Iterable[_Line], frames: Path, header: EpisodeHeader, context: ImportContext
-) -> Iterator[ExchangeStep]:
-    """Yield the steps of lines, each with its picture; the others are left out."""
-    pictures = Pictures(header.image_size)
-    shown, known = "", set[str]()
-    for line in lines:
-        jpeg = None
-        try:
-            if line.frame != shown:
-                if header.image_size is None:
-                    raise DemosError(
-                        f"{line.where} has a picture, but {_HEADER} has no image_size."
-                    )
-                if line.frame in known:
-                    raise DemosError(
-                        f"{line.where} returns to the picture {line.frame!r} of an earlier step."
-                    )
-                path = inside(frames, line.frame, line.where)
-                jpeg = read_bytes(path, MAX_PICTURE_BYTES)
-                pictures.check(jpeg, str(path))
-        except DemosError as error:
-            _leave_out(context, error, line.where)
-            continue
-        shown = line.frame
-        known.add(shown)
-        yield ExchangeStep(step=line.step, jpeg=jpeg, marks=line.marks, dropped=line.dropped)
-
-
-def _leave_out(context: ImportContext, error: DemosError, where: str) -> None:
-    table = where.rpartition(", ")[0]
-    context.leave_out("line", f"of {table}", str(error).removeprefix(f"{table}, ")[:-1])
-
-
-def _lines(
-    folder: Path,
-    columns: dict[str, list[str]],
-    names: Sequence[str],
-    factors: Mapping[str, float] | None,
-    context: ImportContext,
-) -> Iterator[_Line]:
-    """Yield the lines of a table that can be read; the others are left out.
-
-    `columns` are those of each field of a step, `names` those of the table, in order, and `factors`
-    those of the columns of others; None for a table of Shapechanger.
-    """
-    path = folder / _TABLE
-    separator, table = read_table(path, len(names))
-    found = table[0][1] if table else []
-    if factors is None and found != list(names):
-        missing = [name for name in names if name not in found]
-        surplus = [repr(name) for name in found if name not in names]
+def _own(folder: Path, path: Path, context: ImportContext) -> ExchangeEpisode:
+    """Return the episode of a folder that Shapechanger exported."""
+    if context.hz is not None:
+        raise DemosError("The format csv states the rate itself: leave out --hz.")
+    fields = read_json_object(path)
+    try:
+        header = EpisodeHeader.from_json(fields)
+        columns = _columns(header)
+    except (DemosError, LayoutError) as error:
+        raise DemosError(f"{path}: {error}") from error
+    table = _Table(folder / _TABLE, columns, context)
+    expected = list(chain.from_iterable(columns.values()))
+    if table.names != expected:
+        missing = [name for name in expected if name not in table.names]
+        surplus = [repr(name) for name in table.names if name not in expected]
         problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
         problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
         what = " and ".join(problems) or "has its columns in another order"
-        raise DemosError(f"{path} {what}: the columns must be those of {_HEADER}.")
-    before = -1
-    for position, (line, cells) in enumerate(table[1:]):
-        where = f"{path}, line {line}"
-        try:
-            if len(cells) != len(names):
-                hint = " (decimal commas need another separator)" if separator == "," else ""
-                raise DemosError(f"{where} has {len(cells)} cells instead of {len(names)}{hint}.")
-            row = _Row(dict(zip(names, cells, strict=True)), where, separator)
-            number = row.number("step", int) if factors is None else position
-            if number is None:
-                raise DemosError(f"{where}: step is empty.")
-            if number <= before:
-                raise DemosError(f"{where}: step {number} comes after step {before}.")
-            parsed = row.line(number, columns, factors or {})
-        except DemosError as error:
-            _leave_out(context, error, where)
-            continue
-        before = number
-        yield parsed
+        raise DemosError(f"{table.path} {what}: the columns must be those of {_HEADER}.")
+    records = table.records(folder / _FRAMES)
+    if header.image_size is None and any(record.frame for record in records):
+        raise DemosError(f"{table.path} has pictures, but {path} has no image_size.")
+    outcome = str(fields.get("outcome", ""))
+    return episode_of(records, header, context, name=str(folder), what="line", outcome=outcome)
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """The cells of a line by the names of their columns.
+def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+    """Yield the episodes of a table without a header."""
+    table = _Table(folder / _TABLE, {}, context)
+    known = [_known_name(name) for name in table.names]
+    table.names = [name for name, _ in known]
+    table.factors = dict(known)
+    values = {
+        field: [name for name in table.names if name.startswith(_NAMES[field])]
+        for field in _VECTORS
+    }
+    if not values["action"]:
+        raise DemosError(
+            f"There is no {_HEADER} beside {table.path}, and no column of an action: restore it, "
+            f"or name columns action/NAME, or {', '.join(COMMANDS)}."
+        )
+    table.columns = {field: values.get(field, [name]) for field, name in _NAMES.items()}
+    taken = set(chain.from_iterable(table.columns.values()))
+    if others := [name for name in table.names if name not in taken]:
+        context.note(f"Columns that are not imported: {', '.join(others)}.")
+    if len(set(table.names)) < len(table.names):
+        raise DemosError(f"{table.path} has two columns of one name: rename one of them.")
+    records, size = with_pictures(table.records(folder), "line", context)
+
+    def layout(field: str) -> str:
+        names = [name.removeprefix(_NAMES[field]) for name in values[field]]
+        return as_json([COMMANDS.get(name) or features_of(name, 1)[0] for name in names])
+
+    for part, hz, _, timed in stretches([records] if records else [], "line", context):
+        header = EpisodeHeader(
+            action_layout=layout("action"),
+            state_layout=layout("state"),
+            image_size=size,
+            control_hz=hz,
+            clock="real" if timed else "none",
+            source="csv",
+        )
+        name = f"{folder}, from {part[0].name}"
+        yield episode_of(part, header, context, name=name, what="line")
+
+
+def _known_name(name: str) -> tuple[str, int]:
+    """Return the name of a column of others as in `steps.csv`, and its factor to that unit."""
+    plain = name.strip().lower()
+    if plain in COMMANDS:
+        return name_in("csv", "action") + COMMANDS[plain].name, 1
+    for column in COLUMNS:
+        if plain in column.aliases:
+            return column.names["csv"], int(column.aliases[plain])
+    return name.strip(), 1
+
+
+class _Table:
+    """A `steps.csv`.
 
     With another separator than commas, numbers may have decimal commas.
+
+    Attributes:
+        path: The file.
+        names: Names of its columns.
+        columns: Those of each field of a step.
+        factors: Factors to ns; only of a table of others, which may lack columns.
     """
 
-    cells: dict[str, str]
-    where: str
-    separator: str
+    def __init__(
+        self, path: Path, columns: Mapping[str, Sequence[str]], context: ImportContext
+    ) -> None:
+        expected = sum(map(len, columns.values()))
+        self._separator, table = read_table(path, expected or 1)
+        self.path = path
+        self.names = table[0][1] if table else []
+        self.columns = columns
+        self.factors: Mapping[str, int] = {}
+        self._lines = table[1:]
+        self._context = context
 
-    def line(
-        self, number: int, columns: dict[str, list[str]], factors: Mapping[str, float]
-    ) -> _Line:
-        """Return the parsed line; a table of others, which has factors, may lack columns."""
-        driver = self.cells.get("driver") or ("person" if factors else "")
-        if driver not in DRIVERS:
-            raise DemosError(f"{self.where}: {UnknownName('driver', driver, DRIVERS)}")
-        fields: dict[str, Any] = {}
-        for column in COLUMNS:
-            name = column.names["csv"]
-            match column.kind:
-                case "action" | "state":
-                    values = self._vector(column.field, columns[column.field])
-                    fields[column.field] = values if column.kind == "state" else values or None
-                case "time":
-                    fields[column.field] = self._time(name, factors)
-                case "number":
-                    fields[column.field] = self.number(name, float)
-                case "flag":
-                    fields[column.field] = self._flag(name, "false" if factors else "")
-                case "json" | "text" if name in _JSON_TYPES:
-                    fields[column.field] = self._json(name)
-                case _:
-                    pass
-        if fields["action"] is None:
-            raise DemosError(f"{self.where}: the action is empty.")
-        if not all(map(math.isfinite, fields["action"])):
-            raise DemosError(f"{self.where}: the action is not finite.")
+    def records(self, frames: Path) -> list[Record]:
+        """Return the lines that can be read, with their pictures; the others are left out."""
+        found: list[Record] = []
+        before, shown, known = -1, "", set[str]()
+        for position, (line, cells) in enumerate(self._lines):
+            try:
+                record = self._record(f"line {line}", position, cells)
+                if record.number <= before:
+                    raise DemosError(f"step {record.number} comes after step {before}.")
+            except DemosError as error:
+                reason = str(error).removesuffix(".")
+                self._context.leave_out("line", f"of {self.path}", f"line {line}: {reason}")
+                continue
+            before = record.number
+            found.append(record)
+            frame = cast("str", record.frame)
+            if frame:
+                record.picture = frames / frame
+            if frame and not is_inside(frames, frame):
+                record.fault = "with a picture name that leaves the folder"
+            elif frame != shown and frame in known:
+                record.fault = f"that returns to the picture {frame!r} of an earlier step"
+            elif not frame and shown:
+                record.fault = "without a picture"
+            else:
+                shown = frame
+                known.add(frame)
+        return found
+
+    def _record(self, name: str, position: int, cells: Sequence[str]) -> Record:
+        if len(cells) != len(self.names):
+            hint = " (decimal commas need another separator)" if self._separator == "," else ""
+            raise DemosError(f"{len(cells)} cells instead of {len(self.names)}{hint}.")
+        found = dict(zip(self.names, cells, strict=True))
+        fields = {column.field: self._value(column, found) for column in COLUMNS}
+        number = position if self.factors else fields["step"]
+        if number is None or fields["action"] is None:
+            raise DemosError(f"the {'step' if number is None else 'action'} is empty.")
+        marks, dropped = fields.pop("marks"), fields.pop("dropped")
+        frame = fields.pop("frame") or ""
+        del fields["step"]
+        fields["driver"] = fields["driver"] or ("person" if self.factors else "")
         if fields["state"] is None:
-            fields["state"] = (math.nan,) * len(columns["state"])
-        fields["stop_reason"] = fields["stop_reason"] or ""
-        terms = cast("dict[str, Any]", fields["terms"] or {})
-        fields["terms"] = {n: self._parsed(str(v), float, "terms") for n, v in terms.items()}
-        marks = tuple(map(str, fields.pop("marks") or ()))
-        dropped = fields.pop("dropped")
-        step = Step(driver=driver, **fields)
-        return _Line(number, step, self.cells.get("frame", ""), self.where, marks, dropped)
-
-    def number(self, name: str, kind: type[_N]) -> _N | None:
-        """Return the number in a column; None for an empty cell."""
-        cell = self.cells.get(name, "")
-        return self._parsed(cell, kind, name) if cell else None
-
-    def _time(self, name: str, factors: Mapping[str, float]) -> int | None:
-        """Return a time, ns; those of others may have another unit, and digits after the point."""
-        cell = self.cells.get(name, "")
-        if name not in factors or not cell:
-            return self.number(name, int)
+            fields["state"] = (math.nan,) * len(self.columns["state"])
+        known = {field: value for field, value in fields.items() if value is not None}
         try:
-            value = Decimal(cell if self.separator == "," else cell.replace(",", "."))
-            if not value.is_finite() or abs(value) > _MAX_TIME:
-                raise DemosError(f"{self.where}: {name} must be a time, got {cell!r}.")
-        except InvalidOperation as error:
-            raise DemosError(f"{self.where}: {name} must be a number, got {cell!r}.") from error
-        return int(value * int(factors[name]))
+            terms = {term: float(value) for term, value in known.pop("terms", {}).items()}
+        except (ValueError, TypeError) as error:
+            raise DemosError(f"terms must be numbers ({error}).") from error
+        return Record(
+            name=name,
+            step=Step(terms=terms, **known),
+            number=number,
+            frame=frame,
+            marks=tuple(map(str, marks or ())),
+            dropped=dropped,
+        )
 
-    def _json(self, name: str) -> Any:
-        """Return the JSON in a column; None for an empty cell."""
-        if not (cell := self.cells.get(name, "")):
-            return None
-        kind, word = _JSON_TYPES[name]
-        value = parse_json(cell, f"{self.where}: {name}: {cell[:_MAX_QUOTED]!r}")
-        if not isinstance(value, kind):
-            raise DemosError(
-                f"{self.where}: {name} must be a JSON {word}, got {cell[:_MAX_QUOTED]!r}."
-            )
-        return value
+    def _value(self, column: Column, cells: Mapping[str, str]) -> Any:
+        """Return the value of a field; None for empty cells."""
+        names = self.columns[column.field]
+        if column.field not in _VECTORS:
+            cell = cells.get(names[0], "")
+            if column.kind == "flag" and not cell and not self.factors:
+                cell = "an empty cell"
+            return self._parsed(column, names[0], cell) if cell else None
+        values = [self._parsed(column, name, cells[name]) for name in names if cells[name]]
+        if values and len(values) < len(names):
+            raise DemosError(f"some values of {column.field} are empty, but not all.")
+        return tuple(values) if values or (column.kind == "state" and not names) else None
 
-    def _vector(self, field: str, columns: Sequence[str]) -> tuple[float, ...] | None:
-        values = [self.number(column, float) for column in columns]
-        known = tuple(value for value in values if value is not None)
-        if known and len(known) < len(values):
-            raise DemosError(f"{self.where}: some values of {field} are empty, but not all.")
-        return known if known or not columns else None
-
-    def _parsed(self, text: str, kind: type[_N], name: str) -> _N:
+    def _parsed(self, column: Column, name: str, cell: str) -> Any:
+        plain = cell if self._separator == "," else cell.replace(",", ".")
+        factor = self.factors.get(name, 1)
+        expected = _MUST_BE.get(column.kind, "a number")
         try:
-            return kind(text if self.separator == "," else text.replace(",", "."))
-        except ValueError as error:
-            what = "an integer" if kind is int else "a number"
-            raise DemosError(f"{self.where}: {name} must be {what}, got {text!r}.") from error
-
-    def _flag(self, name: str, default: str) -> bool:
-        word = (self.cells.get(name) or default).strip().lower()  # Spreadsheets write TRUE.
-        if word not in {"true", "false", "1", "0"}:
-            raise DemosError(f"{self.where}: expected true or false, got {self.cells[name]!r}.")
-        return word in {"true", "1"}
+            match column.kind:
+                case "text" | "json" if name not in {"driver"}:
+                    expected = _MUST_BE.get(column.field, expected)
+                    value = json.loads(cell)
+                    kind = {"terms": dict, "marks": list}.get(column.field, str)
+                    if isinstance(value, kind):
+                        return value
+                case "text" | "picture":
+                    return cell
+                case "flag":
+                    return _FLAGS[cell.strip().lower()]  # Spreadsheets write TRUE.
+                case "time" | "index":
+                    value = Decimal(plain) * factor
+                    whole = factor > 1 or value == value.to_integral_value()
+                    if abs(value) <= _MAX_TIME and whole:
+                        return int(value)
+                case _:
+                    return float(plain)
+        except (ValueError, KeyError, InvalidOperation, RecursionError) as error:
+            why = f"{name} must be {expected}, got {cell[:_MAX_QUOTED]!r}."
+            raise DemosError(why) from error
+        raise DemosError(f"{name} must be {expected}, got {cell[:_MAX_QUOTED]!r}.")
 
 
 FORMAT: Final = Format(

@@ -182,17 +182,23 @@ def read_json_object(path: Path) -> dict[str, Any]:
     return cast("dict[str, Any]", value)
 
 
-def own_headers(section: object, where: object) -> list[dict[str, Any]]:
-    """Return the headers of the episodes of a data set that Shapechanger exported."""
+def own_headers(section: object, where: object, count: int) -> list[dict[str, Any]]:
+    """Return the headers of the `count` episodes of a data set that Shapechanger exported."""
     fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
     headers = fields.get("episodes")
     if fields.get("format") != 1 or not isinstance(headers, list):
         raise DemosError(
             f"{where} was written by another version of Shapechanger: this one reads format 1 only."
         )
-    if not all(isinstance(header, dict) for header in cast("list[Any]", headers)):
+    found = cast("list[Any]", headers)
+    if not all(isinstance(header, dict) for header in found):
         raise DemosError(f"{where} has a header that is not a JSON object.")
-    return cast("list[dict[str, Any]]", headers)
+    if len(found) != count:
+        raise DemosError(
+            f"{where} describes {len(found)} episodes, and the dataset has {count}: remove it if "
+            "the dataset was edited."
+        )
+    return found
 
 
 def cannot_read(path: Path, error: OSError) -> DemosError:
@@ -301,9 +307,8 @@ def _sizes_of(file: Any, groups: Iterable[int]) -> Iterator[int]:
             yield max(column.total_uncompressed_size, 8 * column.num_values)
 
 
-def _batches(file: Any, columns: Sequence[str], groups: Sequence[int] | None = None) -> Any:
-    """Return the rows of some row groups, or of all, a few at a time."""
-    groups = range(file.metadata.num_row_groups) if groups is None else groups
+def _batches(file: Any, columns: Sequence[str], groups: Sequence[int]) -> Any:
+    """Return the rows of some row groups, a few at a time."""
     # Many rows may share one large value, which is in memory once for each.
     largest = max(_sizes_of(file, groups), default=1)
     rows = max(1, min(_ROWS, MAX_UNPACKED // max(1, largest)))
@@ -315,7 +320,8 @@ def all_rows(path: Path, columns: set[str] | None) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     with _open_parquet(path) as file:
         known = set(file.schema_arrow.names)
-        for batch in _batches(file, sorted(known if columns is None else columns & known)):
+        groups = range(file.metadata.num_row_groups)
+        for batch in _batches(file, sorted(columns & known if columns else known), groups):
             for row in cast("list[dict[str, Any]]", batch.to_pylist()):
                 for value in row.values():  # A text, or a list of texts.
                     texts = cast("list[Any]", value) if isinstance(value, list) else [value]
@@ -330,7 +336,7 @@ def _vectors(column: Any, size: int, what: str) -> NDArray[np.float64]:
     types = library("pyarrow.types", "lerobot")
     rows = len(column)
     values: Any = getattr(column, "storage", column)  # Of arrays in an extension type.
-    even = not types.is_list(values.type) or len(np.unique(values.value_lengths())) == 1
+    even = not types.is_list(values.type) or len(np.unique(values.value_lengths())) <= 1
     while types.is_list(values.type) or types.is_fixed_size_list(values.type):
         values = values.flatten()
     if even and len(values) == rows * size:
@@ -346,16 +352,16 @@ def number_columns(
 ) -> tuple[dict[str, NDArray[np.float64]], set[str]]:
     """Return Parquet columns of single numbers, shape (n,) each, and the names of all columns.
 
-    Those that the file lacks are left out.
+    Columns that the file lacks are left out.
     """
     with _open_parquet(path) as file:
-        known = [name for name in names if name in file.schema_arrow.names]
-        parts: dict[str, list[NDArray[np.float64]]] = {name: [np.empty(0)] for name in known}
-        for batch in _batches(file, known):
-            for name in known:
-                parts[name].append(_vectors(batch.column(name), 1, f"{path}: {name!r}")[:, 0])
-        columns = {name: np.concatenate(found) for name, found in parts.items()}
-        return columns, set(file.schema_arrow.names)
+        columns = set(file.schema_arrow.names)
+        table = file.read(columns=[name for name in names if name in columns])
+        found = {
+            name: _vectors(table.column(name).combine_chunks(), 1, f"{path}: {name!r}")[:, 0]
+            for name in table.column_names
+        }
+        return found, columns
 
 
 def rows_at(

@@ -22,27 +22,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import groupby, islice
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import EpisodeHeader
+from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.exchange.exports import decoded_steps, require_alike, value_names
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import (
-    ExchangeEpisode,
-    ExchangeStep,
-    ExportContext,
-    name_in,
-    require_alike,
-    value_names,
-)
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExportContext, name_in
 from shapechanger.demos.exchange.pictures import VideoWriter
-from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
@@ -81,11 +73,8 @@ _Stats = dict[str, NDArray[Any]]
 
 
 def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
-    """Write episodes into an existing folder, as one dataset, and return the number of steps.
-
-    Episodes without steps are left out, because LeRobot does not support them.
-    """
-    require_alike(episodes, "a LeRobot dataset")
+    """Write episodes into an existing folder, as one dataset, and return the number of steps."""
+    require_alike(episodes, "LeRobot")
     dataset = _Dataset(episodes[0].header, folder, context)
     try:
         for episode in episodes:
@@ -94,8 +83,6 @@ def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCont
             dataset.add(episode, context.task or str(said))
     finally:
         dataset.close_files()
-    if not dataset.places:
-        raise DemosError("There are no steps to export.")
     dataset.write_meta()
     return dataset.steps
 
@@ -128,37 +115,48 @@ class _Dataset:
         self._video: VideoWriter | None = None
 
     def add(self, episode: ExchangeEpisode, task: str) -> None:
-        """Append an episode; one without steps is left out."""
-        rows = iter(episode.rows)
-        if (first := next(rows, None)) is None:
-            return
-        if task not in self._tasks:
-            self._tasks.append(task)
+        """Append an episode."""
+        steps: list[Step] = []
+        stored: list[dict[str, Any]] = []
+        parts: list[dict[str, NDArray[Any]]] = []
+        shown, counts = np.empty(0, np.uint8), np.zeros((_LEVELS, _COLOURS), np.int64)
+        histograms = np.zeros_like(counts)
+        rows = decoded_steps(episode.rows, self._size, episode.name, "LeRobot")
         self._open_files()
-        written = _Written(self.steps, self._tasks.index(task), episode.name)
-        chunk = [first]
-        while chunk:
-            self._add(chunk, written)
-            chunk = list(islice(rows, _ROWS))
-        numbers = {key: np.concatenate(parts) for key, parts in written.numbers.items()}
-        stats = {key: _number_stats(values) for key, values in numbers.items()}
+        for number, (row, jpeg, pixels) in enumerate(rows):
+            if pixels is not None:
+                shown, counts = pixels, _histograms(pixels)
+            histograms += counts
+            if self._video is not None:
+                self._video.add(shown)
+            steps.append(row.step)
+            stored.append({"bytes": jpeg, "path": f"frame-{number:06d}.jpg"})
+            if len(stored) == _ROWS:
+                parts.append(self._write_rows(steps, stored, task, episode.name))
+        if stored:
+            parts.append(self._write_rows(steps, stored, task, episode.name))
+        numbers = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+        stats = {key: _stats_of(values.astype(np.float64)) for key, values in numbers.items()}
         if self._size is not None:
-            stats[_CAMERA] = _picture_stats(written.histograms, written.steps)
+            levels = np.repeat(np.arange(_LEVELS)[:, None] / (_LEVELS - 1), _COLOURS, axis=1)
+            found = _stats_of(levels, histograms)
+            stats[_CAMERA] = {name: value.reshape(-1, 1, 1) for name, value in found.items()}
+            stats[_CAMERA]["count"] = np.array([len(steps)])
         place: dict[str, Any] = {
             "episode_index": len(self.places),
             "tasks": [task],
-            "length": written.steps,
+            "length": len(steps),
             "data/chunk_index": self._tables // _FILES_PER_CHUNK,
             "data/file_index": self._tables % _FILES_PER_CHUNK,
             "dataset_from_index": self.steps,
-            "dataset_to_index": self.steps + written.steps,
+            "dataset_to_index": self.steps + len(steps),
         }
         if self._video is not None:
             end = self._video.frames
             place |= {
                 f"videos/{_CAMERA}/chunk_index": self._videos // _FILES_PER_CHUNK,
                 f"videos/{_CAMERA}/file_index": self._videos % _FILES_PER_CHUNK,
-                f"videos/{_CAMERA}/from_timestamp": float((end - written.steps) / self._rate),
+                f"videos/{_CAMERA}/from_timestamp": float((end - len(steps)) / self._rate),
                 f"videos/{_CAMERA}/to_timestamp": float(end / self._rate),
             }
         place |= {
@@ -169,11 +167,11 @@ class _Dataset:
         place |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
         self.places.append(place)
         self._stats.append(stats)
-        runs = [[driver, len(list(group))] for driver, group in groupby(written.drivers)]
+        runs = [[who, len(list(group))] for who, group in groupby(step.driver for step in steps)]
         self._headers.append(
             episode.header.to_json() | {"outcome": episode.outcome, "drivers": runs}
         )
-        self.steps += written.steps
+        self.steps += len(steps)
 
     def close_files(self) -> None:
         """Close the files of the numbers and the pictures."""
@@ -293,92 +291,49 @@ class _Dataset:
             path = self._next_file(_VIDEO_PATH, self._videos)
             self._video = VideoWriter(path, self._size, self._rate)
 
-    def _add(self, rows: Sequence[ExchangeStep], written: _Written) -> None:
-        """Append some steps."""
-        steps = [row.step for row in rows]
-        start, count = written.steps, len(rows)
-        frames = np.arange(start, start + count)
+    def _write_rows(
+        self, steps: Sequence[Step], stored: list[dict[str, Any]], task: str, name: str
+    ) -> dict[str, NDArray[Any]]:
+        """Append the newest steps, those with the `stored` pictures, and return their columns."""
+        count, end = len(stored), len(steps)
+        newest, frames = steps[end - count :], np.arange(end - count, end)
+        if task not in self._tasks:
+            self._tasks.append(task)
         columns: dict[str, NDArray[Any]] = {
-            _ACTION: _in_32_bits([step.action for step in steps]),
-            DONE: np.array([[step.terminated or step.truncated] for step in steps]),
-            _TERMINATED: np.array([[step.terminated] for step in steps]),
+            _ACTION: _in_32_bits([step.action for step in newest]),
+            DONE: np.array([[step.terminated or step.truncated] for step in newest]),
+            _TERMINATED: np.array([[step.terminated] for step in newest]),
             "timestamp": (frames / float(self._rate)).astype(np.float32)[:, None],
             "frame_index": frames[:, None],
             "episode_index": np.full((count, 1), len(self.places)),
-            "index": frames[:, None] + written.first,
-            "task_index": np.full((count, 1), written.task),
+            "index": frames[:, None] + self.steps,
+            "task_index": np.full((count, 1), self._tasks.index(task)),
         }
         if self._states is not None:
-            states = np.array([step.state for step in steps])
+            states = np.array([step.state for step in newest])
             middles = np.repeat([f.middle for f in self._states], [f.size for f in self._states])
             columns[_STATE] = _in_32_bits(np.where(np.isfinite(states), states, middles))
         if self._rewarded:
-            columns[_REWARD] = _in_32_bits([[step.reward] for step in steps])
+            columns[_REWARD] = _in_32_bits([[step.reward] for step in newest])
         for key, values in columns.items():
             if not np.isfinite(values).all():
                 raise DemosError(
-                    f"{written.name} has a number in {key} that is not finite in 32 bits: export "
-                    "it to csv."
+                    f"{name} has a number in {key} that is not finite in 32 bits: export it to csv."
                 )
-            written.numbers.setdefault(key, []).append(values)
-        jpegs = self._add_pictures(rows, written) if self._size is not None else []
         arrays: list[Any] = []
         for column in self._schema:
-            values: Any = jpegs
-            if column.name != _CAMERA:
-                plain = columns[column.name]
-                values = plain[:, 0] if plain.shape[1] == 1 else list(plain)
+            plain = columns.get(column.name)
+            values: Any = stored if plain is None else list(plain)
+            if plain is not None and plain.shape[1] == 1:
+                values = plain[:, 0]
             arrays.append(self._arrow.array(values, column.type))
         self._table.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
-        written.steps += count
-        written.drivers.extend(step.driver for step in steps)
-
-    def _add_pictures(
-        self, rows: Sequence[ExchangeStep], written: _Written
-    ) -> list[dict[str, Any]]:
-        """Append the pictures of some steps to the video; return them as they are stored."""
-        stored: list[dict[str, Any]] = []
-        for number, row in enumerate(rows, written.steps):
-            where = f"of step {number} of {written.name}"
-            if row.jpeg is not None:
-                pixels = decode_picture(row.jpeg, where)
-                if pixels.shape[1::-1] != self._size:
-                    raise DemosError(
-                        "The picture {} has {} x {} pixels, and not {} x {} like the others: a "
-                        "LeRobot dataset has one size.".format(
-                            where, *pixels.shape[1::-1], *(self._size or ())
-                        )
-                    )
-                written.shown = (row.jpeg, pixels, _histograms(pixels))
-            if written.shown is None:
-                raise DemosError(
-                    f"There is no picture {where}, but LeRobot needs one at every step: drop "
-                    "the steps before the first picture, or export to csv."
-                )
-            jpeg, pixels, histograms = written.shown
-            written.histograms += histograms
-            if self._video is not None:
-                self._video.add(pixels)
-            stored.append({"bytes": jpeg, "path": f"frame-{number:06d}.jpg"})
-        return stored
+        stored.clear()
+        return columns
 
     def _write_json(self, name: str, value: Any) -> None:
         text = json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False)
         (self._folder / name).write_text(text, encoding="utf-8", errors="replace")
-
-
-@dataclass(slots=True)
-class _Written:
-    """What was written of the newest episode: columns of numbers, in parts of shape (n, k)."""
-
-    first: int  # Number of its first step in the dataset.
-    task: int
-    name: str
-    steps: int = 0
-    numbers: dict[str, list[NDArray[Any]]] = field(default_factory=dict[str, list[NDArray[Any]]])
-    histograms: Any = 0  # Number of pixels of each value, shape (3, 256).
-    drivers: list[str] = field(default_factory=list[str])
-    shown: tuple[bytes, NDArray[np.uint8], NDArray[np.int64]] | None = None
 
 
 def _in_32_bits(values: Any) -> NDArray[np.float32]:
@@ -395,45 +350,30 @@ def _vector(layout: Layout) -> dict[str, Any]:
 
 
 def _histograms(pixels: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return the number of pixels of each value, shape (3, 256)."""
+    """Return the number of pixels of each value, shape (256, 3)."""
     height, width, _ = pixels.shape
     if max(width, height) >= _LARGE_PICTURE:
         stride = max(1, max(width, height) // _THINNED_PICTURE)
         pixels = pixels[::stride, ::stride]
-    counts = (np.bincount(pixels[..., n].ravel(), minlength=_LEVELS) for n in range(_COLOURS))
-    return np.array(list(counts))
+    counts = [np.bincount(pixels[..., n].ravel(), minlength=_LEVELS) for n in range(_COLOURS)]
+    return np.stack(counts, axis=1)
 
 
-def _number_stats(values: NDArray[Any]) -> _Stats:
-    """Return the statistics of the columns of an episode, shape (n, k): (k,) each."""
-    numbers = values.astype(np.float64)
-    quantiles = np.quantile(numbers, list(_QUANTILES.values()), axis=0, method="inverted_cdf")
+def _stats_of(values: NDArray[Any], weights: NDArray[np.int64] | None = None) -> _Stats:
+    """Return the statistics of columns, shape (n, k), with the weight of each value: (k,) each."""
+    present = np.ones(values.shape, bool) if weights is None else weights > 0
+    mean = np.average(values, axis=0, weights=weights)
+    quantiles = np.quantile(
+        values, list(_QUANTILES.values()), axis=0, method="inverted_cdf", weights=weights
+    )
     return {
-        "min": numbers.min(axis=0),
-        "max": numbers.max(axis=0),
-        "mean": numbers.mean(axis=0),
-        "std": numbers.std(axis=0),
-        "count": np.array([len(numbers)]),
+        "min": values.min(axis=0, where=present, initial=np.inf),
+        "max": values.max(axis=0, where=present, initial=-np.inf),
+        "mean": mean,
+        "std": np.sqrt(np.average((values - mean) ** 2, axis=0, weights=weights)),
+        "count": np.array([len(values)]),
         **dict(zip(_QUANTILES, quantiles, strict=True)),
     }
-
-
-def _picture_stats(histograms: NDArray[np.int64], count: int) -> _Stats:
-    """Return the statistics of each colour from 0 to 1, shape (3, 1, 1) each."""
-    levels = np.arange(_LEVELS) / (_LEVELS - 1)
-    shares = histograms / histograms.sum(axis=1, keepdims=True)
-    below = shares.cumsum(axis=1)
-    mean = shares @ levels
-    present = histograms > 0
-    found = {
-        "min": levels[present.argmax(axis=1)],
-        "max": levels[_LEVELS - 1 - present[:, ::-1].argmax(axis=1)],
-        "mean": mean,
-        "std": np.sqrt((shares * (levels - mean[:, None]) ** 2).sum(axis=1)),
-        **{name: levels[(below >= q).argmax(axis=1)] for name, q in _QUANTILES.items()},
-    }
-    stats = {name: value.reshape(_COLOURS, 1, 1) for name, value in found.items()}
-    return stats | {"count": np.array([count])}
 
 
 def _combined(episodes: Sequence[Mapping[str, _Stats]], key: str) -> _Stats:

@@ -14,29 +14,43 @@ are in `metadata.json`.
 Of a dataset of others, at most one part of an observation may be a picture; all other values become
 the state, in order. Pictures that are not JPEG are encoded with quality 100. The driver is unknown
 and taken to be an "expert". The rate is that of the key `control_hz`, that of `--hz`, or 20 Hz.
+
+Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
+encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
 """
 
 from __future__ import annotations
 
+import copy
 import json
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final, cast
 
-import msgspec
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
+from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.exchange.drives import (
+    Record,
+    as_json,
+    episode_of,
+    features_of,
+    unreadable,
+)
+from shapechanger.demos.exchange.exports import decoded_steps, require_alike
 from shapechanger.demos.exchange.files import (
-    MAX_FEATURES,
     MAX_UNPACKED,
     MAX_VALUES,
-    UNIT_UNKNOWN,
     chunk_of,
     column,
     inside,
@@ -51,84 +65,82 @@ from shapechanger.demos.exchange.format import (
     DEFAULT_HZ,
     ExchangeEpisode,
     ExchangeStep,
+    ExportContext,
     Format,
     ImportContext,
     few,
     fields_of,
     name_in,
 )
-from shapechanger.demos.exchange.minari_export import (
-    CUT_OFF,
-    DATA,
-    FRAME,
-    JPEG,
-    MAIN,
-    METADATA,
-    OBSERVATIONS,
-    OURS,
-    UNKNOWN_NS,
-    stored_as_jpeg,
-    write_minari,
-)
-from shapechanger.demos.exchange.pictures import Pictures
-from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
-from shapechanger.errors import DemosError, MissingExtra, UnknownName
+from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
+from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Feature, Layout
 
-_CHUNK: Final = 64  # Steps in memory at once; pictures may be stored as pixels.
-_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
-_CHANNELS: Final = (1, 3)
-_DEEP: Final = (np.uint16, np.int16, np.uint32)
-_TIMES: Final = fields_of("time")
-_ACTION, _REWARD, _TERMINATED, _TRUNCATED = (
-    name_in("minari", field) for field in ("action", "reward", "terminated", "truncated")
+_DATA: Final = "data"
+_METADATA: Final = "metadata.json"
+_MAIN: Final = "main_data.hdf5"
+_OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
+_UNKNOWN_NS: Final = -(2**63)
+_FRAME, _JPEG, _CUT_OFF = "infos/frame", "infos/jpeg", "infos/cut_off"
+_OBSERVATIONS: Final = "observations"
+_ACTION, _STATE, _PICTURE, _REWARD, _TERMINATED, _TRUNCATED, _DRIVER, _STOP, _MORE = (
+    name_in("minari", field)
+    for field in (
+        *("action", "state", "frame", "reward", "terminated", "truncated"),
+        *("driver", "stop_reason", "terms"),
+    )
 )
-_DRIVER, _STOP, _MORE = (name_in("minari", field) for field in ("driver", "stop_reason", "terms"))
+_TIMES: Final = fields_of("time")
 _INFOS: Final = (
     *(f"infos/{name}" for name in ("rewarded", "has_applied", "has_wanted", *_TIMES)),
     *("infos/applied", "infos/wanted", _DRIVER, _STOP, _MORE),
 )
+_NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
+_CHUNK: Final = 64  # Steps in memory at once; pictures may be stored as pixels.
+_MIN_JPEG: Final = 32  # Pixels.
+_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
+_BRIGHTEST: Final = 255
+_CHANNELS: Final = (1, 3)
+_DEEP: Final = (np.uint16, np.int16, np.uint32)
 
 
 def _data_folder(folder: Path) -> Path | None:
     """Return the folder with the files of a dataset: `data`, or `folder` itself; None for none."""
-    return next((p for p in (folder / DATA, folder) if (p / METADATA).is_file()), None)
+    return next((p for p in (folder / _DATA, folder) if (p / _METADATA).is_file()), None)
 
 
-def read_minari(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset."""
     place = _data_folder(folder) or folder
-    path = place / METADATA
+    path = place / _METADATA
     metadata = read_json_object(path)
     if metadata.get("data_format", "hdf5") != "hdf5":
         raise DemosError(
             f"{folder} is stored as {metadata['data_format']!r}, but only 'hdf5' is supported: "
             "create it with data_format='hdf5'."
         )
-    main = inside(place, MAIN, path)
+    main = inside(place, _MAIN, path)
     count = metadata.get("total_episodes")
     if not isinstance(count, int) or isinstance(count, bool) or count < 1:
         raise DemosError(f"{path}: total_episodes must be a positive integer, got {count!r}.")
     _require_stored(main, count)
-    ours = own_headers(metadata[OURS], path) if OURS in metadata else []
-    if OURS in metadata and len(ours) != count:
-        raise DemosError(
-            f"{path} has the headers of {len(ours)} episodes, but total_episodes is {count}."
-        )
+    ours = own_headers(metadata[_OURS], path, count) if _OURS in metadata else []
     theirs = None if ours else _foreign(main, path, metadata, context)
     for number in range(count):
         try:
             with open_hdf5(main) as file:
                 parts = theirs or _own(file, number, ours[number])
-                steps = parts.require_whole(file, number, context)
+                steps = parts.count_steps(file, number, context)
         except DemosError as error:
-            why = str(error).removesuffix(".")
-            context.leave_out("episode", f"that cannot be read ({why})", number)
+            context.leave_out("episode", unreadable(error), number)
             continue
-        yield ExchangeEpisode(
-            header=parts.header,
-            rows=_rows(main, number, steps, parts, context),
+        yield episode_of(
+            _records(main, number, steps, parts),
+            parts.header,
+            context,
             name=f"{main}, episode_{number}",
+            what="step",
+            rest=[f"{n} of episode_{number}" for n in range(steps)],
             outcome=str(ours[number].get("outcome", "")) if ours else "",
         )
     if not ours:
@@ -158,17 +170,20 @@ def _require_stored(main: Path, count: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """Columns of an episode, some with their number of values; "" without pictures."""
+    """Columns of an episode, those of the action and the state with their number of values.
+
+    `picture` is "" without pictures, and `infos` empty in a dataset of others.
+    """
 
     header: EpisodeHeader
     action: Sequence[tuple[str, int]]
     state: Sequence[tuple[str, int]]
     picture: str
     is_jpeg: bool
-    infos: Sequence[str] = ()  # Of our own; () in a dataset of others.
+    infos: Sequence[str] = ()
 
     def columns(self, file: Any, number: int) -> dict[str, Any]:
-        """Return the columns by name; those of rewards may be missing."""
+        """Return the columns by name; the rewards of others may be missing."""
         group = f"episode_{number}"
         names = [_TERMINATED, _TRUNCATED, *(name for name, _ in (*self.action, *self.state))]
         names += [*self.infos, *([self.picture] if self.picture else [])]
@@ -176,14 +191,14 @@ class _Parts:
             names.append(_REWARD)
         return {name: column(file, f"{group}/{name}") for name in names}
 
-    def require_whole(self, file: Any, number: int, context: ImportContext) -> int:
-        """Refuse an episode whose columns have different lengths; return the number of steps."""
+    def count_steps(self, file: Any, number: int, context: ImportContext) -> int:
+        """Return the number of steps; refuse an episode whose columns have different lengths."""
         columns = self.columns(file, number)
         ends = columns[_TERMINATED]
         steps = int(ends.shape[0])
         if _REWARD not in columns:
             context.warn(f"{Path(file.filename).name} has no rewards: the steps have none.")
-        observed = {self.picture, *(name for name, _ in self.state)} - {JPEG}
+        observed = {self.picture, *(name for name, _ in self.state)} - {_JPEG}
         for name, found in columns.items():
             have = found.shape[0]
             if name in observed and have not in {steps, steps + 1}:
@@ -200,28 +215,32 @@ class _Parts:
 
 
 def _own(file: Any, number: int, plain: dict[str, Any]) -> _Parts:
-    """Return where the parts of an episode are that Shapechanger exported."""
+    """Return the parts of an episode that Shapechanger exported."""
     header = EpisodeHeader.from_json(plain)
     infos = names_in(file, f"episode_{number}", "infos")
     pictured = "frame" in infos
-    both = pictured and header.state_layout
-    state, picture = (name_in("minari", f) if both else OBSERVATIONS for f in ("state", "frame"))
+    state, picture = _observed(pictured, bool(header.state_layout))
     return _Parts(
         header=header,
         action=[(_ACTION, header.action_size)],
         state=[(state, header.state_size)] if header.state_layout else [],
-        picture=(JPEG if "jpeg" in infos else picture) if pictured else "",
+        picture=(_JPEG if "jpeg" in infos else picture) if pictured else "",
         is_jpeg=True,
-        infos=(*_INFOS, FRAME) if pictured else _INFOS,
+        infos=(*_INFOS, _FRAME) if pictured else _INFOS,
     )
+
+
+def _observed(picture: bool, state: bool) -> tuple[str, str]:
+    """Return the columns of the state and of the picture in an own dataset."""
+    return (_STATE, _PICTURE) if picture and state else (_OBSERVATIONS, _OBSERVATIONS)
 
 
 def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportContext) -> _Parts:
-    """Return where the parts of the episodes of a dataset of others are."""
+    """Return the parts of the episodes of a dataset of others."""
     observed, acted = (
         _leaves_in(metadata, f"{of}_space", path) for of in ("observation", "action")
     )
-    pictured = {name: space for name, space in observed.items() if _picture_size(space)}
+    pictured = {name: size for name, space in observed.items() if (size := _picture_size(space))}
     if len(pictured) > 1:
         raise DemosError(
             f"An observation in {main} has {len(pictured)} pictures ({', '.join(pictured)}), but "
@@ -236,11 +255,16 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
     known = isinstance(hz, int | float) and math.isfinite(hz) and hz > 0.0
     if not known:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-    camera = next(iter(pictured.values()), None)
+    camera = next(iter(pictured), None)
+    layouts = (
+        as_json([f for name, space in leaves.items() for f in _features(name, space, what)])
+        for leaves, what in ((acted, "action"), (sensed, "observation"))
+    )
+    action_layout, state_layout = layouts
     header = EpisodeHeader(
-        action_layout=_layout_of(acted, "action").to_json(),
-        state_layout=_layout_of(sensed, "observation").to_json() if sensed else "",
-        image_size=None if camera is None else _picture_size(camera),
+        action_layout=action_layout,
+        state_layout=state_layout,
+        image_size=None if camera is None else pictured[camera],
         control_hz=float(cast("float", hz)) if known else DEFAULT_HZ,
         clock="none",
         source="minari",
@@ -248,72 +272,53 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
     )
 
     def places(leaves: dict[str, spaces.Space[Any]], part: str) -> list[tuple[str, int]]:
-        return [
-            (f"{part}/{name}" if name else part, max(1, math.prod(space.shape or ())))
-            for name, space in leaves.items()
-        ]
+        sizes = {name: max(1, math.prod(space.shape or ())) for name, space in leaves.items()}
+        return [(f"{part}/{name}" if name else part, size) for name, size in sizes.items()]
 
+    as_jpeg = metadata.get("jpeg_encoding", True)
     return _Parts(
         header=header,
         action=places(acted, _ACTION),
-        state=places(sensed, OBSERVATIONS),
-        picture=next((name for name, _ in places(pictured, OBSERVATIONS)), ""),
-        is_jpeg=bool(metadata.get("jpeg_encoding", True))
-        and camera is not None
-        and stored_as_jpeg(camera),
+        state=places(sensed, _OBSERVATIONS),
+        picture="" if camera is None else f"{_OBSERVATIONS}/{camera}".rstrip("/"),
+        is_jpeg=camera is not None and bool(as_jpeg) and _stored_as_jpeg(observed[camera]),
     )
 
 
-def _rows(
-    main: Path, number: int, steps: int, parts: _Parts, context: ImportContext
-) -> Iterator[ExchangeStep]:
-    """Yield the steps of an episode; those that cannot be read are left out."""
-    pictures = Pictures(parts.header.image_size)
-    group, done = f"episode_{number}", 0
-    read, shown, jpeg, fault = -1, -1, b"", ""
-
-    def leave_out(error: DemosError, left: range) -> None:
-        why = str(error).removesuffix(".")
-        for step in left:
-            context.leave_out("step", f"that cannot be read ({why})", f"{step} of {group}")
-
-    try:
-        with open_hdf5(main) as file:
-            columns = parts.columns(file, number)
-            cut_off = bool(parts.infos) and bool(column(file, f"{group}/{CUT_OFF}", 1)[0])
-            count = chunk_of(columns.values(), _CHUNK)
-            for start in range(0, steps, count):
-                part = slice(start, min(start + count, steps))
-                chunk = {name: values[part] for name, values in columns.items()}
-                actions = _flat(chunk, parts.action, main)
-                states = _flat(chunk, parts.state, main)
-                for place in range(part.stop - start):
-                    at = {name: values[place] for name, values in chunk.items()}
-                    done = start + place + 1
-                    frame = int(at[FRAME]) if FRAME in at else done if parts.picture else shown
-                    try:
-                        if frame not in {read, shown}:
-                            read, jpeg, fault = frame, b"", ""
-                            try:
-                                jpeg = _picture(at[parts.picture], parts, pictures)
-                            except DemosError as error:
-                                fault = str(error)
-                        if frame == read and fault:  # Several steps may share it.
-                            raise DemosError(fault)
-                        action = tuple(actions[place].tolist())
-                        if not np.isfinite(action).all():
-                            raise DemosError("The action is not finite.")
-                        row = _step(at, action, tuple(states[place].tolist()))
-                    except DemosError as error:
-                        leave_out(error, range(done - 1, done))
-                        continue
-                    if cut_off and done == steps:
-                        row = replace(row, step=msgspec.structs.replace(row.step, truncated=False))
-                    if frame != shown:
-                        row, shown = replace(row, jpeg=jpeg), frame
-                    yield row
-    except DemosError as error:
-        leave_out(error, range(done, steps))
+def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Record]:
+    """Yield the records of an episode."""
+    group, size = f"episode_{number}", parts.header.image_size
+    with open_hdf5(main) as file:
+        columns = parts.columns(file, number)
+        cut_off = bool(parts.infos) and bool(column(file, f"{group}/{_CUT_OFF}", 1)[0])
+        count = chunk_of(columns.values(), _CHUNK)
+        for start in range(0, steps, count):
+            part = slice(start, min(start + count, steps))
+            chunk = {name: values[part] for name, values in columns.items()}
+            actions, states = (_flat(chunk, places, main) for places in (parts.action, parts.state))
+            for place, step in enumerate(range(part.start, part.stop)):
+                at = {name: values[place] for name, values in chunk.items()}
+                reward = float(at[_REWARD]) if _REWARD in at else math.nan
+                record = Record(
+                    name=f"{step} of {group}",
+                    step=Step(
+                        action=tuple(actions[place].tolist()),
+                        driver="expert",
+                        state=tuple(states[place].tolist()),
+                        reward=None if math.isnan(reward) else reward,
+                        terminated=bool(at[_TERMINATED]),
+                        truncated=bool(at[_TRUNCATED]) and not (cut_off and step == steps - 1),
+                    ),
+                )
+                if parts.picture:
+                    record.frame = int(at[_FRAME]) if _FRAME in at else step
+                    stored = at[parts.picture]
+                    record.picture = bytes(stored) if parts.is_jpeg else _pixels(stored, size)
+                    if record.picture is None:
+                        record.fault = "whose picture does not fit its space"
+                if parts.infos:
+                    _add_infos(record, at, reward)
+                yield record
 
 
 def _flat(
@@ -335,52 +340,36 @@ def _flat(
     return np.concatenate(flat, axis=1)
 
 
-def _picture(stored: Any, parts: _Parts, pictures: Pictures) -> bytes:
-    """Return a picture as JPEG."""
-    if parts.is_jpeg:
-        pictures.check(bytes(stored), "in the file")
-        return bytes(stored)
+def _pixels(stored: Any, size: tuple[int, int] | None) -> NDArray[np.uint8] | None:
+    """Return a picture with its three colours last; None if it has another size or type."""
     pixels = np.asarray(stored)
     if pixels.ndim == 2:
         pixels = pixels[..., None]
     elif pixels.ndim == 3 and _colours_first(pixels.shape):
         pixels = np.moveaxis(pixels, 0, -1)
-    size = parts.header.image_size
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[1::-1] != size:
-        raise DemosError("The picture does not fit its space.")
-    return encode_picture(np.repeat(pixels, 3, -1) if pixels.shape[-1] == 1 else pixels)
+        return None
+    return np.repeat(pixels, 3, -1) if pixels.shape[-1] == 1 else pixels
 
 
-def _step(at: dict[str, Any], action: tuple[float, ...], state: tuple[float, ...]) -> ExchangeStep:
-    """Return a step, without its picture; the infos of others are not known."""
-    reward = float(at[_REWARD]) if _REWARD in at else math.nan
-    fields: dict[str, Any] = {
-        "driver": "expert",
-        "reward": None if math.isnan(reward) else reward,
-        "terminated": bool(at[_TERMINATED]),
-        "truncated": bool(at[_TRUNCATED]),
-    }
-    marks, dropped = (), None
-    if _MORE in at:
-        try:
-            more = json.loads(at[_MORE])
-            fields["driver"] = at[_DRIVER].decode()
-            times = {name: int(at[f"infos/{name}"]) for name in _TIMES}
-            fields |= {name: ns for name, ns in times.items() if ns != UNKNOWN_NS}
-            for name in ("applied", "wanted"):
-                if at[f"infos/has_{name}"]:
-                    fields[name] = tuple(at[f"infos/{name}"].tolist())
-            fields["reward"] = reward if at["infos/rewarded"] else None
-            fields["terms"] = {name: float(v) for name, v in more.get("terms", {}).items()}
-            fields["stop_reason"] = str(more.get("stop_reason", at[_STOP].decode()))
-            marks = tuple(map(str, more.get("marks", ())))
-            dropped = None if more.get("dropped") is None else str(more["dropped"])
-        except (ValueError, TypeError, AttributeError, LookupError) as error:
-            raise DemosError(f"The infos cannot be read: {error}.") from error
-    if fields["driver"] not in DRIVERS:
-        raise DemosError(str(UnknownName("driver", fields["driver"], DRIVERS)))
-    step = Step(action=action, state=state, **fields)
-    return ExchangeStep(step=step, jpeg=None, marks=marks, dropped=dropped)
+def _add_infos(record: Record, at: Mapping[str, Any], reward: float) -> None:
+    """Complete a record of an own dataset; it has a fault if its infos cannot be read."""
+    try:
+        more = json.loads(at[_MORE])
+        fields: dict[str, Any] = {"driver": at[_DRIVER].decode()}
+        times = {name: int(at[f"infos/{name}"]) for name in _TIMES}
+        fields |= {name: ns for name, ns in times.items() if ns != _UNKNOWN_NS}
+        for name in ("applied", "wanted"):
+            if at[f"infos/has_{name}"]:
+                fields[name] = tuple(at[f"infos/{name}"].tolist())
+        fields["reward"] = reward if at["infos/rewarded"] else None
+        fields["terms"] = {name: float(v) for name, v in more.get("terms", {}).items()}
+        fields["stop_reason"] = str(more.get("stop_reason", at[_STOP].decode()))
+        record.step = replace(record.step, **fields)
+        record.marks = tuple(map(str, more.get("marks", ())))
+        record.dropped = None if more.get("dropped") is None else str(more["dropped"])
+    except (ValueError, TypeError, AttributeError, LookupError) as error:
+        record.fault = f"whose infos cannot be read ({error})"
 
 
 def _leaves_in(metadata: dict[str, Any], name: str, path: Path) -> dict[str, spaces.Space[Any]]:
@@ -442,35 +431,26 @@ def _is_imported(name: str, space: spaces.Space[Any], context: ImportContext) ->
     return False
 
 
-def _layout_of(leaves: dict[str, spaces.Space[Any]], what: str) -> Layout:
-    """Return a layout for the values of leaves, of an "action" or "observation", in order."""
-    features: list[Feature] = []
-    for name, space in leaves.items():
-        match space:
-            case spaces.Box():
-                low, high = space.low, space.high
-            case spaces.Discrete():
-                low, high = space.start, space.start + space.n - 1
-            case spaces.MultiDiscrete():
-                low, high = space.start, space.start + space.nvec - 1
-            case spaces.MultiBinary():
-                low, high = np.zeros(space.shape), np.ones(space.shape)
-            case _:
-                raise DemosError(
-                    f"The {what} has {name or 'a space'!r} of the type {type(space).__name__}, "
-                    "which cannot be imported: use Box, Discrete, MultiDiscrete or MultiBinary."
-                )
-        lows, highs = (np.ravel(np.asarray(end, np.float64)).tolist() for end in (low, high))
-        if not lows:
-            raise DemosError(f"The {what} has {name or 'a space'!r} without any values.")
-        if len(lows) > MAX_FEATURES:
-            shape = (len(lows),)
-            features.append(Feature(name or what, UNIT_UNKNOWN, min(lows), max(highs), shape=shape))
-            continue
-        for number, (least, most) in enumerate(zip(lows, highs, strict=True)):
-            numbered = (name or what) + ("" if len(lows) == 1 else f"/{number}")
-            features.append(Feature(numbered, UNIT_UNKNOWN, least, most))
-    return Layout(tuple(features))
+def _features(name: str, space: spaces.Space[Any], what: str) -> list[Feature]:
+    """Return the features of the values of a leaf, of an "action" or "observation"."""
+    match space:
+        case spaces.Box():
+            low, high = space.low, space.high
+        case spaces.Discrete():
+            low, high = space.start, space.start + space.n - 1
+        case spaces.MultiDiscrete():
+            low, high = space.start, space.start + space.nvec - 1
+        case spaces.MultiBinary():
+            low, high = np.zeros(space.shape), np.ones(space.shape)
+        case _:
+            raise DemosError(
+                f"The {what} has {name or 'a space'!r} of the type {type(space).__name__}, "
+                "which cannot be imported: use Box, Discrete, MultiDiscrete or MultiBinary."
+            )
+    lows, highs = (np.ravel(np.asarray(end, np.float64)).tolist() for end in (low, high))
+    if not lows:
+        raise DemosError(f"The {what} has {name or 'a space'!r} without any values.")
+    return features_of(name or what, len(lows), low=lows, high=highs)
 
 
 def _picture_size(space: spaces.Space[Any]) -> tuple[int, int] | None:
@@ -496,13 +476,227 @@ def _colours_first(shape: tuple[int, ...]) -> bool:
     return shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 
+def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
+    """Write episodes into an existing folder, as one dataset, and return the number of steps.
+
+    Neither Minari's own folder nor the network is used. The name of the dataset, `context.out`,
+    ends in a version.
+    """
+    name = context.out.name
+    if not _NAME.fullmatch(name):
+        better = re.sub(r"[^\w-]+", "-", name).strip("-") or "drive"
+        raise DemosError(
+            f"Minari loads a dataset by its name, which must end in a version: call it "
+            f"{context.out.with_name(f'{better}-v0')}, not {context.out}."
+        )
+    h5py = library("h5py")
+    storages = library("minari.dataset.minari_storage")
+    require_alike(episodes, "Minari")
+    header = episodes[0].header
+    rows = [iter(episode.rows) for episode in episodes]
+    first = next(rows[0])
+    rows[0] = chain((first,), rows[0])
+    space, picture = _space(header, first, episodes[0].name)
+    storage = storages.MinariStorage.new(
+        (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
+        observation_space=space,
+        action_space=_box(header.action_layout),
+        data_format="hdf5",
+    )
+    total, drivers = 0, set[str]()
+    with h5py.File(folder / _DATA / _MAIN, "a", track_order=True) as file:
+        for number, episode in enumerate(episodes):
+            group = file.create_group(f"episode_{number}")
+            steps = _write_episode(group, episode, rows[number], picture)
+            drivers.update(step.driver for step in steps)
+            group.attrs["id"] = number
+            group.attrs["total_steps"] = len(steps)
+            if episode.header.seed is not None:
+                group.attrs["seed"] = episode.header.seed
+            total += len(steps)
+    storage.update_metadata(
+        _metadata(name, episodes, drivers)
+        | {
+            "total_episodes": len(episodes),
+            "total_steps": total,
+            "dataset_size": storage.get_size(),
+        }
+    )
+    return total
+
+
+def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str]) -> dict[str, Any]:
+    header = episodes[0].header
+    plain = header.to_json()
+    own = [e.header.to_json() | {"outcome": e.outcome} for e in episodes]
+    found: dict[str, Any] = {
+        "dataset_id": name,
+        "minari_version": version("minari"),
+        "algorithm_name": ", ".join(sorted(drivers)),
+        "description": (
+            "Episodes recorded by Shapechanger, and exported without a change: pictures are JPEG "
+            "as recorded, numbers have 64 bits, the last observation of an episode is there twice."
+        ),
+        "action_layout": plain["action_layout"],
+        "observation_layout": plain["state_layout"],
+        "control_hz": header.control_hz,
+        _OURS: {"format": 1, "episodes": own},
+    }
+    envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
+    if header.env in gym.registry and all(env == envs[0] for env in envs):
+        spec = copy.deepcopy(gym.spec(header.env))  # For Minari's `recover_environment`.
+        spec.kwargs.update(header.env_kwargs)
+        found["env_spec"] = spec.to_json()
+    if people := {episode.header.driver for episode in episodes if episode.header.driver}:
+        found["author"] = people
+    return found
+
+
+def _box(layout: str) -> spaces.Box:
+    """Return the space of the values of a layout, in 64 bits, so that nothing is rounded."""
+    named = Layout.from_json(layout)
+    return spaces.Box(named.low, named.high, dtype=np.float64)
+
+
+def _space(
+    header: EpisodeHeader, first: ExchangeStep, name: str
+) -> tuple[spaces.Space[Any], spaces.Box | None]:
+    """Return the space of all observations by the first step, and its part of the pictures."""
+    state = _box(header.state_layout) if header.state_layout else None
+    picture = None
+    if first.jpeg is not None or header.image_size is not None:
+        where = f"of the first step of {name}"
+        jpeg = first.jpeg or b""
+        width, height = header.image_size or picture_size(jpeg, where)
+        grey = bool(jpeg) and is_grey(jpeg, where)
+        shape = (height, width) if grey else (height, width, 3)
+        picture = spaces.Box(0, _BRIGHTEST, shape, np.uint8)
+    if picture is not None and state is not None:
+        return spaces.Dict({"image": picture, "state": state}), picture
+    if picture is None and state is None:
+        raise DemosError(
+            f"{name} has neither pictures nor a state, so it has no observations for Minari: "
+            "export it to csv."
+        )
+    return cast("spaces.Space[Any]", state if picture is None else picture), picture
+
+
+def _stored_as_jpeg(space: spaces.Space[Any]) -> bool:
+    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
+    box = cast("Any", space)
+    return (
+        isinstance(space, spaces.Box)
+        and len(box.shape) in {2, 3}
+        and min(box.shape[:2]) >= _MIN_JPEG
+        and box.dtype == np.uint8
+        and bool(np.all(box.low == 0) and np.all(box.high == _BRIGHTEST))
+    )
+
+
+def _write_episode(
+    group: Any, episode: ExchangeEpisode, rows: Iterable[ExchangeStep], picture: spaces.Box | None
+) -> list[Step]:
+    """Write the columns of an episode to its group, and return its steps.
+
+    The last observation is repeated. An episode without an end is truncated at its last step: a
+    learner must not take the next episode for its continuation.
+    """
+    header, steps, more, frames = episode.header, list[Step](), list[str](), list[int]()
+    state_at, picture_at = _observed(picture is not None, bool(header.state_layout))
+    size, grey = None, False
+    observed: list[Any] = []  # The columns of the pictures; the last one is that of Minari.
+    if picture is not None:
+        size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
+        as_jpeg = _stored_as_jpeg(picture)
+        blob = library("h5py").vlen_dtype(np.uint8)
+        observed.append(_empty(group, picture_at if as_jpeg else _JPEG, (), blob))
+        if not as_jpeg:
+            observed.append(_empty(group, picture_at, picture.shape, np.uint8))
+    frame, shown = -1, np.empty(0)
+    for row, jpeg, pixels in decoded_steps(rows, size, episode.name, "Minari"):
+        if pixels is not None:
+            frame, shown = frame + 1, pixels[..., 0] if grey else pixels
+            where = f"of step {len(steps)} of {episode.name}"
+            if is_grey(jpeg, where) != grey:
+                kind = "coloured" if grey else "grey"
+                raise DemosError(
+                    f"The picture {where} is {kind}, and the first one is not: a Minari dataset "
+                    "has pictures of one kind."
+                )
+        for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
+            _append(at, value)
+        steps.append(row.step)
+        more.append(_more(row))
+        frames.append(frame)
+
+    def write(name: str, values: Sequence[Any], dtype: Any) -> None:
+        data = np.array(values, dtype)
+        shape = (None, *data.shape[1:])
+        group.create_dataset(name, data=data, dtype=dtype, maxshape=shape, chunks=True)
+
+    if picture is not None:
+        _append(observed[-1], observed[-1][-1])
+        write(_FRAME, frames, np.int64)
+    if header.state_layout:
+        write(state_at, [*(step.state for step in steps), steps[-1].state], np.float64)
+    write(_ACTION, [step.action for step in steps], np.float64)
+    write(_REWARD, [math.nan if s.reward is None else s.reward for s in steps], np.float64)
+    write("infos/rewarded", [step.reward is not None for step in steps], np.bool_)
+    cut_off = not (steps[-1].terminated or steps[-1].truncated)
+    write(_CUT_OFF, [cut_off], np.bool_)
+    write(_TERMINATED, [step.terminated for step in steps], np.bool_)
+    write(
+        _TRUNCATED,
+        [*(step.truncated for step in steps[:-1]), cut_off or steps[-1].truncated],
+        np.bool_,
+    )
+    unknown = (math.nan,) * header.action_size
+    for field in ("applied", "wanted"):
+        values = [getattr(step, field) for step in steps]
+        write(f"infos/{field}", [unknown if v is None else v for v in values], np.float64)
+        write(f"infos/has_{field}", [value is not None for value in values], np.bool_)
+    for field in _TIMES:
+        times = [getattr(step, field) for step in steps]
+        write(f"infos/{field}", [_UNKNOWN_NS if ns is None else ns for ns in times], np.int64)
+    text = library("h5py").string_dtype("utf-8")
+    write(_DRIVER, [step.driver for step in steps], text)
+    # HDF5 cannot store NUL in a text.
+    write(_STOP, [step.stop_reason.replace("\0", "") for step in steps], text)
+    write(_MORE, more, text)
+    return steps
+
+
+def _empty(group: Any, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+    return group.create_dataset(
+        name, shape=(0, *shape), maxshape=(None, *shape), dtype=dtype, chunks=True
+    )
+
+
+def _append(column: Any, value: Any) -> None:
+    column.resize(len(column) + 1, axis=0)
+    column[-1] = value
+
+
+def _more(row: ExchangeStep) -> str:
+    """Return everything without a column of its own, as JSON, which has no NaN and infinity."""
+    terms = {n: v if math.isfinite(v) else repr(v) for n, v in row.step.terms.items()}
+    more: dict[str, Any] = {"terms": terms} if terms else {}
+    if row.marks:
+        more["marks"] = list(row.marks)
+    if row.dropped is not None:
+        more["dropped"] = row.dropped
+    if "\0" in row.step.stop_reason:
+        more["stop_reason"] = row.step.stop_reason
+    return json.dumps(more)
+
+
 FORMAT: Final = Format(
     name="minari",
     title="Minari",
-    sign=f"{DATA}/{METADATA}",
+    sign=f"{_DATA}/{_METADATA}",
     detect=lambda folder: _data_folder(folder) is not None,
-    read=read_minari,
-    write=write_minari,
+    read=_read,
+    write=_write,
     options=frozenset({"hz", "dropped"}),
     consecutive=True,
 )

@@ -13,7 +13,6 @@ import os
 import re
 import subprocess
 import tempfile
-from collections import Counter
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -25,8 +24,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES, read_file
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ImportContext, counted
-from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture, picture_size
+from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import DemosError, OutputError
 
 _JPEG: Final = b"\xff\xd8"
@@ -43,117 +41,82 @@ class PictureError(DemosError):
         reason: Why, after a noun, such as "with an empty picture".
     """
 
-    def __init__(self, name: object, reason: str) -> None:
-        super().__init__(f"{name} cannot be imported: a record {reason}.")
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"A record {reason} cannot be imported.")
         self.reason = reason
 
 
-class Pictures:
-    """Check of JPEGs that must be intact and of one size.
+def load_jpeg(
+    picture: Path | bytes | NDArray[np.uint8] | None, size: tuple[int, int] | None = None
+) -> tuple[bytes, bool]:
+    """Return an intact picture as JPEG, and whether it was encoded, with quality 100.
 
     Args:
-        size: Width and height in pixels; None to take those of the first picture.
+        picture: A file, or the content of one: JPEG, PNG or BMP; or pixels, shape
+            (height, width, 3).
+        size: Width and height that it must have, pixels; None for any.
 
-    Attributes:
-        size: Width and height in pixels; None before the first picture.
+    Raises:
+        PictureError: If it is missing, damaged, of another kind or size, or too large.
     """
-
-    def __init__(self, size: tuple[int, int] | None = None) -> None:
-        self.size = size
-
-    def check(self, jpeg: bytes, name: str, *, decode: bool = True) -> None:
-        """Refuse a picture that is damaged or of another size.
-
-        Args:
-            jpeg: Its bytes.
-            name: How to name it in errors.
-            decode: Whether to decode it, because others encoded it.
-        """
-        size = picture_size(jpeg, name)
-        self.size = self.size or size
-        if size != self.size:
-            raise DemosError(
-                f"The picture {name} has {size[0]} x {size[1]} pixels, and not "
-                f"{self.size[0]} x {self.size[1]} like the others: a data set has one size."
-            )
-        if decode:
-            decode_picture(jpeg, name)
+    if isinstance(picture, np.ndarray):
+        jpeg, encoded, found = encode_picture(picture), True, picture.shape[1::-1]
+    else:
+        data = _read(picture) if isinstance(picture, Path) else picture or b""
+        if not data.strip(b"\0"):
+            raise PictureError("with an empty picture")
+        if len(data) > MAX_PICTURE_BYTES:
+            raise PictureError(f"with a picture of more than {MAX_PICTURE_BYTES} bytes")
+        encoded = not data.startswith(_JPEG)
+        try:
+            pixels = _pixels(data) if encoded else decode_picture(data, "")
+        except PictureError:
+            raise
+        except DemosError as error:
+            raise PictureError("with a damaged picture") from error
+        jpeg, found = encode_picture(pixels) if encoded else data, pixels.shape[1::-1]
+    if size is not None and found != size:
+        raise PictureError(other_size(found, size))
+    return jpeg, encoded
 
 
-def as_jpeg(data: bytes, name: object) -> bytes:
-    """Return a picture as JPEG; PNG and BMP are encoded with quality 100."""
-    if data.startswith(_JPEG):
-        return data  # Its users decode it.
-    if not data.strip(b"\0"):
-        raise PictureError(name, "with an empty picture")
+def other_size(found: Sequence[int], size: Sequence[int]) -> str:
+    """Return the reason to leave out a picture of another size, each in pixels."""
+    return "with a picture of {} x {} pixels, and not {} x {}".format(*found, *size)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return read_file(path, MAX_PICTURE_BYTES)
+    except FileNotFoundError as error:
+        raise PictureError("with a picture that is missing") from error
+    except OSError as error:
+        reason = f"with a picture that cannot be read ({error.strerror or error})"
+        raise PictureError(reason) from error
+
+
+def _pixels(data: bytes) -> NDArray[np.uint8]:
+    """Decode a PNG or BMP of 8 bits, shape (height, width, 3)."""
     form = next((form for magic, form in _MAGIC.items() if data.startswith(magic)), "")
     if not form:
-        raise PictureError(name, "with a picture that is not JPEG, PNG or BMP")
+        raise PictureError("with a picture that is not JPEG, PNG or BMP")
     image = library("PIL.Image")
     try:
         with image.open(io.BytesIO(data), formats=[form]) as opened:
             if opened.width * opened.height > MAX_PIXELS:
-                raise PictureError(name, f"with a picture of more than {MAX_PIXELS} pixels")
+                raise PictureError(f"with a picture of more than {MAX_PIXELS} pixels")
             if opened.mode.startswith(_DEEP) or (form == "PNG" and data[_PNG_DEPTH] == b"\x10"):
                 raise PictureError(
-                    name,
-                    "with a picture of more than 8 bits a value, like that of a depth camera",
+                    "with a picture of more than 8 bits a value, like that of a depth camera"
                 )
-            if (
-                opened.has_transparency_data
-                and np.asarray(opened.convert("RGBA"))[..., 3].min() < _OPAQUE
-            ):
-                raise PictureError(name, "with a picture that is partly transparent")
-            pixels = np.asarray(opened.convert("RGB"))
+            alpha = opened.convert("RGBA") if opened.has_transparency_data else None
+            if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
+                raise PictureError("with a picture that is partly transparent")
+            return np.asarray(opened.convert("RGB"))
     except PictureError:
         raise
     except Exception as error:  # Pillow's errors have no common base.
-        raise PictureError(name, "with a damaged picture") from error
-    return encode_picture(pixels)
-
-
-def read_picture(path: Path) -> tuple[bytes, bool]:
-    """Read a picture as JPEG."""
-    try:
-        data = read_file(path, MAX_PICTURE_BYTES)
-    except FileNotFoundError as error:
-        raise PictureError(path, "with a picture that is missing") from error
-    except OSError as error:
-        reason = f"with a picture that cannot be read ({error.strerror or error})"
-        raise PictureError(path, reason) from error
-    jpeg = as_jpeg(data, path)
-    return jpeg, jpeg is not data
-
-
-def check_pictures(
-    pictures: Sequence[tuple[Path, str]], what: str, context: ImportContext
-) -> tuple[list[bool], tuple[int, int] | None]:
-    """Decode each picture once, and leave out the records whose pictures are not whole.
-
-    All pictures of a data set have one size, which is the most frequent one.
-    """
-    sizes: list[tuple[int, int] | None] = []
-    encoded = 0
-    for path, name in pictures:
-        try:
-            jpeg, is_new = read_picture(path)
-            if not is_new:
-                decode_picture(jpeg, str(path))
-            encoded += is_new
-            sizes.append(picture_size(jpeg, str(path)))
-        except DemosError as error:
-            reason = error.reason if isinstance(error, PictureError) else "with a damaged picture"
-            context.leave_out(what, reason, name)
-            sizes.append(None)
-    counts = Counter(size for size in sizes if size is not None)
-    common = counts.most_common(1)[0][0] if counts else None
-    for size, (_, name) in zip(sizes, pictures, strict=True):
-        if size is not None and common is not None and size != common:
-            reason = "with a picture of another size than {} x {} pixels".format(*common)
-            context.leave_out(what, reason, name)
-    if encoded:
-        context.note(f"{counted(encoded, 'picture')} encoded as JPEG of quality 100.")
-    return [size is not None and size == common for size in sizes], common
+        raise PictureError("with a damaged picture") from error
 
 
 # Constant quality, 0 to 51; see the measured error in docs/exchange.md.

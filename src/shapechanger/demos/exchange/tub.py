@@ -1,4 +1,4 @@
-"""Donkeycar tubs: import of versions 1 and 2.
+"""Donkeycar tubs: import of versions 1 and 2, export of version 2.
 
 `user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
 Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is what a policy wanted. In
@@ -16,21 +16,33 @@ parts/datastore.py for version 1, at the commits 1e831b81, 38a1c2db and b253cef6
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from datetime import UTC, datetime
 from itertools import groupby, pairwise
 from pathlib import Path, PurePath
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
 import msgspec
+from msgspec.structs import replace
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.exchange.drives import (
+    Record,
+    as_json,
+    choose_camera,
+    episode_of,
+    features_of,
+    iso_time,
+    stretches,
+    with_pictures,
+)
+from shapechanger.demos.exchange.exports import kept_steps
 from shapechanger.demos.exchange.files import (
-    UNIT_UNKNOWN,
     cannot_read,
     is_inside,
     parse_json,
@@ -39,32 +51,31 @@ from shapechanger.demos.exchange.files import (
     read_text,
 )
 from shapechanger.demos.exchange.format import (
+    COMMANDS,
     ExchangeEpisode,
-    ExchangeStep,
+    ExportContext,
     Format,
     ImportContext,
     counted,
     few,
+    name_in,
 )
-from shapechanger.demos.exchange.pictures import check_pictures, read_picture
-from shapechanger.demos.exchange.times import TimedDrive, choose_rates, iso_time, split_at_jumps
-from shapechanger.demos.exchange.tub_export import (
-    ACTIONS,
-    AXES,
-    IMAGE,
-    IMAGES,
-    LOOP_HZ,
-    MANIFEST,
-    MODE,
-    NS_PER_MS,
-    NS_PER_S,
-    PERSON_DRIVES,
-    write,
-)
-from shapechanger.errors import DemosError, UnknownName
-from shapechanger.layout import Feature, Layout
+from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
 
+_ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
+_AXES: Final = ("angle", "throttle")
+_USER, _PILOT = ([f"{who}/{axis}" for axis in _AXES] for who in ("user", "pilot"))
+_IMAGE, _MODE = name_in("tub", "frame"), name_in("tub", "driver")
+_MANIFEST: Final = "manifest.json"
+_IMAGES: Final = "images"
+_LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
+_NS_PER_MS: Final = 1_000_000
+_NS_PER_S: Final = 1_000_000_000
+_PERSON_DRIVES: Final = "user"
+_POLICY_DRIVES: Final = "local"
 _POLICY_STEERS: Final = "local_angle"
+_CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
 _V1_TIME: Final = "milliseconds"
 _MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
 _MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two times.
@@ -82,22 +93,20 @@ _Fields = dict[str, Any]
 _T = TypeVar("_T", int, str)
 
 
-class _Record(NamedTuple):
-    """A record with its `_index` or the number of its file; its time and picture if known."""
+class _Line(NamedTuple):
+    """The fields of a record, its `_index` or the number of its file, and its time and session."""
 
     fields: _Fields
     number: int
     time_ns: int | None
     session: str = ""
-    step: Step | None = None
-    path: Path | None = None
 
 
 class _Tub(NamedTuple):
     """The records of a tub that were not deleted, and its declarations."""
 
     inputs: dict[str, str]
-    records: list[_Record]
+    lines: list[_Line]
     deleted: int
     images: Path
     start_ns: int | None
@@ -107,78 +116,51 @@ class _Tub(NamedTuple):
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
-    tub = (_read_v2 if (folder / MANIFEST).is_file() else _read_v1)(folder, context)
+    tub = (_read_v2 if (folder / _MANIFEST).is_file() else _read_v1)(folder, context)
     if tub.deleted:
         context.note(f"{counted(tub.deleted, 'record')} deleted in the tub, and not imported.")
-    if not tub.records:
-        return
     columns: dict[str, str] = {}  # The type of each that a record has, declared or by its values.
-    for record in tub.records:
-        for name, value in record.fields.items():
+    for line in tub.lines:
+        for name, value in line.fields.items():
             if not name.startswith("_") and name != _V1_TIME and columns.get(name) not in _KNOWN:
                 declared = tub.inputs.get(name, "")
                 columns[name] = declared if declared in _KNOWN else _kind_of(value)
-    camera = _camera(columns, folder, context)
+    camera = _camera(columns, folder, context) if tub.lines else ""
     sensed = [
         name
         for name, kind in (tub.inputs or columns).items()
         if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
     ]
-    state = Layout(tuple(Feature(name, UNIT_UNKNOWN) for name in sensed)) if sensed else None
-    taken = {
-        camera,
-        MODE,
-        *sensed,
-        *(f"{who}/{axis}" for who in ("user", "pilot") for axis in AXES),
-    }
+    taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
     if left := [f"{name} ({kind})" for name, kind in columns.items() if name and name not in taken]:
         context.note(f"Columns that are not imported: {', '.join(left)}.")
-    records, size = [record for r in tub.records if (record := _driven(r, sensed, context))], None
+    records = [_record(line, sensed, context) for line in tub.lines]
     if camera:
-        records, size = _with_pictures(records, tub.images, camera, context)
-    if not records:
-        return
-    parts = list(_drives(records, restarts=not tub.is_unix))
-    times = [_times_ns(part, context) for part in parts]
-    numbers = [[record.number for record in part] for part in parts]
-    drives = [
-        TimedDrive(known, part, f"record {part[0]}")
-        for known, part in zip(times, numbers, strict=True)
-    ]
-    rates, believed = choose_rates(drives, context, tub.stated_hz)
-    if not believed:
-        drives = [replace(drive, times_ns=()) for drive in drives]
-    places = split_at_jumps(drives, [list(map(str, part)) for part in numbers], rates, context)
-    for part, known, hz, split in zip(parts, times, rates, places, strict=True):
-        timed = bool(known) and believed
-        for place in split:
-            began_ns = known[place][0] if timed and tub.is_unix else tub.start_ns
-            header = EpisodeHeader(
-                action_layout=ACTIONS.to_json(),
-                state_layout="" if state is None else state.to_json(),
-                image_size=size,
-                control_hz=hz,
-                body="car",
-                clock="real" if timed else "none",
-                source="tub",
-                notes={"session": part[0].session} if part[0].session else {},
-                created=iso_time(began_ns) if began_ns and (timed or not known) else "",
-            )
-            yield ExchangeEpisode(
-                header=header,
-                rows=_steps(part[place], timed=timed, is_unix=tub.is_unix),
-                name=f"{folder}, from record {part[place][0].number}",
-            )
-
-
-def _steps(records: Sequence[_Record], *, timed: bool, is_unix: bool) -> Iterator[ExchangeStep]:
-    for record in records:
-        at_ns = record.time_ns if timed else None
-        wall_ns = at_ns if is_unix else None
-        step = msgspec.structs.replace(
-            cast("Step", record.step), captured_ns=at_ns, wall_ns=wall_ns
+        _find_pictures(records, tub, camera, context)
+    records, size = with_pictures(records, "record", context)
+    sessions = {line.number: line.session for line in tub.lines}
+    parts = list(_parts(records, sessions, restarts=not tub.is_unix))
+    for part, hz, has_times, timed in stretches(parts, "record", context, tub.stated_hz):
+        began_ns = tub.start_ns
+        for record in part:
+            at_ns = record.step.captured_ns
+            record.step = replace(record.step, wall_ns=at_ns if tub.is_unix else None)
+        if timed and tub.is_unix:
+            began_ns = part[0].step.captured_ns
+        session = sessions[part[0].number]
+        header = EpisodeHeader(
+            action_layout=_ACTIONS.to_json(),
+            state_layout=as_json([f for name in sensed for f in features_of(name, 1)]),
+            image_size=size,
+            control_hz=hz,
+            body="car",
+            clock="real" if timed else "none",
+            source="tub",
+            notes={"session": session} if session else {},
+            created=iso_time(began_ns) if began_ns and (timed or not has_times) else "",
         )
-        yield ExchangeStep(step=step, jpeg=read_picture(record.path)[0] if record.path else None)
+        name = f"{folder}, from record {part[0].name}"
+        yield episode_of(part, header, context, name=name, what="record")
 
 
 def _kind_of(value: Any) -> str:
@@ -193,56 +175,50 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
     """Return the column of the pictures; "" without pictures."""
     cameras = [name for name, kind in columns.items() if kind in _PICTURES]
     deep = [name for name, kind in columns.items() if kind == _DEPTH]
-    if context.camera:
-        if context.camera not in cameras:
-            raise UnknownName(f"camera of {folder}", context.camera, cameras)
-        return context.camera
-    if not cameras and deep:
+    if deep and not cameras and not context.camera:
         context.warn(
             f"The steps have no pictures, because those of {few(deep)} have 16 bits, as of depth, "
             "and only pictures of 8 bits can be imported."
         )
-    if len(cameras) > 1 and IMAGE not in cameras:
-        raise DemosError(
-            f"{folder} has {len(cameras)} cameras ({', '.join(cameras)}), but an episode has one: "
-            f"choose with --camera, such as --camera {cameras[0]}."
-        )
-    if len(cameras) == 1 and cameras[0] != IMAGE:
-        context.note(f"The pictures are those of the column {cameras[0]}.")
-    return IMAGE if IMAGE in cameras else "".join(cameras)
+    if _IMAGE in cameras and not context.camera:
+        return _IMAGE
+    camera = choose_camera(folder, cameras, context)
+    if camera not in {_IMAGE, context.camera}:
+        context.note(f"The pictures are those of the column {camera}.")
+    return camera
 
 
-def _driven(record: _Record, sensed: Sequence[str], context: ImportContext) -> _Record | None:
-    """Return a record with its step; None, with a finding, if it has no valid action."""
-    mode = record.fields.get(MODE, PERSON_DRIVES)
-    by_person = mode == PERSON_DRIVES
-    actors = ("user" if by_person else "pilot",) * 2
+def _record(line: _Line, sensed: Sequence[str], context: ImportContext) -> Record:
+    """Return a record; it has a fault if it has no valid action."""
+    mode = line.fields.get(_MODE, _PERSON_DRIVES)
+    by_person = mode == _PERSON_DRIVES
+    names = _USER if by_person else _PILOT
     if mode == _POLICY_STEERS:
-        actors = ("pilot", "user")
-    names = [f"{actor}/{axis}" for actor, axis in zip(actors, AXES, strict=True)]
-    lacking = [name for name in names if record.fields.get(name) is None]
-    action = _pair(record, names)
-    if lacking or action is None:
-        reason = f"with {' or '.join(names)} that is not a number from -1 to 1"
-        if lacking:
-            driver = "" if by_person else ", although a pilot drove"
-            reason = f"without {' and '.join(lacking)}{driver}"
-        context.leave_out("record", reason, record.number)
-        return None
-    wanted, suggested = None, [f"pilot/{axis}" for axis in AXES]
-    if by_person:
-        wanted = _pair(record, suggested)
-        if wanted is None and None not in map(record.fields.get, suggested):
+        names = [_PILOT[0], _USER[1]]
+    action, wanted, fault = _pair(line, names), None, ""
+    if lacking := [name for name in names if line.fields.get(name) is None]:
+        driver = "" if by_person else ", although a pilot drove"
+        fault = f"without {' and '.join(lacking)}{driver}"
+    elif action is None:
+        fault = f"with {' or '.join(names)} that is not a number from -1 to 1"
+    elif by_person:
+        wanted = _pair(line, _PILOT)
+        if wanted is None and None not in map(line.fields.get, _PILOT):
             reason = "of the pilot that is not a number from -1 to 1, while a person drove"
-            context.leave_out("suggestion", reason, record.number)
-    state = tuple(_sensed(record.fields.get(name)) for name in sensed)
-    driver = "person" if by_person else "policy"
-    return record._replace(step=Step(action=action, driver=driver, wanted=wanted, state=state))
+            context.leave_out("suggestion", reason, line.number)
+    step = Step(
+        action=action or (0.0, 0.0),
+        driver="person" if by_person else "policy",
+        wanted=wanted,
+        state=tuple(_sensed(line.fields.get(name)) for name in sensed),
+        captured_ns=line.time_ns,
+    )
+    return Record(name=str(line.number), number=line.number, step=step, fault=fault)
 
 
-def _pair(record: _Record, names: Sequence[str]) -> tuple[float, float] | None:
+def _pair(line: _Line, names: Sequence[str]) -> tuple[float, float] | None:
     """Return two numbers from -1 to 1; None for anything else."""
-    values: list[Any] = [record.fields.get(name) for name in names]
+    values: list[Any] = [line.fields.get(name) for name in names]
     if all(type(value) in {int, float} and abs(value) <= 1.0 for value in values):
         return float(values[0]), float(values[1])
     return None
@@ -256,61 +232,51 @@ def _sensed(value: Any) -> float:
         return math.nan
 
 
-def _with_pictures(
-    records: Sequence[_Record], images: Path, camera: str, context: ImportContext
-) -> tuple[list[_Record], tuple[int, int] | None]:
-    """Return the records whose pictures can be imported, and the size of these."""
-    shown = Counter(str(record.fields.get(camera)) for record in records)
-    found: list[_Record] = []
+def _find_pictures(
+    records: Sequence[Record], tub: _Tub, camera: str, context: ImportContext
+) -> None:
+    """Give each record its picture; it has a fault if it has none of its own."""
+    names = [line.fields.get(camera) for line in tub.lines]
+    good = [name for name, record in zip(names, records, strict=True) if not record.fault]
+    shown = Counter(map(str, good))
     offsets: dict[int, int] = {}
-    for record in records:
-        number, name = record.number, record.fields.get(camera)
+    for name, record in zip(names, records, strict=True):
+        if record.fault:
+            continue
         if not name or not isinstance(name, str):
-            context.leave_out("record", "without a picture", number)
+            record.fault = "without a picture"
             continue
         # Version 1 writes whole paths of the robot for the type "image".
         place = PurePath(name).name if PurePath(name).is_absolute() else name
-        if not is_inside(images, place):
-            context.leave_out("record", "with a picture name that leaves the folder", number)
-        elif shown[name] > 1 and (images / place).is_file():
-            context.leave_out("record", "with the picture of another record", number)
-        else:
-            found.append(record._replace(path=images / place))
-            if (match := _PICTURE_NUMBER.match(name)) and int(match[1]) != number:
-                offsets[number] = int(match[1]) - number
+        record.picture = tub.images / place
+        if not is_inside(tub.images, place):
+            record.fault = "with a picture name that leaves the folder"
+        elif shown[name] > 1 and record.picture.is_file():
+            record.fault = "with the picture of another record"
+        elif (match := _PICTURE_NUMBER.match(name)) and int(match[1]) != record.number:
+            offsets[record.number] = int(match[1]) - record.number
     if offsets:
         context.warn(
             f"{counted(len(offsets), 'record')} with the picture of another number, up to "
             f"{max(map(abs, offsets.values()))} off ({few(list(offsets))}): look whether they "
             "belong together."
         )
-    pictures = [(cast("Path", record.path), str(record.number)) for record in found]
-    good, size = check_pictures(pictures, "record", context)
-    return [record for record, is_good in zip(found, good, strict=True) if is_good], size
 
 
-def _drives(records: Sequence[_Record], *, restarts: bool) -> Iterator[list[_Record]]:
+def _parts(
+    records: Sequence[Record], sessions: Mapping[int, str], *, restarts: bool
+) -> Iterator[list[Record]]:
     """Yield the records of each session, and of each start of the car if times restart with it."""
-    for _, session in groupby(records, key=lambda record: record.session):
-        drive: list[_Record] = []
+    for _, session in groupby(records, key=lambda record: sessions[record.number]):
+        part: list[Record] = []
         for record in session:
-            before_ns, now_ns = drive[-1].time_ns if drive else None, record.time_ns
+            before_ns = part[-1].step.captured_ns if part else None
+            now_ns = record.step.captured_ns
             if restarts and now_ns is not None and before_ns is not None and now_ns < before_ns:
-                yield drive
-                drive = []
-            drive.append(record)
-        yield drive
-
-
-def _times_ns(drive: Sequence[_Record], context: ImportContext) -> list[int]:
-    """Return the time of each record, ns; an empty list if one is unknown."""
-    times = [record.time_ns for record in drive if record.time_ns is not None]
-    if 0 < len(times) < len(drive):
-        context.warn(
-            f"{len(drive) - len(times)} of the {len(drive)} records from {drive[0].number} have no "
-            "valid time: the times of the others are left out."
-        )
-    return times if len(times) == len(drive) else []
+                yield part
+                part = []
+            part.append(record)
+        yield part
 
 
 def _numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, str]:
@@ -323,7 +289,7 @@ def _numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, str]:
 
 
 def _read_v2(folder: Path, context: ImportContext) -> _Tub:
-    path = folder / MANIFEST
+    path = folder / _MANIFEST
     lines = [line.strip(b"\0\r ") for line in read_bytes(path).split(b"\n")]
     inputs, types, metadata, more, catalogs = map(_parsed, (lines + [b""] * 5)[:5])
     if not isinstance(inputs, list) or not isinstance(types, list):
@@ -351,10 +317,10 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
     _report_missing(records, deleted, known.get("current_index"), context)
     return _Tub(
         inputs=_typed(inputs, types, path),
-        records=[record for record in records if record.number not in deleted],
+        lines=[record for record in records if record.number not in deleted],
         deleted=len(deleted & {record.number for record in records}),
-        images=folder / IMAGES,
-        start_ns=_in_ns((_object(more) or {}).get("created_at"), NS_PER_S),
+        images=folder / _IMAGES,
+        start_ns=_in_ns((_object(more) or {}).get("created_at"), _NS_PER_S),
         is_unix=True,
         stated_hz=_stated_hz(metadata),
     )
@@ -384,42 +350,40 @@ def _read_catalog(path: Path, rows: list[tuple[int, _Fields]], context: ImportCo
             context.leave_out("line", reason, f"{path.name}, line {number}")
 
 
-def _with_numbers(rows: Sequence[tuple[int, _Fields]], context: ImportContext) -> list[_Record]:
+def _with_numbers(rows: Sequence[tuple[int, _Fields]], context: ImportContext) -> list[_Line]:
     """Return records in the order of their `_index`, without those whose number is unclear."""
     has_index = any("_index" in fields for _, fields in rows)
-    records: list[_Record] = []
+    records: list[_Line] = []
     for position, fields in rows:
         number = fields.get("_index") if has_index else position
         if type(number) is not int:
             context.leave_out("record", "without a valid _index", f"the one at position {position}")
             continue
         session = fields.get("_session_id")
-        time_ns = _in_ns(fields.get("_timestamp_ms"), NS_PER_MS)
-        records.append(_Record(fields, number, time_ns, "" if session is None else str(session)))
+        time_ns = _in_ns(fields.get("_timestamp_ms"), _NS_PER_MS)
+        records.append(_Line(fields, number, time_ns, "" if session is None else str(session)))
     falls = [(a.number, b.number) for a, b in pairwise(records) if b.number < a.number]
     if falls:
         context.warn(
             f"The _index falls in {counted(len(falls), 'place')}, first from {falls[0][0]} to "
             f"{falls[0][1]}: the records are read in its order."
         )
-    unique: list[_Record] = []
+    unique: list[_Line] = []
     ordered = sorted(records, key=lambda record: record.number)
     for number, group in groupby(ordered, key=lambda record: record.number):
         first, *others = group
-        same = sum(record.fields == first.fields for record in others)
-        for _ in range(same):
+        odd = [record for record in others if record.fields != first.fields]
+        for _ in others[len(odd) :]:
             context.leave_out("record", "that repeats another", number)
-        if same == len(others):
-            unique.append(first)
-            continue
         # Of those with one number and different content, nothing says which one counts.
-        for _ in range(1 + len(others) - same):
+        for _ in (first, *odd) if odd else ():
             context.leave_out("record", "with the _index of another record", number)
+        unique += [] if odd else [first]
     return unique
 
 
 def _report_missing(
-    records: Sequence[_Record], deleted: set[int], count: Any, context: ImportContext
+    records: Sequence[_Line], deleted: set[int], count: Any, context: ImportContext
 ) -> None:
     """Report numbers that the manifest has and no record."""
     numbers = {record.number for record in records}
@@ -449,9 +413,9 @@ def _read_v1(folder: Path, context: ImportContext) -> _Tub:
     if exclude.is_file():
         gone = parse_json(read_text(exclude), str(exclude))
         deleted = set(_list(gone, int, f"numbers in {exclude}"))
-    start_ns = _in_ns(meta.get("start"), NS_PER_S)
+    start_ns = _in_ns(meta.get("start"), _NS_PER_S)
     names = _numbered(folder, _RECORD_NAME)
-    records: list[_Record] = []
+    records: list[_Line] = []
     for number in sorted(names.keys() - deleted):
         record_path = folder / names[number]
         if not is_inside(folder, names[number]):
@@ -459,12 +423,12 @@ def _read_v1(folder: Path, context: ImportContext) -> _Tub:
         if (fields := _object(_parsed(read_bytes(record_path)))) is None:
             context.leave_out("record", _DAMAGED, number)
             continue
-        time_ns = _in_ns(fields.get(_V1_TIME), NS_PER_MS)
+        time_ns = _in_ns(fields.get(_V1_TIME), _NS_PER_MS)
         time_ns = None if time_ns is None else time_ns + (start_ns or 0)
-        records.append(_Record(fields, number, time_ns))
+        records.append(_Line(fields, number, time_ns))
     return _Tub(
         inputs=_typed(meta.get("inputs", []), meta.get("types", []), path),
-        records=records,
+        lines=records,
         deleted=len(deleted & names.keys()),
         images=folder,
         start_ns=start_ns,
@@ -501,7 +465,7 @@ def _list(value: Any, kind: type[_T], what: str) -> list[_T]:
 def _stated_hz(metadata: Any) -> float | None:
     """Return the rate in the metadata of a tub; None if they do not state it."""
     with suppress(LookupError, TypeError, ValueError, OverflowError):
-        hz = float(metadata[LOOP_HZ])
+        hz = float(metadata[_LOOP_HZ])
         return hz if 0.0 < hz < math.inf else None
     return None
 
@@ -514,12 +478,134 @@ def _in_ns(value: Any, unit_ns: int) -> int | None:
     return in_ns if abs(in_ns) < _MAX_NS else None
 
 
+def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
+    """Write episodes as the sessions of one tub of version 2.
+
+    Actions of people, experts and programs become the user's, those of policies the pilot's. Steps
+    of a simulated drive get the times of its own clock, since the recorder's tells how fast the
+    simulation ran; steps without a time follow the one before at the rate of the episode.
+    """
+    states = [_state_names(episode) for episode in episodes]
+    if any(state != states[0] for state in states):
+        raise DemosError("The episodes have different states: export each kind to its own tub.")
+    (folder / _IMAGES).mkdir()
+    records: list[_Fields] = []
+    sessions: list[str] = []
+    for number, episode in enumerate(episodes):
+        began = _began(episode.header)
+        sessions.append(f"{began:%y-%m-%d}_{number}")
+        last_ns: int | None = None
+        first_ns: int | None = None
+        for step, jpeg in kept_steps(episode.rows):
+            if jpeg is None:
+                raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
+            first_ns = step.clock_ns if first_ns is None else first_ns
+            last_ns = _time_ns(step, episode.header, began, first_ns, last_ns)
+            name = f"{len(records)}_cam_image_array_.jpg"
+            (folder / _IMAGES / name).write_bytes(jpeg)
+            fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
+            fields |= {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
+            records.append(fields | {"_timestamp_ms": round(last_ns / _NS_PER_MS)})
+    created_s = _began(episodes[0].header).timestamp()
+    floats = ("user/angle", "user/throttle", "pilot/angle", "pilot/throttle", *states[0])
+    inputs = {_IMAGE: "image_array", _MODE: "str"} | dict.fromkeys(floats, "float")
+    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
+    rates = {episode.header.control_hz for episode in episodes}
+    catalogs = {
+        "paths": _write_catalogs(folder, records, created_s),
+        "current_index": len(records),
+        "max_len": _CATALOG_LENGTH,
+        "deleted_indexes": [],
+    }
+    lines: tuple[object, ...] = (
+        list(inputs),
+        list(inputs.values()),
+        {_LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {},
+        {"created_at": created_s, "sessions": named},
+        catalogs,
+    )
+    _write_lines(folder / _MANIFEST, [json.dumps(line) for line in lines])
+    return len(records)
+
+
+def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
+    """Return the names of the values of the state."""
+    names = Layout.from_json(episode.header.action_layout).names
+    if names != _ACTIONS.names:
+        raise DemosError(
+            f"The actions of {episode.name} are {', '.join(names)}, but those of a tub are "
+            f"{', '.join(_ACTIONS.names)}: export it to minari or csv."
+        )
+    if not episode.header.state_layout:
+        return ()
+    state = Layout.from_json(episode.header.state_layout)
+    if state.size != len(state):
+        raise DemosError(f"The state of {episode.name} has array features: export it to csv.")
+    return state.names
+
+
+def _fields(step: Step, state: Sequence[str], where: str) -> _Fields:
+    by_policy = step.driver == "policy"
+    if any(abs(value) > 1.0 for value in step.action):
+        raise DemosError(f"{where}: the action {list(step.action)} is not from -1 to 1.")
+    fields: _Fields = {_MODE: _POLICY_DRIVES if by_policy else _PERSON_DRIVES}
+    # A tub always contains the user's action; while a policy drives, it is 0.
+    user = (0.0, 0.0) if by_policy else step.action
+    fields |= {f"user/{axis}": value for axis, value in zip(_AXES, user, strict=True)}
+    pilot = step.action if by_policy else step.wanted
+    if pilot is not None and all(abs(value) <= 1.0 for value in pilot):
+        fields |= {f"pilot/{axis}": value for axis, value in zip(_AXES, pilot, strict=True)}
+    known = zip(state, step.state, strict=True)
+    return fields | {name: value for name, value in known if math.isfinite(value)}
+
+
+def _time_ns(
+    step: Step, header: EpisodeHeader, began: datetime, first_ns: int | None, last_ns: int | None
+) -> int:
+    """Return the Unix time of a step, ns, after the one before."""
+    began_ns = round(began.timestamp() * _NS_PER_S)
+    at_ns = step.wall_ns
+    if header.clock == "twin" or (header.clock == "none" and header.env):  # Simulated.
+        clock_ns = step.clock_ns
+        at_ns = None if clock_ns is None else began_ns + clock_ns - cast("int", first_ns)
+    if at_ns is None or (last_ns is not None and at_ns <= last_ns):
+        return began_ns if last_ns is None else last_ns + round(_NS_PER_S / header.control_hz)
+    return at_ns
+
+
+def _began(header: EpisodeHeader) -> datetime:
+    """Return when an episode began; the Unix epoch if unknown."""
+    try:
+        return datetime.fromisoformat(header.created)
+    except ValueError:
+        return datetime.fromtimestamp(0.0, UTC)
+
+
+def _write_catalogs(folder: Path, records: Sequence[_Fields], created_s: float) -> list[str]:
+    """Write the catalogs, each with its manifest; return the names of the catalogs."""
+    paths: list[str] = []
+    for number, start in enumerate(range(0, len(records), _CATALOG_LENGTH)):
+        part = records[start : start + _CATALOG_LENGTH]
+        lines = [json.dumps(record, allow_nan=False, sort_keys=True) for record in part]
+        paths.append(f"catalog_{number}.catalog")
+        _write_lines(folder / paths[-1], lines)
+        beside = f"{paths[-1]}_manifest"
+        kept: _Fields = {"created_at": created_s, "path": beside, "start_index": start}
+        kept["line_lengths"] = [len(line) + 1 for line in lines]
+        _write_lines(folder / beside, [json.dumps(kept, sort_keys=True)])
+    return paths
+
+
+def _write_lines(path: Path, lines: Sequence[str]) -> None:
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+
+
 FORMAT: Final = Format(
     name="tub",
     title="Donkeycar",
-    sign=f"{MANIFEST} or record_0.json",
-    detect=lambda path: (path / MANIFEST).is_file() or bool(_numbered(path, _RECORD_NAME)),
+    sign=f"{_MANIFEST} or record_0.json",
+    detect=lambda path: (path / _MANIFEST).is_file() or bool(_numbered(path, _RECORD_NAME)),
     read=_read,
-    write=write,
+    write=_write,
     options=frozenset({"camera", "hz"}),
 )

@@ -1,0 +1,402 @@
+"""The way from records to episodes, which all formats share.
+
+A reader fills `Record`s from its file. Here their actions, drivers and pictures are checked, rates
+are measured, and sessions are split where time jumps.
+
+Times may be rounded, and records may be missing, so a median of periods is not the rate: at times
+in whole milliseconds it is off by up to 2 % at 20 Hz. The rate is the mean over the periods near
+the median, each divided by the steps that its records are apart where they are numbered.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import pairwise
+from math import inf, isfinite
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
+from shapechanger.demos.episodes.records import longest_period_s
+from shapechanger.demos.exchange.files import MAX_FEATURES, UNIT_UNKNOWN, UnpacksToTooMuch
+from shapechanger.demos.exchange.format import (
+    DEFAULT_HZ,
+    ExchangeEpisode,
+    ExchangeStep,
+    ImportContext,
+    counted,
+    few,
+)
+from shapechanger.demos.exchange.pictures import PictureError, load_jpeg, other_size
+from shapechanger.demos.jpeg import picture_size
+from shapechanger.errors import DemosError, UnknownName
+from shapechanger.layout import Feature, Layout
+
+_NS_PER_S: Final = 1e9
+_NS_PER_MS: Final = 1e6
+_PAUSE_PERIODS: Final = 30.0
+_NEAR: Final = (0.5, 1.5)  # Of the median period; one missing record is 2.
+_MIN_PERIODS: Final = 10  # A shorter drive is not evidence of its rate.
+_IRREGULAR: Final = 0.1
+# Measured rates of one setting differ slightly, those of two settings by at least a third.
+_RATE_RATIO: Final = 1.3
+_SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # As `control_hz` of a profile.
+# A loop that sleeps for the rest of each period, as Donkeycar's, is up to 2 % slower than it was
+# set to, by the time that it takes to wake up.
+_WHOLE: Final = ((1.0, 0.005), (5.0, 0.025))
+
+
+@dataclass(slots=True, kw_only=True)
+class Record:
+    """A record of a source, before it is checked.
+
+    Attributes:
+        name: Its name in reports.
+        step: Its step, with its time as `captured_ns`.
+        number: Its number in the source; gaps are missing records.
+        picture: Its picture: a file, a JPEG, PNG or BMP, or pixels; None without one.
+        frame: Equal for successive records that share a picture; None to take `picture`.
+        fault: Why it cannot be imported, after a noun; "" if it can.
+        marks: Texts of its marks.
+        dropped: Why the step is excluded; None if it is not.
+    """
+
+    name: str
+    step: Step
+    number: int = 0
+    picture: Path | bytes | NDArray[np.uint8] | None = None
+    frame: object = None
+    fault: str = ""
+    marks: tuple[str, ...] = ()
+    dropped: str | None = None
+
+
+def episode_of(
+    records: Iterable[Record],
+    header: EpisodeHeader,
+    context: ImportContext,
+    *,
+    name: str,
+    what: str,
+    rest: Sequence[str] = (),
+    outcome: str = "",
+) -> ExchangeEpisode:
+    """Return the episode of the records that are whole; the others are reported.
+
+    Args:
+        records: The records in order; they are read with the episode.
+        header: Its metadata, with the layouts, the rate and the size of the pictures.
+        context: Collects what is left out.
+        name: How to name the episode in errors.
+        what: A record, as a noun for reports.
+        rest: Names of all records, of which those are reported that a damaged file does not have.
+        outcome: How it ended; "" if unspecified.
+    """
+    rows = _rows(records, header.image_size, context, what, rest)
+    return ExchangeEpisode(header=header, rows=rows, name=name, outcome=outcome)
+
+
+def _rows(
+    records: Iterable[Record],
+    size: tuple[int, int] | None,
+    context: ImportContext,
+    what: str,
+    rest: Sequence[str],
+) -> Iterator[ExchangeStep]:
+    read: object = None
+    shown: object = None
+    jpeg: bytes | None = None
+    reason, done = "", 0
+    try:
+        for record in records:
+            done += 1
+            frame = record.picture if record.frame is None else record.frame
+            new = size is not None and record.picture is not None and frame != shown
+            fault = record.fault or _fault(record.step)
+            if new and not fault:
+                if frame != read:
+                    read, reason = frame, ""
+                    try:
+                        jpeg, _ = load_jpeg(record.picture, size)
+                    except PictureError as error:
+                        reason = error.reason
+                fault = reason
+            if fault:
+                context.leave_out(what, fault, record.name)
+                continue
+            shown = frame if new else shown
+            yield ExchangeStep(
+                step=record.step,
+                jpeg=jpeg if new else None,
+                marks=record.marks,
+                dropped=record.dropped,
+            )
+    except UnpacksToTooMuch:
+        raise
+    except DemosError as error:
+        for name in rest[done:]:
+            context.leave_out(what, unreadable(error), name)
+
+
+def unreadable(error: DemosError) -> str:
+    """Return a reason to leave a part out, after a noun."""
+    return f"that cannot be read ({str(error).removesuffix('.')})"
+
+
+def _fault(step: Step) -> str:
+    if not all(map(isfinite, step.action)):
+        return "with an action that is not finite"
+    if step.driver not in DRIVERS:
+        return unreadable(UnknownName("driver", step.driver, DRIVERS))
+    return ""
+
+
+def with_pictures(
+    records: Sequence[Record], what: str, context: ImportContext
+) -> tuple[list[Record], tuple[int, int] | None]:
+    """Return the records with a whole picture, or with none, and the most frequent size.
+
+    All pictures are decoded, so that rates and jumps are those of the records that remain.
+    """
+    sizes: dict[int, tuple[int, int]] = {}
+    encoded = 0
+    for place, record in enumerate(records):
+        if record.picture is not None and not record.fault:
+            try:
+                jpeg, is_new = load_jpeg(record.picture)
+                sizes[place] = picture_size(jpeg, record.name)
+                encoded += is_new
+            except PictureError as error:
+                record.fault = error.reason
+    common = Counter(sizes.values()).most_common(1)[0][0] if sizes else None
+    for place, size in sizes.items():
+        if common is not None and size != common:
+            records[place].fault = other_size(size, common)
+    for record in records:
+        if record.fault:
+            context.leave_out(what, record.fault, record.name)
+    if encoded:
+        context.note(f"{counted(encoded, 'picture')} encoded as JPEG of quality 100.")
+    return [record for record in records if not record.fault], common
+
+
+class Stretch(NamedTuple):
+    """Records that follow each other without a pause, with their rate.
+
+    `has_times` tells whether the source states them, and `timed` whether they are believed.
+    """
+
+    records: list[Record]
+    hz: float
+    has_times: bool
+    timed: bool
+
+
+def stretches(
+    parts: Sequence[list[Record]], what: str, context: ImportContext, stated_hz: float | None = None
+) -> list[Stretch]:
+    """Measure the rates of sessions, or take a stated one, and split them where time jumps.
+
+    What is odd about the times is reported. Times that contradict the stated rate are left out.
+    """
+    times = [_times_ns(part, what, context) for part in parts]
+    periods = [_periods_ns(*pair) for pair in zip(times, parts, strict=True)]
+    names = [f"{what} {part[0].name}" for part in parts]
+    rates, believed = _rates(names, periods, context, stated_hz)
+    found: list[Stretch] = []
+    pauses_s: list[float] = []
+    backwards: list[tuple[float, str]] = []
+    for known, part, hz in zip(times, parts, rates, strict=True):
+        timed = bool(known) and believed
+        if not timed:
+            for record in part:
+                record.step = replace(record.step, captured_ns=None)
+        starts = [0]
+        for number, (now, later) in enumerate(pairwise(known if timed else ()), 1):
+            passed_s = (later - now) / _NS_PER_S
+            if passed_s < 0.0:
+                backwards.append((-passed_s, part[number].name))
+            elif passed_s > longest_period_s(hz):
+                pauses_s.append(passed_s)
+            else:
+                continue
+            starts.append(number)
+        for start, end in pairwise([*starts, len(part)]):
+            found.append(Stretch(part[start:end], hz, bool(known), timed))
+    if pauses_s:
+        context.note(
+            f"A new episode begins after {counted(len(pauses_s), 'pause')}, of "
+            f"{max(pauses_s):.6g} s at most and {sum(pauses_s):.6g} s in all."
+        )
+    if backwards:
+        context.warn(
+            f"Time runs backwards by up to {max(backwards)[0]:.6g} s at "
+            f"{few([name for _, name in backwards])}: a new episode begins there."
+        )
+    return found
+
+
+def _times_ns(part: Sequence[Record], what: str, context: ImportContext) -> list[int]:
+    """Return the time of each record, ns; an empty list if one is unknown."""
+    times = [ns for record in part if (ns := record.step.captured_ns) is not None]
+    if 0 < len(times) < len(part):
+        context.warn(
+            f"{len(part) - len(times)} of the {len(part)} {what}s from {part[0].name} have no "
+            "valid time: the times of the others are left out."
+        )
+    return times if len(times) == len(part) else []
+
+
+def _periods_ns(times: Sequence[int], part: Sequence[Record]) -> list[float]:
+    """Return the time from one record to the next, ns, per number that they are apart."""
+    pairs = zip(pairwise(times), pairwise(part), strict=False)
+    return [(later - now) / max(1, b.number - a.number) for (now, later), (a, b) in pairs]
+
+
+def _rates(
+    names: Sequence[str],
+    periods: Sequence[Sequence[float]],
+    context: ImportContext,
+    stated_hz: float | None,
+) -> tuple[list[float], bool]:
+    """Return the rate of each session, and whether its times are believed."""
+    pool = [period for part in periods for period in part]
+    pooled = measured_hz(pool)
+    if (hz := context.hz or stated_hz) is not None:
+        if pooled is None or 1.0 / _RATE_RATIO < pooled / hz < _RATE_RATIO:
+            return [hz] * len(names), True
+        (context.warn if context.hz is None else context.note)(
+            f"The records are {_described(pooled)} by their times, and not the {hz:g} Hz that are "
+            "stated: these times are left out."
+        )
+        return [hz] * len(names), False
+    if pooled is None:
+        context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
+        return [DEFAULT_HZ] * len(names), True
+    measured = {
+        name: hz
+        for name, part in zip(names, periods, strict=True)
+        if len(part) >= _MIN_PERIODS and (hz := measured_hz(part)) is not None
+    }
+    slow = min(measured, key=lambda name: measured[name], default="")
+    fast = max(measured, key=lambda name: measured[name], default="")
+    if measured and measured[fast] > _RATE_RATIO * measured[slow]:
+        context.warn(
+            f"The drive from {slow} has {measured[slow]:.3g} steps a second, and the drive from "
+            f"{fast} {measured[fast]:.3g}: a policy learns from one rate at a time."
+        )
+        rates = [_nominal_hz(measured.get(name, pooled)) for name in names]
+    else:
+        rates = [_nominal_hz(pooled)] * len(names)
+        if abs(pooled / rates[0] - 1.0) > _WHOLE[0][1]:
+            context.note(
+                f"The records are {_described(pooled)}, which is taken to be {rates[0]:g} Hz; --hz "
+                "states another rate."
+            )
+    for hz in sorted({rate for rate in rates if not _SLOWEST_HZ <= rate <= _FASTEST_HZ}):
+        context.warn(
+            f"The records are {_described(hz)}, which no robot has ({_SLOWEST_HZ:g} to "
+            f"{_FASTEST_HZ:g} Hz): perhaps a conversion set their times. State the rate with --hz."
+        )
+    driven, near = _typical(pool)
+    if len(driven) >= _MIN_PERIODS and len(driven) - len(near) > _IRREGULAR * len(driven):
+        least, most = np.percentile(driven, [5, 95]) / _NS_PER_MS
+        context.note(
+            f"The records are irregular: {100 - 100 * len(near) / len(driven):.0f} % come more "
+            f"than half a period early or late (the middle 90 % of the periods are {least:.3g} to "
+            f"{most:.3g} ms)."
+        )
+    return rates, True
+
+
+def measured_hz(periods_ns: Sequence[float]) -> float | None:
+    """Return the steps per second, without regard to pauses and outliers.
+
+    Args:
+        periods_ns: Times from step to step, ns.
+    """
+    driven, near = _typical(periods_ns)
+    if not driven:
+        return None
+    if 2 * sum(period > 0.0 for period in periods_ns) < len(periods_ns):
+        return _NS_PER_S * len(periods_ns) / sum(driven)  # The clock is coarser than a period.
+    # Where no period prevails, the rate is that of all.
+    return _NS_PER_S / statistics.fmean(near if 2 * len(near) > len(driven) else driven)
+
+
+def _typical(periods_ns: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return the periods that are not pauses, and those of them that are near the median."""
+    positive = [period for period in periods_ns if period > 0.0]
+    typical = statistics.median_low(positive) if positive else 0.0
+    low, high = _NEAR
+    driven = [period for period in positive if period <= _PAUSE_PERIODS * typical]
+    return driven, [period for period in driven if low * typical <= period <= high * typical]
+
+
+def _nominal_hz(measured: float) -> float:
+    """Return the rate that a loop was set to, from its measured rate: a whole one, if near."""
+    for grid, tolerance in _WHOLE:
+        nominal = grid * max(1, round(measured / grid))
+        if abs(measured / nominal - 1.0) <= tolerance:
+            return nominal
+    return float(f"{measured:.4g}")
+
+
+def iso_time(unix_ns: int) -> str:
+    """Return a Unix time as ISO 8601 in UTC; "" if it is beyond the calendar."""
+    try:
+        at = datetime.fromtimestamp(unix_ns / _NS_PER_S, UTC)
+    except (OverflowError, ValueError, OSError):
+        return ""
+    return at.isoformat(timespec="milliseconds")
+
+
+def _described(hz: float) -> str:
+    return f"{1e3 / hz:.4g} ms apart, {hz:.4g} a second"
+
+
+def features_of(
+    key: str,
+    size: int,
+    *,
+    names: Sequence[str] = (),
+    units: Sequence[str] = (),
+    low: Sequence[float] = (),
+    high: Sequence[float] = (),
+) -> list[Feature]:
+    """Return the features of the values of a column of others: named, numbered, or one array."""
+    units = units if len(units) == size and all(units) else (UNIT_UNKNOWN,) * size
+    lows = low or (-inf,) * size
+    highs = high or (inf,) * size
+    if not names and size > MAX_FEATURES:
+        unit = units[0] if len(set(units)) == 1 else UNIT_UNKNOWN
+        return [Feature(key, unit, min(lows), max(highs), shape=(size,))]
+    names = names or ([f"{key}/{n}" for n in range(size)] if size > 1 else [key])
+    return [Feature(*about) for about in zip(names, units, lows, highs, strict=True)]
+
+
+def as_json(features: Sequence[Feature]) -> str:
+    """Return features as the layout of a header; "" for none."""
+    return Layout(tuple(features)).to_json() if features else ""
+
+
+def choose_camera(folder: Path, cameras: Sequence[str], context: ImportContext) -> str:
+    """Return the chosen camera, or the only one; "" without any."""
+    if context.camera:
+        if context.camera not in cameras:
+            raise UnknownName(f"camera of {folder}", context.camera, cameras)
+        return context.camera
+    if len(cameras) > 1:
+        raise DemosError(
+            f"{folder} has {len(cameras)} cameras ({', '.join(cameras)}), but an episode has one: "
+            f"choose with --camera, such as --camera {cameras[0]}."
+        )
+    return "".join(cameras)
