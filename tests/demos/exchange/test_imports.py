@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -36,7 +35,6 @@ from tests.demos.exchange.small import (
 
 
 def test_a_table_of_others(tmp_path: Path) -> None:
-    """Columns are known by their names; the source is unchanged."""
     folder = keys_folder(tmp_path / "keys")
     before = snapshot(folder)
     assert find_format(folder) == "csv"
@@ -56,21 +54,6 @@ def test_a_table_of_others(tmp_path: Path) -> None:
     assert import_recording(folder, tmp_path / "slow", hz=5.0).notes[0].endswith("are left out.")
     assert {step.clock_ns for step in all_of(tmp_path / "slow")[0].steps} == {None}
     assert snapshot(folder) == before
-
-
-def test_a_table_of_others_is_split_where_time_jumps(tmp_path: Path) -> None:
-    (tmp_path / "table").mkdir()
-    times = [100.0, 100.1, 100.2, 103.5, 103.6, 90.0, 90.1]
-    lines = "".join(f"{n / 10},{at}\n\n" for n, at in enumerate(times))  # And blank lines.
-    (tmp_path / "table/steps.csv").write_text(f"steering,timestamp\n{lines}")
-    done = import_recording(tmp_path / "table", tmp_path / "data")
-    assert done.notes == ("A new episode begins after 1 pause, of 3.3 s at most and 3.3 s in all.",)
-    assert done.warnings == (
-        "Time runs backwards by up to 13.6 s at line 12: a new episode begins there.",
-    )
-    episodes = all_of(tmp_path / "data")
-    assert [len(episode.steps) for episode in episodes] == [3, 2, 2]
-    assert {episode.header.control_hz for episode in episodes} == {10.0}
 
 
 def test_a_table_of_others_with_states(tmp_path: Path) -> None:
@@ -123,25 +106,6 @@ def test_a_tub(tmp_path: Path) -> None:
     assert second.steps[1].state == (2.5,)
     assert second.header.notes == {"session": "21-06-25_1"}
     assert snapshot(folder) == before
-
-
-def test_an_old_tub(tmp_path: Path) -> None:
-    """Records are ordered by number, and a restart of the car starts a new episode."""
-    folder = tmp_path / "tub"
-    folder.mkdir()
-    for n, ms in enumerate([0, 50, 100, 150, 200, 250, 300, 350, 400, 450, 0, 50]):
-        name = f"{n}_cam-image_array_.jpg"
-        (folder / name).write_bytes(picture(n))
-        fields = {"cam/image_array": name, "user/angle": n / 100, "user/throttle": 0.5}
-        text = json.dumps(fields | {"user/mode": "user", "milliseconds": ms})
-        (folder / f"record_{n}.json").write_text(text)
-    assert find_format(folder) == "tub"
-    import_recording(folder, tmp_path / "data")
-    first, second = all_of(tmp_path / "data")
-    assert [step.action[0] for step in first.steps] == [n / 100 for n in range(10)]
-    assert [step.action[0] for step in second.steps] == [0.1, 0.11]
-    assert first.header.control_hz == pytest.approx(20.0)
-    assert {step.wall_ns for step in first.steps} == {None}  # Times are relative to the start.
 
 
 def test_minari_recovers_the_env(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

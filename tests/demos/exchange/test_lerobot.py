@@ -208,7 +208,6 @@ def test_refused_exports(
 
 
 def test_options_of_lerobot_alone(tmp_path: Path) -> None:
-    """Other formats have no task, no choice of images and no cameras."""
     drive(tmp_path / "data")
     with pytest.raises(DemosError, match="are of lerobot, and not of csv"):
         export_recording(tmp_path / "data", tmp_path / "out", "csv", images=True)
@@ -263,31 +262,6 @@ def test_one_of_several_cameras(dataset: Path, tmp_path: Path) -> None:
         import_recording(dataset, tmp_path / "back", camera="wirst")
     import_recording(dataset, tmp_path / "back", camera="camera")
     import_recording(dataset, tmp_path / "again", camera="observation.images.camera")
-
-
-def test_pngs_are_encoded(dataset: Path, tmp_path: Path) -> None:
-    """LeRobot stores pictures without video as PNG."""
-    import io
-
-    import pyarrow as pa
-    from PIL import Image
-
-    camera = {"dtype": "image", "shape": [3, 48, 64], "names": ["channels", "height", "width"]}
-    edit_features(dataset, **{"observation.images.camera": camera})
-    pixels = np.random.default_rng(0).integers(0, 255, (12, 48, 64, 3), np.uint8)
-    stored = []
-    for one in pixels:
-        file = io.BytesIO()
-        Image.fromarray(one).save(file, "PNG")
-        stored.append({"bytes": file.getvalue(), "path": "frame.png"})
-    table = pq.read_table(dataset / DATA)
-    pq.write_table(
-        table.append_column("observation.images.camera", pa.array(stored)), dataset / DATA
-    )
-    import_recording(dataset, tmp_path / "back")
-    (episode,) = all_of(tmp_path / "back")
-    error = np.abs(np.array(pictures_of(episode), float) - pixels)
-    assert error.mean() < 1.0
 
 
 def cut(name: str, size: int) -> Callable[[Path], None]:

@@ -99,5 +99,4 @@ def test_a_format_of_a_name_that_is_taken(installed: Path) -> None:
 
 
 def test_the_columns_are_documented() -> None:
-    """The documentation shows the table that the formats use."""
     assert as_markdown() in DOCS.read_text()

@@ -85,7 +85,6 @@ def test_any_recording_round_trips(
     outcome: str,
     data: st.DataObject,
 ) -> None:
-    """Numbers, texts, frames, marks and drops are kept exactly."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         with EpisodeWriter.create(place / "data", header(**head)) as writer:
@@ -142,7 +141,6 @@ def test_every_kind_of_observation_round_trips(
 def test_folders_may_be_relative(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """Relative paths are accepted."""
     monkeypatch.chdir(tmp_path)
     drive(Path("data"))
     export_recording(Path("data"), Path("x-v0"), name)

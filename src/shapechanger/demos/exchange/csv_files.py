@@ -333,7 +333,7 @@ class _Table:
                     value = json.loads(cell)
                     kind = {"terms": dict, "marks": list}.get(column.field, str)
                     if isinstance(value, kind):
-                        return value
+                        return cast("Any", value)
                 case "text" | "picture":
                     return cell
                 case "flag":

@@ -37,7 +37,7 @@ from shapechanger.demos.exchange.format import (
 )
 from shapechanger.demos.exchange.pictures import PictureError, load_jpeg, other_size
 from shapechanger.demos.jpeg import picture_size
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.errors import DemosError, ShapechangerError, UnknownName
 from shapechanger.layout import Feature, Layout
 
 _NS_PER_S: Final = 1e9
@@ -146,7 +146,7 @@ def _rows(
             context.leave_out(what, unreadable(error), name)
 
 
-def unreadable(error: DemosError) -> str:
+def unreadable(error: ShapechangerError) -> str:
     """Return a reason to leave a part out, after a noun."""
     return f"that cannot be read ({str(error).removesuffix('.')})"
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Driver, EpisodeHeader, Step
 from shapechanger.demos.exchange.drives import (
@@ -297,16 +298,16 @@ def _records(
     """Yield the records of an episode; `unpacked` counts the bytes of pictures of each file."""
     stored = kept.camera.key if kept.camera is not None and kept.camera.kind == "image" else ""
     times = located.times
-    videos: Iterator[Any] = repeat(None)
+    videos: Iterator[NDArray[np.uint8] | None] = repeat(None, len(located.steps))
     if located.video is not None and times is not None and header.image_size is not None:
         ticks = located.steps["tick"].tolist()
         videos = read_pictures(located.video, times, ticks, header.image_size)
     rows = _in_order(located, kept, stored)
-    first = located.paths[located.steps["file"].min()]
-    sizes = sum(located.paths[n].stat().st_size for n in np.unique(located.steps["file"]))
+    paths = [path for path, _, _ in located.rows_by_file()]
+    first, sizes = paths[0], sum(path.stat().st_size for path in paths)
     most = MAX_UNPACKED + MAX_PACKED * sizes
     read = b""
-    for step, row, picture in zip(located.steps, rows, videos, strict=False):
+    for step, row, picture in zip(located.steps, rows, videos, strict=True):
         frame = int(step["frame"])
         reward = float(row[_REWARD][0]) if _REWARD in row else math.nan
         done = DONE in row and bool(row[DONE][0])

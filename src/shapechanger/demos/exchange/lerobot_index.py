@@ -273,7 +273,8 @@ class Index:
         exact = np.abs(times_s - nominal_s) <= _tolerance_s(times_s)
         found = np.zeros(len(frames), _STEP)
         found["frame"], found["file"], found["row"] = frames, files, rows
-        found["time_ns"] = np.round(np.where(exact, nominal_s, times_s) * _NS_PER_S)
+        chosen_s = np.asarray(np.where(exact, nominal_s, times_s), np.float64)
+        found["time_ns"] = np.round(chosen_s * _NS_PER_S)
         return found
 
     def _require_times(

@@ -25,7 +25,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import groupby, pairwise
 from pathlib import Path, PurePath
-from typing import Any, Final, NamedTuple, TypeVar, cast
+from typing import Any, Final, NamedTuple, cast
 
 import msgspec
 from msgspec.structs import replace
@@ -80,6 +80,7 @@ _V1_TIME: Final = "milliseconds"
 _MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
 _MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two times.
 _NUMBERS: Final = ("float", "int", "boolean")
+_KINDS: Final = {str: "str", bool: "boolean", int: "float", float: "float"}
 _PICTURES: Final = ("image_array", "image")
 _DEPTH: Final = "gray16_array"
 _KNOWN: Final = (*_NUMBERS, *_PICTURES, _DEPTH, "str", "list", "vector", "nparray")
@@ -90,7 +91,6 @@ _CATALOG_NAME: Final = re.compile(r"catalog_([0-9]{1,9})\.catalog")
 _DAMAGED: Final = "that is not valid JSON"
 
 _Fields = dict[str, Any]
-_T = TypeVar("_T", int, str)
 
 
 class _Line(NamedTuple):
@@ -134,12 +134,12 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
     if left := [f"{name} ({kind})" for name, kind in columns.items() if name and name not in taken]:
         context.note(f"Columns that are not imported: {', '.join(left)}.")
-    records = [_record(line, sensed, context) for line in tub.lines]
+    records = [_record(line, sensed, camera, context) for line in tub.lines]
     if camera:
-        _find_pictures(records, tub, camera, context)
+        _find_pictures(records, tub.images, context)
     records, size = with_pictures(records, "record", context)
     sessions = {line.number: line.session for line in tub.lines}
-    parts = list(_parts(records, sessions, restarts=not tub.is_unix))
+    parts = _parts(records, sessions, restarts=not tub.is_unix)
     for part, hz, has_times, timed in stretches(parts, "record", context, tub.stated_hz):
         began_ns = tub.start_ns
         for record in part:
@@ -164,11 +164,9 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
 
 
 def _kind_of(value: Any) -> str:
-    if isinstance(value, str):
-        return _PICTURES[0] if value.lower().endswith(_ENDINGS) else "str"
-    if isinstance(value, bool):
-        return "boolean"
-    return "float" if isinstance(value, int | float) else "list"
+    if isinstance(value, str) and value.lower().endswith(_ENDINGS):
+        return _PICTURES[0]
+    return _KINDS.get(type(value), "list")
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
@@ -188,7 +186,7 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
     return camera
 
 
-def _record(line: _Line, sensed: Sequence[str], context: ImportContext) -> Record:
+def _record(line: _Line, sensed: Sequence[str], camera: str, context: ImportContext) -> Record:
     """Return a record; it has a fault if it has no valid action."""
     mode = line.fields.get(_MODE, _PERSON_DRIVES)
     by_person = mode == _PERSON_DRIVES
@@ -213,7 +211,8 @@ def _record(line: _Line, sensed: Sequence[str], context: ImportContext) -> Recor
         state=tuple(_sensed(line.fields.get(name)) for name in sensed),
         captured_ns=line.time_ns,
     )
-    return Record(name=str(line.number), number=line.number, step=step, fault=fault)
+    name, frame = str(line.number), line.fields.get(camera)
+    return Record(name=name, number=line.number, step=step, frame=frame, fault=fault)
 
 
 def _pair(line: _Line, names: Sequence[str]) -> tuple[float, float] | None:
@@ -232,15 +231,12 @@ def _sensed(value: Any) -> float:
         return math.nan
 
 
-def _find_pictures(
-    records: Sequence[Record], tub: _Tub, camera: str, context: ImportContext
-) -> None:
-    """Give each record its picture; it has a fault if it has none of its own."""
-    names = [line.fields.get(camera) for line in tub.lines]
-    good = [name for name, record in zip(names, records, strict=True) if not record.fault]
-    shown = Counter(map(str, good))
+def _find_pictures(records: Sequence[Record], images: Path, context: ImportContext) -> None:
+    """Find the picture of each record by its name, the `frame`; others get a fault."""
+    shown = Counter(str(record.frame) for record in records if not record.fault)
     offsets: dict[int, int] = {}
-    for name, record in zip(names, records, strict=True):
+    for record in records:
+        name = record.frame
         if record.fault:
             continue
         if not name or not isinstance(name, str):
@@ -248,8 +244,8 @@ def _find_pictures(
             continue
         # Version 1 writes whole paths of the robot for the type "image".
         place = PurePath(name).name if PurePath(name).is_absolute() else name
-        record.picture = tub.images / place
-        if not is_inside(tub.images, place):
+        record.picture = images / place
+        if not is_inside(images, place):
             record.fault = "with a picture name that leaves the folder"
         elif shown[name] > 1 and record.picture.is_file():
             record.fault = "with the picture of another record"
@@ -265,18 +261,18 @@ def _find_pictures(
 
 def _parts(
     records: Sequence[Record], sessions: Mapping[int, str], *, restarts: bool
-) -> Iterator[list[Record]]:
-    """Yield the records of each session, and of each start of the car if times restart with it."""
-    for _, session in groupby(records, key=lambda record: sessions[record.number]):
-        part: list[Record] = []
-        for record in session:
-            before_ns = part[-1].step.captured_ns if part else None
-            now_ns = record.step.captured_ns
-            if restarts and now_ns is not None and before_ns is not None and now_ns < before_ns:
-                yield part
-                part = []
-            part.append(record)
-        yield part
+) -> list[list[Record]]:
+    """Return the records of each session, and of each start of the car if times restart with it."""
+    parts: list[list[Record]] = []
+    for record in records:
+        before = parts[-1][-1] if parts else None
+        was_ns, now_ns = before and before.step.captured_ns, record.step.captured_ns
+        falls = was_ns is not None and now_ns is not None and now_ns < was_ns
+        new = before is None or sessions[before.number] != sessions[record.number]
+        if new or (restarts and falls):
+            parts.append([])
+        parts[-1].append(record)
+    return parts
 
 
 def _numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, str]:
@@ -291,14 +287,15 @@ def _numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, str]:
 def _read_v2(folder: Path, context: ImportContext) -> _Tub:
     path = folder / _MANIFEST
     lines = [line.strip(b"\0\r ") for line in read_bytes(path).split(b"\n")]
-    inputs, types, metadata, more, catalogs = map(_parsed, (lines + [b""] * 5)[:5])
+    inputs, types, *others = (lines + [b""] * 5)[:5]
+    inputs, types = _parsed(inputs), _parsed(types)
+    metadata, more, catalogs = (_object(line) or {} for line in others)
     if not isinstance(inputs, list) or not isinstance(types, list):
         context.warn(f"{path} is damaged: the columns are those that the records have.")
         inputs = types = []
-    known = _object(catalogs) or {}
-    if known:
-        names = _list(known.get("paths"), str, f"paths in {path}")
-        gone = known.get("deleted_indexes", [])
+    if catalogs:
+        names = _list(catalogs.get("paths"), str, f"paths in {path}")
+        gone = catalogs.get("deleted_indexes", [])
         deleted = set(_list(gone, int, f"deleted_indexes in {path}"))
     else:
         deleted, names = set[int](), [*_numbered(folder, _CATALOG_NAME).values()]
@@ -314,13 +311,13 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
             raise DemosError(f"{path}: the catalog {name!r} leaves the folder.")
         _read_catalog(folder / name, rows, context)
     records = _with_numbers(rows, context)
-    _report_missing(records, deleted, known.get("current_index"), context)
+    _report_missing(records, deleted, catalogs.get("current_index"), context)
     return _Tub(
         inputs=_typed(inputs, types, path),
         lines=[record for record in records if record.number not in deleted],
         deleted=len(deleted & {record.number for record in records}),
         images=folder / _IMAGES,
-        start_ns=_in_ns((_object(more) or {}).get("created_at"), _NS_PER_S),
+        start_ns=_in_ns(more.get("created_at"), _NS_PER_S),
         is_unix=True,
         stated_hz=_stated_hz(metadata),
     )
@@ -332,8 +329,8 @@ def _read_catalog(path: Path, rows: list[tuple[int, _Fields]], context: ImportCo
         context.leave_out("catalog", "that is missing", path.name)
         return
     beside = path.with_suffix(".catalog_manifest")
-    about = _object(_parsed(read_bytes(beside))) if beside.is_file() else None
-    start = (about or {}).get("start_index")
+    about = (_object(read_bytes(beside)) if beside.is_file() else None) or {}
+    start = about.get("start_index")
     if type(start) is not int:
         start = rows[-1][0] + 1 if rows else 0
     try:
@@ -343,7 +340,7 @@ def _read_catalog(path: Path, rows: list[tuple[int, _Fields]], context: ImportCo
         return
     whole = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
     for position, (number, line) in enumerate(whole, start):
-        if (fields := _object(_parsed(line))) is not None:
+        if (fields := _object(line)) is not None:
             rows.append((position, fields))
         else:
             reason = _DAMAGED if line.strip(b"\0\r") else "of NUL bytes, as after a power cut"
@@ -394,15 +391,12 @@ def _report_missing(
             context.warn(
                 f"The manifest counts {count} records, and the last one has the _index {last}."
             )
-    missing = [number for number in range(last + 1) if number not in numbers]
-    if missing:
-        runs = [
-            [number for _, number in run]
-            for _, run in groupby(enumerate(missing), key=lambda pair: pair[1] - pair[0])
-        ]
-        named = few([f"{r[0]} to {r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs])
-        context.note(f"{len(missing)} of the records 0 to {last} are in no catalog: {named}.")
-    if strange := sorted(deleted - numbers - set(missing)):
+    ends = pairwise([-1, *sorted(numbers), last + 1])
+    if gaps := [(one + 1, two - 1) for one, two in ends if two - one > 1]:
+        missing = sum(end - start + 1 for start, end in gaps)
+        named = few([f"{start} to {end}" if end > start else f"{start}" for start, end in gaps])
+        context.note(f"{missing} of the records 0 to {last} are in no catalog: {named}.")
+    if strange := sorted(number for number in deleted - numbers if not 0 <= number <= last):
         context.warn(f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}.")
 
 
@@ -417,10 +411,9 @@ def _read_v1(folder: Path, context: ImportContext) -> _Tub:
     names = _numbered(folder, _RECORD_NAME)
     records: list[_Line] = []
     for number in sorted(names.keys() - deleted):
-        record_path = folder / names[number]
         if not is_inside(folder, names[number]):
-            raise DemosError(f"{record_path} is a link that leaves the folder.")
-        if (fields := _object(_parsed(read_bytes(record_path)))) is None:
+            raise DemosError(f"{folder / names[number]} is a link that leaves the folder.")
+        if (fields := _object(read_bytes(folder / names[number]))) is None:
             context.leave_out("record", _DAMAGED, number)
             continue
         time_ns = _in_ns(fields.get(_V1_TIME), _NS_PER_MS)
@@ -444,7 +437,8 @@ def _parsed(line: bytes) -> Any:
     return None
 
 
-def _object(value: Any) -> _Fields | None:
+def _object(line: bytes) -> _Fields | None:
+    value = _parsed(line)
     return cast("_Fields", value) if isinstance(value, dict) else None
 
 
@@ -455,14 +449,14 @@ def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
     return dict(zip(names, kinds, strict=True))
 
 
-def _list(value: Any, kind: type[_T], what: str) -> list[_T]:
+def _list(value: Any, kind: type, what: str) -> list[Any]:
     try:
         return msgspec.convert(value, list[kind])
     except msgspec.ValidationError as error:
         raise DemosError(f"The {what} must be a list of {kind.__name__}: {error}.") from error
 
 
-def _stated_hz(metadata: Any) -> float | None:
+def _stated_hz(metadata: _Fields) -> float | None:
     """Return the rate in the metadata of a tub; None if they do not state it."""
     with suppress(LookupError, TypeError, ValueError, OverflowError):
         hz = float(metadata[_LOOP_HZ])
@@ -511,19 +505,11 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     inputs = {_IMAGE: "image_array", _MODE: "str"} | dict.fromkeys(floats, "float")
     named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
     rates = {episode.header.control_hz for episode in episodes}
-    catalogs = {
-        "paths": _write_catalogs(folder, records, created_s),
-        "current_index": len(records),
-        "max_len": _CATALOG_LENGTH,
-        "deleted_indexes": [],
-    }
-    lines: tuple[object, ...] = (
-        list(inputs),
-        list(inputs.values()),
-        {_LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {},
-        {"created_at": created_s, "sessions": named},
-        catalogs,
-    )
+    catalogs: _Fields = {"paths": _write_catalogs(folder, records, created_s)}
+    catalogs |= {"current_index": len(records), "max_len": _CATALOG_LENGTH, "deleted_indexes": []}
+    metadata = {_LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {}
+    more = {"created_at": created_s, "sessions": named}
+    lines = (list(inputs), list(inputs.values()), metadata, more, catalogs)
     _write_lines(folder / _MANIFEST, [json.dumps(line) for line in lines])
     return len(records)
 
@@ -587,12 +573,12 @@ def _write_catalogs(folder: Path, records: Sequence[_Fields], created_s: float) 
     for number, start in enumerate(range(0, len(records), _CATALOG_LENGTH)):
         part = records[start : start + _CATALOG_LENGTH]
         lines = [json.dumps(record, allow_nan=False, sort_keys=True) for record in part]
-        paths.append(f"catalog_{number}.catalog")
-        _write_lines(folder / paths[-1], lines)
-        beside = f"{paths[-1]}_manifest"
-        kept: _Fields = {"created_at": created_s, "path": beside, "start_index": start}
+        name = f"catalog_{number}.catalog"
+        paths.append(name)
+        _write_lines(folder / name, lines)
+        kept: _Fields = {"created_at": created_s, "path": f"{name}_manifest", "start_index": start}
         kept["line_lengths"] = [len(line) + 1 for line in lines]
-        _write_lines(folder / beside, [json.dumps(kept, sort_keys=True)])
+        _write_lines(folder / f"{name}_manifest", [json.dumps(kept, sort_keys=True)])
     return paths
 
 
