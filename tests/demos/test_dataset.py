@@ -32,7 +32,6 @@ def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
 
 
 def test_kept_steps_of_persons_are_loaded_in_order(tmp_path: Path) -> None:
-    """Dropped steps and those of other drivers are skipped."""
     first, _ = _recorded(tmp_path), _recorded(tmp_path)
     drop(first, 1, 1, "bad")
     data = load_dataset(tmp_path)
@@ -50,7 +49,6 @@ def test_kept_steps_of_persons_are_loaded_in_order(tmp_path: Path) -> None:
 
 
 def test_a_shared_frame_is_kept_for_its_step(tmp_path: Path) -> None:
-    """A person's step after a policy's step has the frame that both share."""
     with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
         writer.add(step(0, driver="policy"), _jpeg(5))
         writer.add(step(1))
@@ -60,7 +58,6 @@ def test_a_shared_frame_is_kept_for_its_step(tmp_path: Path) -> None:
 
 
 def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
-    """A misspelt name gets a suggestion."""
     path = _recorded(tmp_path)
     assert load_dataset(path, drivers=["policy"]).episodes == (1,)
     with pytest.raises(UnknownName, match="Did you mean 'policy'"):
@@ -70,7 +67,6 @@ def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
 
 
 def test_images_can_be_shrunk_while_loading(tmp_path: Path) -> None:
-    """`shrink` limits the memory that is needed."""
     data = load_dataset(_recorded(tmp_path), shrink=lambda picture, _: picture[::2, ::2])
     assert data.pictures is not None
     assert data.pictures.shape == (5, 12, 16, 3)
@@ -88,7 +84,6 @@ def test_images_can_be_shrunk_while_loading(tmp_path: Path) -> None:
 def test_episodes_that_differ_are_not_mixed(
     tmp_path: Path, changes: dict[str, Any], what: str
 ) -> None:
-    """The error names both episodes and their difference."""
     first, second = _recorded(tmp_path), _recorded(tmp_path, **changes)
     with pytest.raises(
         DemosError, match=f"{second} has other {what} than {first}: learn from one kind"
@@ -97,14 +92,12 @@ def test_episodes_that_differ_are_not_mixed(
 
 
 def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
-    """The error names the file and both sizes."""
     path = _recorded(tmp_path, image_size=(64, 24))
     with pytest.raises(DemosError, match=r"000000\.jpg has 32 x 24 pixels, but .* 64 x 24"):
         load_dataset(path)
 
 
 def test_a_truncated_frame_is_refused(tmp_path: Path) -> None:
-    """Truncation is only detected on decoding."""
     with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
         writer.add(step(0), _jpeg(1)[:-40])
     with pytest.raises(DemosError, match=r"000000\.jpg is not a JPEG, or is damaged"):
@@ -112,7 +105,6 @@ def test_a_truncated_frame_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_oversized_frame_is_not_decoded() -> None:
-    """The size in the header is checked first."""
     jpeg = bytearray(_jpeg(1))
     place = jpeg.index(b"\xff\xc0") + 5
     jpeg[place : place + 4] = b"\xea\x60\xea\x60"  # 60,000 x 60,000.
@@ -121,7 +113,6 @@ def test_an_oversized_frame_is_not_decoded() -> None:
 
 
 def test_a_damaged_episode_is_refused(tmp_path: Path) -> None:
-    """The error names the repair command."""
     path = _recorded(tmp_path)
     (path / "frames" / "000000.jpg").unlink()
     with pytest.raises(BrokenEpisode, match="demos repair"):

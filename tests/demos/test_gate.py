@@ -25,22 +25,18 @@ def drivers(gaps: list[float], dangers: dict[int, str] | None = None) -> str:
 
 
 def test_a_difference_must_last() -> None:
-    """A short difference is ignored, and a break restarts the time."""
     assert drivers([0.9, 0.9, 0.0, 0.9, 0.9, 0.9]) == "PPPPPE"
 
 
 def test_control_returns_after_lasting_agreement() -> None:
-    """A difference restarts the time."""
     assert drivers([0.9] * 3 + [0.1] * 2 + [0.3] + [0.1] * 4) == "PPEEEEEEPP"
 
 
 def test_danger_takes_over_at_once() -> None:
-    """The expert also keeps control for a while when both agree."""
     assert drivers([0.0] * 7, {1: "0.1 m ahead", 3: "0.1 m ahead"}) == "PEEEEEP"
 
 
 def test_the_gate_gives_reasons() -> None:
-    """A text is returned only when the driver changes."""
     gate = Gate(RULE, 0.1)
     off = RIGHT + np.float32(0.8)
     reasons = [gate.watch(off, RIGHT, "") for _ in range(4)]
@@ -55,7 +51,6 @@ def test_the_gate_gives_reasons() -> None:
     share=st.floats(0.0, 1.0, width=32),
 )
 def test_slower_than_the_expert_is_no_difference(right: float, rest: float, share: float) -> None:
-    """Every value from rest to the expert's counts as agreement, and hands control back."""
     expert = np.array([0.0, right], np.float32)
     slow = np.array([0.1, rest + share * (right - rest)], np.float32)
     gate = Gate(RULE, 0.1, (None, rest))
@@ -66,7 +61,6 @@ def test_slower_than_the_expert_is_no_difference(right: float, rest: float, shar
 
 @pytest.mark.parametrize("wanted", [(0.9, 0.5), (0.0, 1.0), (0.0, -0.6)])
 def test_faster_backward_and_aside_are_corrected(wanted: tuple[float, float]) -> None:
-    """What is not on the way from rest to the expert's action differs from it."""
     gate = Gate(RULE, 0.1, (None, 0.0))
     right = np.array([0.0, 0.4], np.float32)
     reasons = [gate.watch(np.array(wanted, np.float32), right, "") for _ in range(3)]
@@ -74,7 +68,6 @@ def test_faster_backward_and_aside_are_corrected(wanted: tuple[float, float]) ->
 
 
 def test_a_rule_that_contradicts_itself_is_refused() -> None:
-    """Invalid thresholds and times raise errors."""
     with pytest.raises(DemosError, match="agree must be positive"):
         GateRule(apart=0.2, agree=0.3)
     with pytest.raises(DemosError, match="must not be negative"):

@@ -42,7 +42,6 @@ def test_duplicates_are_refused(tmp_path: Path) -> None:
 
 
 def test_incomplete_episodes_are_refused(tmp_path: Path) -> None:
-    """The error names the command that repairs."""
     begun = recorded(tmp_path / "a", close=False)
     with pytest.raises(DemosError, match="demos repair"):
         merge([begun], tmp_path / "all")
@@ -55,7 +54,6 @@ def test_incomplete_episodes_are_refused(tmp_path: Path) -> None:
 
 
 def test_an_episode_cannot_be_the_target(tmp_path: Path) -> None:
-    """A recording is a folder of episodes."""
     one, two = recorded(tmp_path / "a"), recorded(tmp_path / "b")
     with pytest.raises(DemosError, match="is an episode"):
         merge([one], two)

@@ -14,7 +14,6 @@ PICTURE = np.full((30, 40, 3), 7, np.uint8)
 
 @pytest.mark.parametrize(("steering", "left", "right"), [(-1.0, 1, 0), (0.5, 0, 1)])
 def test_the_bar_shows_the_steering(steering: float, left: int, right: int) -> None:
-    """The bar extends to the left for left, in the colour of the driver."""
     drawn = overlay(PICTURE, Step(action=(steering, 0.0), driver="person"), ACTIONS)
     assert drawn.shape == (30 * 12 + 2 * 14, 480, 3)
     assert (drawn[: 30 * 12] == 7).all()
@@ -25,7 +24,6 @@ def test_the_bar_shows_the_steering(steering: float, left: int, right: int) -> N
 
 
 def test_the_suggestion_is_a_white_line() -> None:
-    """The policy's suggestion is drawn beside the driver's bar."""
     step = Step(action=(0.0, 0.0), driver="expert", wanted=(0.5, -1.0))
     drawn = overlay(PICTURE, step, ACTIONS)
     white = np.argwhere((drawn[30 * 12 + 7] == 255).all(axis=1)).ravel()

@@ -24,7 +24,6 @@ AWAY = np.array([-1.0, 0.5], np.float32)
 
 
 def test_an_expert_is_recorded_with_its_intention(tmp_path: Path) -> None:
-    """The executed action differs, and each episode has its own seed."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path) as env:
         record_steps(env, ExpertPilot(AlwaysForward()), 50, seed=5)
@@ -39,7 +38,6 @@ def test_an_expert_is_recorded_with_its_intention(tmp_path: Path) -> None:
 
 
 def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
-    """The expert corrects from the second step on, and the policy's action is kept as `wanted`."""
     gate = Gate(GateRule(apart=0.5, apart_s=0.15), 0.1)
     pilot = CorrectedPilot(lambda seen: AWAY, AlwaysForward(), gate)
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:

@@ -57,7 +57,6 @@ def only(recording: Path) -> Episode:
 
 @pytest.mark.parametrize("shows", ["picture", "state", "both"])
 def test_observations_are_paired_with_actions(shows: Shows, tmp_path: Path) -> None:
-    """Step n holds the observation before action n, and the outcome and reward after it."""
     with RecordEpisodes(CorridorEnv(shows), tmp_path) as env:
         drive(env, 30, seed=3)
         env.end()
@@ -90,7 +89,6 @@ def test_observations_are_paired_with_actions(shows: Shows, tmp_path: Path) -> N
 
 
 def test_an_intervention_is_recorded_as_the_persons_action(tmp_path: Path) -> None:
-    """The program's action is kept as `wanted`."""
     inner = CorridorEnv()
     with RecordEpisodes(inner, tmp_path, driver="policy") as env:
         env.reset()
@@ -103,7 +101,6 @@ def test_an_intervention_is_recorded_as_the_persons_action(tmp_path: Path) -> No
 
 
 def test_decide_records_the_intended_action(tmp_path: Path) -> None:
-    """The intention of a demonstrator applies to one step."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
         env.reset()
         env.decide([0.0, 0.5], "expert", [1.0, 1.0])
@@ -116,7 +113,6 @@ def test_decide_records_the_intended_action(tmp_path: Path) -> None:
 
 
 def test_bytes_and_times_of_the_env_are_kept_as_they_are(tmp_path: Path) -> None:
-    """A robot's JPEG is not re-encoded, and a repeated frame is stored once."""
     inner: Any = CorridorEnv()
     inner.newest_jpeg = jpeg = _jpeg(inner)
     inner.record_clock = "twin"
@@ -138,7 +134,6 @@ def _jpeg(inner: CorridorEnv) -> bytes:
 
 
 def test_the_key_of_a_robot_is_not_recorded(tmp_path: Path) -> None:
-    """The other arguments of the env are recorded."""
     inner = CorridorEnv("state")
     inner.spec = EnvSpec("x/Y-v0", kwargs={"key": "5ec2e7", "shows": "state", "path": tmp_path})
     with RecordEpisodes(inner, tmp_path) as env:
@@ -150,7 +145,6 @@ def test_the_key_of_a_robot_is_not_recorded(tmp_path: Path) -> None:
 
 
 def test_the_outcome_of_an_episode(tmp_path: Path) -> None:
-    """Time limit, truncation reason, or none after a reset."""
     inner = CorridorEnv("state")
     with RecordEpisodes(TimeLimit(inner, 2), tmp_path / "time") as env:
         drive(env, 2)
@@ -165,7 +159,6 @@ def test_the_outcome_of_an_episode(tmp_path: Path) -> None:
 
 
 def test_a_reset_alone_records_nothing(tmp_path: Path) -> None:
-    """No folder is created."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path / "data") as env:
         env.reset()
         env.reset()
@@ -200,7 +193,6 @@ def small_files(size: int) -> Iterator[None]:
 def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
     size: int, tmp_path: Path
 ) -> None:
-    """The env gets a zero action, the error names the file, and complete steps are kept."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path) as env:
         env.reset()
@@ -222,7 +214,6 @@ def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
 def test_a_full_episode_goes_on_in_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The steps of one reset are in several episodes, of which only the first has the seed."""
     monkeypatch.setattr(writer, "FULL_BYTES", 1500)
     with RecordEpisodes(CorridorEnv("both"), tmp_path) as env:
         drive(env, 20, seed=3)
@@ -236,7 +227,6 @@ def test_a_full_episode_goes_on_in_the_next(
 
 
 def test_a_full_disk_raises_before_the_first_action(tmp_path: Path) -> None:
-    """The env is not stepped."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path, spare_bytes=1 << 62) as env:
         env.reset()
@@ -246,7 +236,6 @@ def test_a_full_disk_raises_before_the_first_action(tmp_path: Path) -> None:
 
 
 def test_two_recorders_in_one_folder(tmp_path: Path) -> None:
-    """The second recorder is refused before the env is stepped."""
     inner = CorridorEnv("state")
     with (
         EpisodeWriter.create(tmp_path, header(), spare_bytes=0),
@@ -284,7 +273,6 @@ def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
 
 
 def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
-    """The env gets a zero action."""
     inner = CorridorEnv("state")
     inner.more = {"captured_ns": 2_000}
     with RecordEpisodes(inner, tmp_path) as env:

@@ -26,14 +26,14 @@ _MAGNIFICATION: Final = 3
 
 
 def write_numbers(
-    path: Path, policy: CameraPolicy, judgement: EvaluationResult, training: Training | None
+    path: Path, policy: CameraPolicy, evaluation: EvaluationResult, training: Training | None
 ) -> None:
     """Write the report's numbers as JSON.
 
     Args:
         path: The file.
         policy: The policy.
-        judgement: Its evaluation.
+        evaluation: Its evaluation.
         training: How it was trained; None if unknown.
 
     Raises:
@@ -42,7 +42,7 @@ def write_numbers(
     write_json(
         path,
         {
-            "judgement": judgement,
+            "evaluation": evaluation,
             "training": training,
             "policy": policy.card,
             "outlook": outlook(policy.card),
@@ -54,7 +54,7 @@ def clone_html(
     name: str,
     policy: CameraPolicy,
     data: Dataset,
-    judgement: EvaluationResult,
+    evaluation: EvaluationResult,
     training: Training | None,
     data_note: str,
 ) -> str:
@@ -63,8 +63,8 @@ def clone_html(
     Args:
         name: Name of the policy.
         policy: The policy.
-        data: The steps that it was evaluated on, which `judgement.worst` indexes.
-        judgement: Its evaluation.
+        data: The steps that it was evaluated on, which `evaluation.worst` indexes.
+        evaluation: Its evaluation.
         training: How it was trained; None if unknown.
         data_note: A sentence on the steps that it was evaluated on.
 
@@ -72,30 +72,30 @@ def clone_html(
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
     card = policy.card
-    by_class = judgement.head == "class"
+    by_class = evaluation.head == "class"
     return render(
         Path(__file__).with_name("clone.html"),
         title=name,
         verdict=(
-            f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps; "
+            f"The policy chose the driver's action on {evaluation.accuracy:.1%} of the steps; "
             "always choosing the driver's most frequent action is right on "
-            f"{judgement.majority_baseline:.1%}. {data_note}"
+            f"{evaluation.majority_baseline:.1%}. {data_note}"
         ),
-        cards=_cards(judgement),
+        cards=_cards(evaluation),
         outlook=outlook(policy.card),
-        judgement=judgement,
+        evaluation=evaluation,
         errors=[
             (number, f"{error:.4g}")
-            for number, error in zip(judgement.numbers, judgement.errors, strict=False)
+            for number, error in zip(evaluation.numbers, evaluation.errors, strict=False)
         ],
-        calibration=svg_uri(calibration_chart(judgement.calibration)) if by_class else "",
-        calibration_error=f"{judgement.ece or 0.0:.3f}",
+        calibration=svg_uri(calibration_chart(evaluation.calibration)) if by_class else "",
+        calibration_error=f"{evaluation.ece or 0.0:.3f}",
         scatters=[
-            (number, svg_uri(scatter_chart(judgement, place)))
-            for place, number in enumerate(judgement.numbers[:_MAX_SCATTERS])
+            (number, svg_uri(scatter_chart(evaluation, place)))
+            for place, number in enumerate(evaluation.numbers[:_MAX_SCATTERS])
             if not by_class
         ],
-        frames=_worst(policy, data, judgement),
+        frames=_worst(policy, data, evaluation),
         training=training,
         training_chart="" if training is None else svg_uri(training_chart(training)),
         card=card,
@@ -107,20 +107,20 @@ def clone_html(
     )
 
 
-def _cards(judgement: EvaluationResult) -> list[tuple[str, str]]:
-    shown = [("Accuracy", f"{judgement.accuracy:.3f}"), ("Macro-F1", f"{judgement.macro_f1:.3f}")]
-    if judgement.ece is not None:
-        shown.append(("Calibration error", f"{judgement.ece:.3f}"))
+def _cards(evaluation: EvaluationResult) -> list[tuple[str, str]]:
+    shown = [("Accuracy", f"{evaluation.accuracy:.3f}"), ("Macro-F1", f"{evaluation.macro_f1:.3f}")]
+    if evaluation.ece is not None:
+        shown.append(("Calibration error", f"{evaluation.ece:.3f}"))
     else:
-        shown.append((f"Within {judgement.tolerance:g}", f"{judgement.within:.3f}"))
-    return [*shown, ("Most frequent action", f"{judgement.majority_baseline:.3f}")]
+        shown.append((f"Within {evaluation.tolerance:g}", f"{evaluation.within:.3f}"))
+    return [*shown, ("Most frequent action", f"{evaluation.majority_baseline:.3f}")]
 
 
 def _worst(
-    policy: CameraPolicy, data: Dataset, judgement: EvaluationResult
+    policy: CameraPolicy, data: Dataset, evaluation: EvaluationResult
 ) -> list[dict[str, Any]]:
     """The steps with the largest errors: what the driver did, and what the policy did."""
-    chosen = list(judgement.worst)
+    chosen = list(evaluation.worst)
     pictures = None if data.pictures is None else data.pictures[chosen]
     states = None if data.states is None else data.states[chosen]
     outputs = policy.outputs(pictures, states)
@@ -177,12 +177,12 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
     return svg_chart(SQUARE, draw)
 
 
-def scatter_chart(judgement: EvaluationResult, place: int) -> str:
+def scatter_chart(evaluation: EvaluationResult, place: int) -> str:
     """Plot one number of each action: the policy's over the driver's."""
 
     def draw(_: Figure, axes: Axes) -> None:
-        wanted = [row[place] for row in judgement.target]
-        done = [row[place] for row in judgement.predicted]
+        wanted = [row[place] for row in evaluation.target]
+        done = [row[place] for row in evaluation.predicted]
         low, high = min(*wanted, *done), max(*wanted, *done)
         axes.plot([low, high], [low, high], color="#777777", linestyle="--", linewidth=1.0)
         axes.scatter(wanted, done, s=9, alpha=0.35, color=BLUE, linewidths=0, rasterized=True)

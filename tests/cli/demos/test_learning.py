@@ -51,7 +51,7 @@ def test_a_recording_becomes_a_policy_with_a_report(
     assert page.count("data:image/png;base64,") == 12
     assert "http" not in page.replace("http://www.w3.org", "")
     report = json.loads(out.with_suffix(".json").read_text())
-    assert report["judgement"]["steps"] == 30
+    assert report["evaluation"]["steps"] == 30
     assert report["outlook"]["minutes"] == 0.1  # 120 of 150 steps at 20 Hz.
     printed = " ".join(capsys.readouterr().out.split())
     for told in (report["outlook"]["expected"], report["outlook"]["next_step"]):
@@ -66,8 +66,8 @@ def test_a_recording_becomes_a_policy_with_a_report(
     Evaluate(out, _record(tmp_path / "other", 60, 1), report=tmp_path / "r" / "page.html").run()
     lines = capsys.readouterr().out.splitlines()
     report = json.loads((tmp_path / "r" / "page.json").read_text())
-    assert lines[-1] == f"accuracy {report['judgement']['accuracy']:.3f}"
-    assert report["judgement"]["accuracy"] > 0.8
+    assert lines[-1] == f"accuracy {report['evaluation']['accuracy']:.3f}"
+    assert report["evaluation"]["accuracy"] > 0.8
 
 
 def test_regression_prints_errors_and_accuracy(

@@ -34,7 +34,6 @@ def _augmented(seed: int = 0, **changes: float) -> tuple[Tensor, Tensor, Tensor,
 
 
 def test_a_neutral_augmentation_changes_nothing() -> None:
-    """Each change can be switched off."""
     seen, wanted, before, actions = _augmented()
     torch.testing.assert_close(seen, before)
     torch.testing.assert_close(wanted, actions)
@@ -56,7 +55,6 @@ def test_each_image_is_mirrored_with_its_action() -> None:
 
 
 def test_a_shift_repeats_the_edge() -> None:
-    """Pixels beyond the image repeat its edge."""
     seen, wanted, before, actions = _augmented(shift=2)
     moved = set[tuple[int, int]]()
     for new, old in zip(seen, before, strict=True):
@@ -71,7 +69,6 @@ def test_a_shift_repeats_the_edge() -> None:
 
 
 def test_the_gain_scales_whole_images() -> None:
-    """Each image is multiplied by one factor within the bounds."""
     seen, _, before, _ = _augmented(gain=1.25)
     factor = (seen / before).flatten(1)
     assert float(factor.std(dim=1).max()) < 1e-5
@@ -80,7 +77,6 @@ def test_the_gain_scales_whole_images() -> None:
 
 
 def test_colour_channels_are_scaled_separately() -> None:
-    """Each channel of an image has its own factor."""
     seen, _, before, _ = _augmented(colour=1.2)
     factor = (seen / before).flatten(2)
     assert float(factor.std(dim=2).max()) < 1e-5
@@ -88,14 +84,12 @@ def test_colour_channels_are_scaled_separately() -> None:
 
 
 def test_the_share_of_blurred_and_noisy_images() -> None:
-    """A quarter of 64 images changes, give or take one."""
     for changes in ({"blurred": 0.25}, {"noisy": 0.25, "noise": 0.1}):
         seen, _, before, _ = _augmented(**changes)
         assert int((seen != before).any(dim=(1, 2, 3)).sum()) in (16, 17)
 
 
 def test_values_stay_in_range() -> None:
-    """Pixel values stay within 0 to 1 for any augmentation."""
     seen, _, _, _ = _augmented(gain=4.0, offset=0.5, noise=0.5, noisy=1.0, blurred=1.0)
     assert float(seen.min()) >= 0.0
     assert float(seen.max()) <= 1.0
@@ -111,6 +105,5 @@ def test_the_same_seed_gives_the_same_images() -> None:
     "wrong", [{"mirror": 1.5}, {"noisy": -0.1}, {"shift": -1}, {"noise": -1.0}, {"gain": 0.5}]
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
-    """Invalid values raise CloningError at construction."""
     with pytest.raises(CloningError):
         Augmentation(**wrong)  # pyright: ignore[reportArgumentType]

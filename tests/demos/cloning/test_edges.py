@@ -17,7 +17,6 @@ def _bars(upright: bool) -> Tensor:
 
 
 def test_each_direction_has_its_channel() -> None:
-    """Vertical bars activate the first direction, horizontal bars the middle one."""
     upright, level = (edges(_bars(x), (4, 4)).mean(dim=(0, 2, 3)) for x in (True, False))
     assert int(upright.argmax()) == 0
     assert int(level.argmax()) == DIRECTIONS // 2
@@ -25,7 +24,6 @@ def test_each_direction_has_its_channel() -> None:
 
 
 def test_neither_light_nor_colour_matters() -> None:
-    """Features hardly change with half the light or with yellow light."""
     before = edges(_bars(True), (4, 4))
     yellow = torch.tensor([1.0, 0.9, 0.4]).view(1, 3, 1, 1)
     for other in (0.5 * _bars(True), yellow * _bars(True)):
@@ -33,12 +31,10 @@ def test_neither_light_nor_colour_matters() -> None:
 
 
 def test_a_black_image_has_no_edges() -> None:
-    """Noise is not amplified."""
     assert float(edges(torch.zeros(1, 3, 32, 32), (4, 4)).max()) == 0.0
 
 
 def test_images_of_any_size_have_features() -> None:
-    """Includes images smaller than a cell."""
     for height, width in ((48, 64), (30, 41), (3, 5)):
         eyes = EdgeEyes(Framing(height=height, width=width, top=0.0), (8, 8), 5)
         found = eyes(torch.rand(2, 3, height, width))

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.evaluation import judge, macro_f1, tercile_classes
+from shapechanger.demos.cloning.evaluation import evaluate, macro_f1, tercile_classes
 from shapechanger.demos.cloning.learn import best_temperature, learn
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -27,7 +27,6 @@ def keys() -> CameraPolicy:
 
 
 def test_macro_f1_weighs_classes_equally() -> None:
-    """Includes a class that was predicted and never correct (computed by hand)."""
     truth, done = np.array([0, 0, 0, 1]), np.array([0, 0, 1, 2])
     assert macro_f1(done, truth) == pytest.approx((2 * 2 / 5 + 0.0 + 0.0) / 3)
     assert macro_f1(truth, truth) == 1.0
@@ -37,7 +36,7 @@ def test_the_metrics_are_consistent(keys: CameraPolicy) -> None:
     """Confusion, accuracy, calibration and worst frames describe the same steps."""
     data = stripes(60, 5)
     data.actions[:5] = [0, 1, 0, 0]  # A key that was not in the training data.
-    report = judge(keys, data)
+    report = evaluate(keys, data)
     confusion = np.array(report.confusion)
     assert confusion.sum() == report.steps == 60
     assert np.trace(confusion) / 60 == pytest.approx(report.accuracy)
@@ -51,18 +50,16 @@ def test_the_metrics_are_consistent(keys: CameraPolicy) -> None:
     assert set(range(5)) <= set(report.worst)
 
 
-def test_only_the_chosen_steps_are_judged(keys: CameraPolicy) -> None:
-    """Indices of the worst steps count over all steps."""
+def test_only_the_chosen_steps_are_evaluated(keys: CameraPolicy) -> None:
     data = stripes(60, 5)
-    report = judge(keys, data, np.arange(60) >= 40)
+    report = evaluate(keys, data, np.arange(60) >= 40)
     assert report.steps == 20
     assert min(report.worst) >= 40
-    with pytest.raises(CloningError, match="no step to judge"):
-        judge(keys, data, np.zeros(60, np.bool_))
+    with pytest.raises(CloningError, match="no step to evaluate"):
+        evaluate(keys, data, np.zeros(60, np.bool_))
 
 
 def test_regression_is_correct_in_the_same_third() -> None:
-    """Thirds are left, straight and right; back, still and forward."""
     actions = np.array([[-1.0, 1.0], [-0.4, 0.4], [0.2, 0.0], [0.4, -0.9]])
     names, numbers = tercile_classes(actions, STEERS)
     assert [names[i] for i in numbers] == [
@@ -92,7 +89,7 @@ def scores(done: NDArray[np.float64], wanted: NDArray[np.float64], layout: Layou
     data = dataclasses.replace(
         stripes(len(wanted), 0), actions=wanted, pictures=None, action_layout=layout
     )
-    report = judge(Answers(done), data)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+    report = evaluate(Answers(done), data)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
     return [report.accuracy, report.within, report.macro_f1, *(-np.array(report.errors))]
 
 
@@ -110,7 +107,6 @@ UNBOUNDED = Layout((Feature("left", "N·m"), Feature("right", "N·m", high=1.0))
 def test_no_metric_gains_from_an_absurd_output(
     *, seed: int, steps: int, layout: Layout, absurd: float, unrelated: bool
 ) -> None:
-    """However good or bad the outputs are, replacing them by absurd ones improves no metric."""
     rng = np.random.default_rng(seed)
     wanted = rng.uniform(-1.0, 1.0, (steps, 2))
     done = rng.uniform(-1.0, 1.0, (steps, 2)) if unrelated else wanted.copy()
@@ -126,7 +122,6 @@ def test_no_metric_gains_from_an_absurd_output(
 @settings(max_examples=50)
 @given(seed=st.integers(0, 10_000), by=st.floats(0.0, 100.0))
 def test_no_metric_gains_when_a_right_output_moves(seed: int, by: float) -> None:
-    """Moving an output away from the driver's action never improves a metric."""
     rng = np.random.default_rng(seed)
     wanted = rng.uniform(-1.0, 1.0, (20, 2))
     done = np.where(rng.random((20, 1)) < 0.5, wanted, rng.uniform(-1.0, 1.0, (20, 2)))
@@ -138,11 +133,10 @@ def test_no_metric_gains_when_a_right_output_moves(seed: int, by: float) -> None
         assert all(b <= a + 1e-12 for a, b in zip(before, after, strict=True))
 
 
-def test_regression_is_judged_by_errors() -> None:
-    """Errors are in the units of the actions."""
+def test_regression_is_evaluated_by_errors() -> None:
     policy = learn(stripes(120, 0, STEERS), settings=QUICK, seed=0)[0]
     data = stripes(50, 6, STEERS)
-    report = judge(policy, data)
+    report = evaluate(policy, data)
     done = policy.predict_many(data.pictures)
     np.testing.assert_allclose(report.errors, np.abs(done - data.actions).mean(axis=0), rtol=1e-5)
     assert report.within == pytest.approx((np.abs(done - data.actions) <= 0.1).all(axis=1).mean())
@@ -151,7 +145,6 @@ def test_regression_is_judged_by_errors() -> None:
 
 
 def test_the_temperature_calibrates_confidence() -> None:
-    """Logits that are three times too large give 3; few steps give 1."""
     generator = torch.Generator().manual_seed(0)
     logits = torch.randn((4000, 3), generator=generator)
     drawn = torch.multinomial(logits.softmax(dim=1), 1, generator=generator)[:, 0]

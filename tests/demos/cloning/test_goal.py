@@ -34,21 +34,18 @@ def _card(
 
 
 def test_keys_become_classes_with_names() -> None:
-    """Classes are ordered by frequency."""
     card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), _KEYS, "auto")
     assert (card.head, card.class_names) == ("class", ("forward", "left", "none"))
     assert card.targets(_keys("LFNB")).tolist() == [1, 0, 2, -1]
 
 
 def test_mirrored_actions_are_classes_too() -> None:
-    """Mirrored images need a class for their actions."""
     actions = _keys("FFFFFFFFLLLLLLLL")
     card = _card(actions, _KEYS, "class", actions[:, [0, 1, 3, 2]])
     assert set(card.class_names) == {"forward", "left", "right"}
 
 
 def test_numbers_are_scaled_by_their_layout() -> None:
-    """Features without bounds are scaled by the data, and constant features are accepted."""
     layout = Layout((Feature("a", "N", 0.0, 10.0), Feature("b", "m"), Feature("c", "m")))
     actions = np.stack([np.linspace(2, 8, 50), np.linspace(-3, 5, 50), np.ones(50)], axis=1)
     card = _card(actions.astype(np.float32), layout, "auto")
@@ -57,14 +54,12 @@ def test_numbers_are_scaled_by_their_layout() -> None:
 
 
 def test_many_distinct_actions_give_regression() -> None:
-    """Ten distinct actions in ten steps are not classes."""
     rng = np.random.default_rng(0)
     card = _card(rng.uniform(-1, 1, (10, 2)).astype(np.float32), _STEERS, "auto")
     assert card.head == "regression"
 
 
 def test_unsuitable_classes_are_refused() -> None:
-    """Too many classes and a single class raise errors."""
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
     with pytest.raises(CloningError, match="200 different actions, but at most 16"):
@@ -74,7 +69,6 @@ def test_unsuitable_classes_are_refused() -> None:
 
 
 def test_an_action_outside_the_classes() -> None:
-    """Close actions match a class; others give -1."""
     classes = ((0.0, 1.0), (1.0, 0.0))
     actions = np.array([[1.0 + 1e-6, 0.0], [0.5, 0.5], [math.nan, 0.0]])
     assert class_numbers(actions, classes).tolist() == [1, -1, -1]

@@ -15,14 +15,12 @@ def _layout(*names: str, low: float = -1.0) -> Layout:
 
 
 def test_steering_is_negated_and_throttle_kept() -> None:
-    """The order of features does not matter."""
     assert mirror_of(_layout("steering", "throttle")) == STEERING
     turned = mirror_of(_layout("throttle", "steering"))(np.array([[0.5, -0.25]], np.float32))
     np.testing.assert_array_equal(turned, [[0.5, 0.25]])
 
 
 def test_left_and_right_are_swapped() -> None:
-    """For four keys, and for the two tracks of a tank."""
     keys = mirror_of(_layout("forward", "backward", "right", "left", low=0.0))
     left, right = np.eye(4, dtype=np.float32)[[3]], np.eye(4, dtype=np.float32)[[2]]
     np.testing.assert_array_equal(keys(left), right)
@@ -32,7 +30,6 @@ def test_left_and_right_are_swapped() -> None:
 
 
 def test_a_state_is_mirrored_with_its_image() -> None:
-    """The yaw rate is negated, and the speed kept."""
     layout = Layout((Feature("speed", "m/s"), Feature("yaw_rate", "rad/s")))
     turned = mirror_of(layout)(np.array([[2.0, 0.5]], np.float32))
     np.testing.assert_array_equal(turned, [[2.0, -0.5]])
@@ -48,13 +45,11 @@ def test_a_state_is_mirrored_with_its_image() -> None:
     ],
 )
 def test_a_layout_without_a_mirror_is_refused(layout: Layout, name: str) -> None:
-    """The error names the feature."""
     with pytest.raises(CloningError, match=f"the mirror image of .*{name}"):
         mirror_of(layout)
 
 
 def test_balance_of_both_sides() -> None:
-    """0 is one side only, 1 both equally."""
     keys = mirror_of(_layout("forward", "backward", "right", "left", low=0.0))
     forward, _, right, left = np.eye(4, dtype=np.float32)
     assert keys.balance(np.stack([left, left, forward])) == 0.0

@@ -34,7 +34,6 @@ def _card(learned_s: object, layout: Layout | None = STEERS, **changes: Any) -> 
 
 @pytest.mark.parametrize("row", [*EXPERT, *CORRECTED])
 def test_rates_are_those_of_the_benchmark(row: Driven) -> None:
-    """The table in the code equals the measured rows."""
     rows = json.loads(RESULTS.read_text())["rows"]
     (found,) = [each for each in rows if each["name"].startswith(f"{row.row}: collisions")]
     assert float(found["value"]) == row.per_100_m
@@ -44,7 +43,6 @@ def test_rates_are_those_of_the_benchmark(row: Driven) -> None:
 
 @given(st.floats(1.0, 1e5), st.sampled_from([STEERS, KEYS]))
 def test_every_driver_hears_a_rate_and_a_next_step(learned_s: float, layout: Layout) -> None:
-    """Whatever the length, the outlook states it, a rate that was measured, and corrections."""
     found = outlook(_card(learned_s, layout))
     assert found is not None
     assert f"{found.minutes:.1f} minutes" in found.expected
@@ -68,7 +66,6 @@ def test_more_driving_never_promises_more_collisions(learned_s: float, more: flo
 
 
 def test_two_minutes_of_keys_are_told_to_record_more() -> None:
-    """A short drive hears the rate of short drives, and which length helps."""
     found = outlook(_card(96.0, KEYS))
     assert found is not None
     assert "more than 3.5 (5.9 for the worst of 3 seeds) collisions per 100 m" in found.expected
@@ -77,18 +74,15 @@ def test_two_minutes_of_keys_are_told_to_record_more() -> None:
 
 @pytest.mark.parametrize("learned_s", [0.0, float("nan"), float("inf"), "long", None])
 def test_an_unknown_length_promises_nothing(learned_s: object) -> None:
-    """Cards of others may hold anything."""
     assert outlook(_card(learned_s)) is None
 
 
 def test_other_robots_are_promised_nothing() -> None:
-    """Rates of a car say nothing about a finger, or about a policy without pictures."""
     assert outlook(_card(60.0, None)) is None
     assert outlook(_card(60.0, Layout((Feature("tension/FDP", "N"),)))) is None
     assert outlook(_card(60.0, eyes="none", nerves=(4,), state_layout=STATE)) is None
 
 
 def test_a_duration_follows_the_times_of_each_episode() -> None:
-    """Gaps count, the number of steps alone does not."""
     assert duration_s(np.array([0.0, 0.1, 5.0, 0.0, 0.1]), [3, 2], 10.0) == pytest.approx(5.3)
     assert duration_s(np.array([0.0, 2.0]), [2], 0.0) == 2.0

@@ -16,7 +16,6 @@ def _pictures(n: int, height: int = 120, width: int = 160) -> np.ndarray:
 
 @pytest.mark.parametrize("scale", [1, 2])
 def test_each_pixel_is_the_mean_of_its_block(scale: int) -> None:
-    """Means are rounded half up, below the cropped rows."""
     pictures = _pictures(3, 120 * scale, 160 * scale)
     size = 2 * scale
     blocks = pictures[:, 24 * scale :].reshape(3, 48, size, 80, size, 3).astype(np.float64)
@@ -25,7 +24,6 @@ def test_each_pixel_is_the_mean_of_its_block(scale: int) -> None:
 
 
 def test_batches_match_single_images() -> None:
-    """Preparing in chunks gives the same result."""
     pictures = _pictures(300)
     small = prepare(pictures, _FRAMING)
     assert small.dtype == np.uint8
@@ -35,7 +33,6 @@ def test_batches_match_single_images() -> None:
 
 @pytest.mark.parametrize("size", [(100, 160), (120, 170), (20, 40), (7, 1), (1, 1)])
 def test_other_sizes_are_resized_by_area(size: tuple[int, int]) -> None:
-    """Matches averaging over a grid that divides both sizes."""
     framing = Framing(height=6, width=9, top=0.2)
     pictures = _pictures(2, *size)
     first = min(round(0.2 * size[0]), size[0] - 1)
@@ -48,13 +45,11 @@ def test_other_sizes_are_resized_by_area(size: tuple[int, int]) -> None:
 
 
 def test_a_uniform_image_stays_uniform() -> None:
-    """Rounding does not change white."""
     white = np.full((1, 101, 67, 3), 255, np.uint8)
     assert (prepare(white, _FRAMING) == 255).all()
 
 
 def test_prepared_images_are_returned_unchanged() -> None:
-    """No copy is made."""
     small = prepare(_pictures(2), _FRAMING)
     assert prepare(small, _FRAMING) is small
 
@@ -74,7 +69,6 @@ def test_an_empty_batch() -> None:
     ],
 )
 def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
-    """The error gives shape or dtype."""
     with pytest.raises(CloningError, match=words):
         prepare(pictures, _FRAMING)
 
@@ -83,6 +77,5 @@ def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
     "wrong", [{"height": 0}, {"width": -1}, {"top": 1.0}, {"top": float("nan")}]
 )
 def test_invalid_framing_is_refused(wrong: dict[str, float]) -> None:
-    """Sizes must be positive, and some rows remain."""
     with pytest.raises(CloningError, match="Invalid framing of"):
         Framing(**wrong)  # pyright: ignore[reportArgumentType]

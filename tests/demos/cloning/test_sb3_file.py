@@ -69,7 +69,6 @@ def _done(policy: CameraPolicy, inputs: Inputs, data: Any) -> np.ndarray:
 
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
 def test_sac_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) -> None:
-    """Raw observations are accepted, single and batched."""
     policy, data = _policy(STEERS, inputs), stripes(16, 1, STEERS)
     size = None if inputs == "state" else _SIZE
     as_sac(policy, size, batch_size=8, buffer_size=64).save(tmp_path / "sac.zip")
@@ -87,7 +86,6 @@ def test_sac_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) 
 
 @pytest.mark.parametrize("inputs", ["picture", "both"])
 def test_ppo_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) -> None:
-    """Regression outputs are squashed as in the clone."""
     policy, data = _policy(STEERS, inputs), stripes(16, 1, STEERS)
     as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
     model = PPO.load(tmp_path / "ppo.zip", env=_World(STEERS, inputs))
@@ -98,7 +96,6 @@ def test_ppo_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) 
 
 
 def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
-    """A wrapper maps class numbers to keys."""
     policy, data = _policy(KEYS), stripes(16, 1)
     as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
     model = PPO.load(tmp_path / "ppo.zip", env=ChosenActions(_World(KEYS, "picture"), policy))
@@ -116,7 +113,6 @@ def test_sac_refuses_classes() -> None:
 
 
 def test_sac_explores_close_to_the_clone() -> None:
-    """Stochastic actions stay near the clone's."""
     policy, data = _policy(STEERS), stripes(64, 1, STEERS)
     tried = as_sac(policy, _SIZE, buffer_size=64).predict(data.pictures, deterministic=False)[0]
     apart = np.abs(tried - _done(policy, "picture", data)).mean(axis=0)
@@ -126,12 +122,10 @@ def test_sac_explores_close_to_the_clone() -> None:
 
 
 def test_settings_reach_the_learner() -> None:
-    """Settings are passed on, except for the shape of the actor."""
     model = as_sac(_policy(STEERS), _SIZE, gamma=0.9, buffer_size=64)
     assert (model.gamma, model.buffer_size) == (0.9, 64)
 
 
 def test_critic_features_are_normalized() -> None:
-    """Shift and scale of the inputs do not matter."""
     x = torch.tensor([[1.0, 2.0, 4.0, 9.0]])
     torch.testing.assert_close(NormedReLU()(x), NormedReLU()(1000.0 * x + 5.0), atol=1e-3, rtol=0.0)

@@ -89,7 +89,6 @@ def test_headers_round_trip(tmp_path: Path) -> None:
 
 
 def test_two_episodes_of_the_same_second_have_two_folders(tmp_path: Path) -> None:
-    """Short episodes in quick succession do not overwrite each other."""
     now = datetime(2026, 11, 21, tzinfo=UTC)
     for _ in range(2):
         EpisodeWriter.create(tmp_path, header(), spare_bytes=0, now=lambda: now).close()
@@ -98,7 +97,6 @@ def test_two_episodes_of_the_same_second_have_two_folders(tmp_path: Path) -> Non
 
 
 def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
-    """A reader of a growing recording sees every step written so far."""
     writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
     writer.add(step(0), picture())
     read = read_episode(writer.path)
@@ -139,7 +137,6 @@ def test_undo_excludes_what_is_later(
     has_clock: bool,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
-    """Each undo excludes the newest kept step and all less than so many seconds before it."""
     times_ns = [began_ns + round(1e9 * at_s) for at_s in times_s]
     if not has_clock:  # Steps of 1/20 s.
         times_ns = [50_000_000 * number for number in range(len(times_s))]
@@ -161,7 +158,6 @@ def test_undo_excludes_what_is_later(
     "seconds", [0.0, -0.0, -1e-300, -1.0, -math.inf, math.nan, math.inf], ids=str
 )
 def test_undo_refuses_what_is_no_duration(tmp_path: Path, seconds: float) -> None:
-    """Nothing is excluded by a duration that is not positive, or not finite."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step(0))
         with pytest.raises(DemosError, match=rf"must be (positive|finite), got {seconds}\."):
@@ -194,7 +190,6 @@ def test_undo_refuses_what_is_no_duration(tmp_path: Path, seconds: float) -> Non
 def test_a_free_path_is_found_beside_any_others(
     stem: str, number: int, kind: str, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """Whatever a name ends with and whatever has it, the next path is free and begins like it."""
     folder = tmp_path_factory.mktemp("recording")
     (folder / f"{stem}-odd").mkdir()
     for _ in range(number):
@@ -212,7 +207,6 @@ def test_a_free_path_is_found_beside_any_others(
 
 
 def test_counting_goes_on_from_a_counted_name(tmp_path: Path) -> None:
-    """Four digits after a dash are a number; dates and others are part of the name."""
     for stem, following in (
         ("20261124T1200Z-0001", "20261124T1200Z-0002"),
         ("drive-20261124", "drive-20261124-0001"),
@@ -226,7 +220,6 @@ def test_counting_goes_on_from_a_counted_name(tmp_path: Path) -> None:
 def test_a_missing_picture_does_not_keep_the_others_from_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All other pictures and the steps are flushed, and so they are if the disk fails at one."""
     flushed: list[str] = []
 
     def fsync(fd: int) -> None:
@@ -249,7 +242,6 @@ def test_a_missing_picture_does_not_keep_the_others_from_the_disk(
 
 
 def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:
-    """Undo without steps returns 0."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         assert writer.undo() == 0
         with pytest.raises(DemosError, match="must be positive, got nan"):
@@ -257,7 +249,6 @@ def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:
 
 
 def test_dropped_steps_can_be_kept_again(tmp_path: Path) -> None:
-    """Later edits override earlier ones, and recorded lines are never rewritten."""
     path = recorded(tmp_path)
     before = (path / "steps.jsonl").read_bytes()
     drop(path, 1, 3, "bad")
@@ -270,7 +261,6 @@ def test_dropped_steps_can_be_kept_again(tmp_path: Path) -> None:
 
 
 def test_dropping_missing_steps_is_refused(tmp_path: Path) -> None:
-    """The error gives the range of existing steps."""
     path = recorded(tmp_path)
     with pytest.raises(DemosError, match="has the steps 0 to 4, and not 3 to 5"):
         drop(path, 3, 5, "bad")
@@ -288,7 +278,6 @@ def test_dropping_missing_steps_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_an_invalid_step_is_refused(tmp_path: Path, change: dict[str, object], reason: str) -> None:
-    """The error names the step and the reason, and recording continues."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step(0))
         with pytest.raises(DemosError, match=f"Step 1 of .* cannot be recorded: .*{reason}"):
@@ -298,7 +287,6 @@ def test_an_invalid_step_is_refused(tmp_path: Path, change: dict[str, object], r
 
 
 def test_an_invalid_frame_is_refused(tmp_path: Path) -> None:
-    """Data that are not a JPEG, or are too large, are not written."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         with pytest.raises(DemosError, match="its picture is not a JPEG"):
             writer.add(step(0), b"GIF89a")
@@ -308,7 +296,6 @@ def test_an_invalid_frame_is_refused(tmp_path: Path) -> None:
 
 
 def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
-    """The second recorder is refused, and the folder is free after the first closes."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         with pytest.raises(DemosError, match="is in use by another recorder"):
             EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
@@ -319,14 +306,12 @@ def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_is_nearly_full_is_not_filled(tmp_path: Path) -> None:
-    """The error gives the free space, and no file is created."""
     with pytest.raises(OutputError, match="MB of the disk are free"):
         EpisodeWriter.create(tmp_path, header(), spare_bytes=1 << 60)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_closed_episode_refuses_steps(tmp_path: Path) -> None:
-    """Closing twice is allowed; adding a step after closing is not."""
     writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
     writer.close()
     writer.close()
@@ -335,7 +320,6 @@ def test_a_closed_episode_refuses_steps(tmp_path: Path) -> None:
 
 
 def test_an_invalid_recording_is_named(tmp_path: Path) -> None:
-    """A missing folder, a file and an empty folder have different errors."""
     (tmp_path / "file").touch()
     (tmp_path / "empty").mkdir()
     for name, reason in [
@@ -350,7 +334,6 @@ def test_an_invalid_recording_is_named(tmp_path: Path) -> None:
 
 
 def test_a_later_format_is_refused(tmp_path: Path) -> None:
-    """A newer format version raises an error."""
     path = recorded(tmp_path)
     file = path / "episode.json"
     file.write_text(file.read_text().replace('"format": 1', '"format": 2'))
@@ -360,7 +343,6 @@ def test_a_later_format_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("harm", ["missing", "short", "changed"])
 def test_a_damaged_frame_is_detected(tmp_path: Path, harm: str) -> None:
-    """Damage is found on reading, and the error names the repair command."""
     path = recorded(tmp_path)
     file = path / "frames" / "000002.jpg"
     if harm == "missing":

@@ -14,7 +14,6 @@ from tests.demos.episodes.making import header, picture, recorded, step
 @settings(max_examples=40)
 @given(share=st.floats(0.0, 1.0))
 def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """All complete steps are kept, and the partial line is moved to `lost`."""
     path = recorded(tmp_path_factory.mktemp("recording"), close=False)
     file = path / "steps.jsonl"
     content = file.read_bytes()
@@ -39,7 +38,6 @@ def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFact
 def test_one_flipped_bit_costs_one_step(
     place: int, bit: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """A flipped bit on a memory card costs its line, or two where the line break is hit."""
     path = recorded(tmp_path_factory.mktemp("recording"))
     file = path / "steps.jsonl"
     content = bytearray(file.read_bytes())
@@ -52,7 +50,6 @@ def test_one_flipped_bit_costs_one_step(
 
 
 def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
-    """No byte of any file changes."""
     path = recorded(tmp_path)
     before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
     assert not repair(path).changed
@@ -60,7 +57,6 @@ def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_frame_without_a_step_is_moved_to_lost(tmp_path: Path) -> None:
-    """Nothing is deleted."""
     path = recorded(tmp_path, close=False)
     (path / "frames" / "000005.jpg").write_bytes(picture(5)[:20])
     assert repair(path).pictures == 1
@@ -68,7 +64,6 @@ def test_a_frame_without_a_step_is_moved_to_lost(tmp_path: Path) -> None:
 
 
 def test_lost_pictures_with_one_name_are_all_kept(tmp_path: Path) -> None:
-    """The second one gets the next free number."""
     path = recorded(tmp_path, close=False)
     for size in (20, 30):
         (path / "frames" / "000005.jpg").write_bytes(picture(5)[:size])
@@ -79,7 +74,6 @@ def test_lost_pictures_with_one_name_are_all_kept(tmp_path: Path) -> None:
 
 
 def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
-    """The other steps survive, and marks and drops keep their step numbers."""
     path = recorded(tmp_path)
     (path / "frames" / "000002.jpg").unlink()
     done = repair(path)
@@ -89,7 +83,6 @@ def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
 
 
 def test_a_running_recording_is_refused(tmp_path: Path) -> None:
-    """Repairing an episode while it is being recorded raises an error."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step())
         with pytest.raises(DemosError, match="is being recorded at this moment"):

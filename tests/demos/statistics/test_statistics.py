@@ -18,7 +18,6 @@ from tests.demos.episodes.making import header, recorded, step
 
 
 def test_numbers_are_counted_in_bins() -> None:
-    """Bounds fall into the outer bins, and 0 has its own bin."""
     found = spread([-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, math.nan], -1.0, 1.0)
     assert found is not None
     assert (found.counts[0], found.counts[10], found.counts[-1]) == (1, 4, 2)
@@ -27,7 +26,6 @@ def test_numbers_are_counted_in_bins() -> None:
 
 
 def test_without_bounds_the_range_is_that_of_the_numbers() -> None:
-    """Equal numbers get a range around them; no finite number gives None."""
     found = spread([2.0, 4.0])
     assert found is not None
     assert (found.low, found.high) == (2.0, 4.0)
@@ -38,7 +36,6 @@ def test_without_bounds_the_range_is_that_of_the_numbers() -> None:
 
 
 def test_summary_of_an_episode(tmp_path: Path) -> None:
-    """Only kept steps count, and drivers are ordered by steps."""
     with EpisodeWriter.create(tmp_path, header(env="x/Car-v1"), spare_bytes=0) as writer:
         for number in range(10):
             writer.add(
@@ -71,7 +68,6 @@ def test_summary_of_an_episode(tmp_path: Path) -> None:
 def test_durations_are_those_of_the_times(
     hz: float, spread_by: float, pauses_s: list[float], dropped: int
 ) -> None:
-    """Steps last until the next one, without pauses, whatever rate the header states."""
     rng = np.random.default_rng(1)
     periods_s = (1 + rng.uniform(-spread_by, spread_by, 40)) / hz
     parts = [periods_s[n * 10 : (n + 1) * 10] for n in range(len(pauses_s) + 1)]
@@ -87,7 +83,6 @@ def test_durations_are_those_of_the_times(
 
 
 def test_an_episode_lasts_as_long_as_its_times_say(tmp_path: Path) -> None:
-    """A robot that is commanded at a fourth of its rate drives four times as long."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         for number in range(100):
             at_ns = number * 200_000_000
@@ -100,7 +95,6 @@ def test_an_episode_lasts_as_long_as_its_times_say(tmp_path: Path) -> None:
 
 
 def test_jitter_is_measured_and_bounded() -> None:
-    """A few outliers do not count, and two settings never become one."""
     assert rate_jitter([0.05] * 100, 20.0) == pytest.approx(0.0)
     assert rate_jitter([0.051] * 97 + [5.0] * 3, 20.0) == pytest.approx(0.02)
     assert rate_jitter([0.05, 0.2] * 50, 20.0) == 0.25

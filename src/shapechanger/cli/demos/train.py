@@ -41,7 +41,7 @@ class TrainClone:
     split: Literal["time", "episode"] = "time"
     """Held-out data: the last stretch of time, or the last complete episodes."""
     held_out: float = 0.2
-    """Share of the steps that judges the policy and is not learned from; 0 to learn from all."""
+    """Share of the steps to evaluate the policy on, not learned from; 0 to learn from all."""
     waypoints: bool = False
     """Learn where the free way is instead of steering and throttle, for any vehicle to follow:
     shapechanger play TankWaypoint --policy ..."""
@@ -64,8 +64,8 @@ class TrainClone:
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.demos.clone_report")
         from shapechanger.demos.clone_report import clone_html, write_numbers
-        from shapechanger.demos.cloning.evaluation import duration_s, judge, outlook
-        from shapechanger.demos.cloning.examples import judged_steps
+        from shapechanger.demos.cloning.evaluation import duration_s, evaluate, outlook
+        from shapechanger.demos.cloning.examples import evaluated_steps
         from shapechanger.demos.cloning.learn import learn
         from shapechanger.demos.cloning.settings import settings_for
         from shapechanger.demos.cloning.shrinking import ShrunkFrames
@@ -88,10 +88,10 @@ class TrainClone:
             for note in (view.note(), *shown.notes):
                 say(note)
             data, origin = shown.data, {"response": astuple(shown.response)}
-        judged = judged_steps(data.episodes, self.split, self.held_out)
-        learned = ~judged
+        evaluated = evaluated_steps(data.episodes, self.split, self.held_out)
+        learned = ~evaluated
         n = int(learned.sum())
-        say(f"{n} steps to learn from, {len(data) - n} to judge by")
+        say(f"{n} steps to learn from, {len(data) - n} to evaluate on")
         try:
             with _Progress(settings.members, settings.steps(n)) as progress:
                 policy, training = learn(
@@ -119,23 +119,23 @@ class TrainClone:
             **origin,
         )
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
-        if not judged.any():
-            judged = learned
+        if not evaluated.any():
+            evaluated = learned
             note = "These are the steps that it learned from, so expect less on others."
-        judgement = judge(policy, data, judged)
+        evaluation = evaluate(policy, data, evaluated)
         policy.save(self.out)
         for path in self._write_for_sb3(policy, shrinking.size):
             say(f"wrote {path}")
         page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
-        report = clone_html(self.out.name, policy, data, judgement, training, note)
+        report = clone_html(self.out.name, policy, data, evaluation, training, note)
         write_atomic(page, report.encode())
-        write_numbers(numbers, policy, judgement, training)
+        write_numbers(numbers, policy, evaluation, training)
         say(f"wrote {self.out}, {page} and {numbers}")
         say(note)
         if (ahead := outlook(policy.card)) is not None:
             say(ahead.expected)
             say(ahead.next_step)
-        _print_judgement(judgement)
+        _print_evaluation(evaluation)
 
     def _view(self) -> CanonicalView | None:
         """Return how pictures are warped; None without waypoints."""
@@ -205,26 +205,26 @@ class _Progress(StudyProgress):
         return f"network {member + 1}"
 
 
-def _print_judgement(judgement: EvaluationResult) -> None:
+def _print_evaluation(evaluation: EvaluationResult) -> None:
     """Print an evaluation; the last line is the accuracy."""
-    always = f"always the same: {judgement.majority_baseline:.3f}"
-    say(f"{judgement.steps} steps; {always}")
-    if judgement.head == "class":
-        for name, row in zip(judgement.classes, judgement.confusion, strict=True):
+    always = f"always the same: {evaluation.majority_baseline:.3f}"
+    say(f"{evaluation.steps} steps; {always}")
+    if evaluation.head == "class":
+        for name, row in zip(evaluation.classes, evaluation.confusion, strict=True):
             if sum(row):
-                right = row[judgement.classes.index(name)]
+                right = row[evaluation.classes.index(name)]
                 say(f"  {name}: {right} of {sum(row)} right")
-        say(f"calibration error {judgement.ece or 0.0:.3f}")
+        say(f"calibration error {evaluation.ece or 0.0:.3f}")
     else:
-        for name, error in zip(judgement.numbers, judgement.errors, strict=False):
+        for name, error in zip(evaluation.numbers, evaluation.errors, strict=False):
             say(f"  {name}: mean absolute error {error:.3f}")
-        say(f"within {judgement.tolerance:g} of half the range {judgement.within:.3f}")
+        say(f"within {evaluation.tolerance:g} of half the range {evaluation.within:.3f}")
         say(
             "accuracy counts steps whose numbers all fall in the driver's third of their range, "
             "such as left, straight or right"
         )
-    say(f"macro-F1 {judgement.macro_f1:.3f}")
-    say(f"accuracy {judgement.accuracy:.3f}")
+    say(f"macro-F1 {evaluation.macro_f1:.3f}")
+    say(f"accuracy {evaluation.accuracy:.3f}")
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate and print."""
-        from shapechanger.demos.cloning.evaluation import judge
+        from shapechanger.demos.cloning.evaluation import evaluate
         from shapechanger.demos.cloning.policy import CameraPolicy
         from shapechanger.demos.cloning.shrinking import ShrunkFrames
 
@@ -263,22 +263,22 @@ class Evaluate:
             for note in (view.note(), *shown.notes):
                 say(note)
             data = shown.data
-        judgement = judge(policy, data)
+        evaluation = evaluate(policy, data)
         note = f"These are the {len(data)} steps of {self.data}."
         learned = policy.card.data.get("learned", 0)
         if policy.card.data.get("digest") == shrinking.digest(data.actions):
             note = f"The policy learned from the first {learned} of these {len(data)} steps."
             if learned < len(data):
-                unseen = judge(policy, data, np.arange(len(data)) >= learned)
+                unseen = evaluate(policy, data, np.arange(len(data)) >= learned)
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:
             from shapechanger.demos.clone_report import clone_html, write_numbers
 
             require_file(self.report)
-            page = clone_html(self.policy.name, policy, data, judgement, None, note)
+            page = clone_html(self.policy.name, policy, data, evaluation, None, note)
             write_atomic(self.report, page.encode())
             numbers = self.report.with_suffix(".json")
-            write_numbers(numbers, policy, judgement, None)
+            write_numbers(numbers, policy, evaluation, None)
             say(f"wrote {self.report} and {numbers}")
-        _print_judgement(judgement)
+        _print_evaluation(evaluation)

@@ -4,7 +4,7 @@
 learn.clone          learn steering and throttle from arrays of pictures
 learn.learn          learn any actions from any demonstrations (`shapechanger demos train`)
 policy.CameraPolicy  predict, save and load
-judge.judge          compare a policy with a driver on held-out steps
+evaluation.evaluate compare a policy with a driver on held-out steps
 sb3, replay          continue with reinforcement learning in Stable-Baselines3
 ```
 

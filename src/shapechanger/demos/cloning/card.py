@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any, Final, Literal, cast
@@ -10,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
+from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError, prepare
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
@@ -49,6 +50,8 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         low: Action for an output of -1; () for -1 each.
         high: Action for an output of 1; () for 1 each.
         identity: Version of the env whose demonstrator was cloned; {} for recordings.
+        body: Kind of robot that an exported policy learned in, such as "car"; "" for any.
+        control_hz: Actions per second that it learned with; None if unknown.
     """
 
     framing: Framing
@@ -72,6 +75,8 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
     identity: dict[str, Identity] = {}
+    body: str = ""
+    control_hz: float | None = None
 
     def __post_init__(self) -> None:
         """Validate the architecture."""
@@ -135,29 +140,26 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
         return (low + 0.5 * (outputs + 1.0) * (high - low)).astype(np.float32)
 
-    def inputs_of(self, observations: Any) -> tuple[NDArray[Any] | None, NDArray[Any] | None]:
-        """Return pictures and states of observations of an env.
+    def prepared(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None
+    ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None]:
+        """Return pictures and states as the network takes them; None for an input it lacks.
 
         Args:
-            observations: Pictures, shape (n, H, W, 3); states, shape (n, k), for a policy without
-                pictures; a mapping with `image` and `state` for one with both.
+            pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared.
+            states: Shape (n, k), NaN for unknown values.
+
+        Raises:
+            CloningError: If an input is missing or has another shape.
         """
-        if isinstance(observations, Mapping):
-            named = cast("Mapping[str, NDArray[Any]]", observations)
-            return named.get("image"), named.get("state")
-        values: NDArray[Any] = np.asarray(observations)
-        return (None, values) if self.eyes == "none" else (values, None)
-
-    def require_picture(self, picture: object) -> None:
-        """Refuse a missing picture."""
-        if self.eyes != "none" and picture is None:
+        if self.eyes == "none":
+            pictures = None
+        elif pictures is None:
             raise CloningError("This policy needs a picture, but there is none.")
-
-    def known_states(self, states: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
-        """Return states as the network takes them; None for a policy without a state."""
+        seen = None if pictures is None else prepare(pictures, self.framing)
         layout = self.state_layout
         if layout is None:
-            return None
+            return seen, None
         if states is None or states.ndim != 2 or states.shape[1] != layout.size:
             raise CloningError(
                 f"This policy needs the state {', '.join(layout.names)} with shape "
@@ -166,7 +168,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         known = np.array(states, np.float32)
         for name in self.unseen:
             known[:, layout.slices[name]] = np.nan
-        return known
+        return seen, known
 
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
         """Refuse a robot, an env or data whose layouts differ from the policy's.
@@ -195,6 +197,81 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
                 f"The policy needs the state {', '.join(_words(self.state_layout))}, but it gets "
                 f"{', '.join(felt) or 'none'}."
             )
+
+
+class ActingClone(ABC):
+    """A policy for pictures, states or both.
+
+    Attributes:
+        card: Its architecture and origin.
+    """
+
+    card: CloneCard
+
+    @abstractmethod
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
+
+        Args:
+            pictures: As in `predict_many`.
+            states: As in `predict_many`.
+
+        Raises:
+            CloningError: If an input is missing or has another shape.
+        """
+
+    def predict(
+        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the action for one picture and state, as `predict_many` does for several.
+
+        Args:
+            picture: Red, green and blue, shape (H, W, 3).
+            state: Shape (k,).
+
+        Returns:
+            Action, shape (m,). For a vehicle: steering (-1 is left) and throttle (1 is forward).
+        """
+        return self.predict_many(
+            None if picture is None else picture[np.newaxis],
+            None if state is None else state[np.newaxis],
+        )[0]
+
+    def predict_many(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return an action for each picture and state.
+
+        Args:
+            pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared; None for a policy
+                without pictures.
+            states: Shape (n, k), NaN for unknown values; None for a policy without a state.
+
+        Returns:
+            Actions, shape (n, m).
+
+        Raises:
+            CloningError: If an input is missing or has another shape.
+        """
+        return self.card.actions(self.outputs(pictures, states))
+
+    def act(self, observations: Any) -> NDArray[np.float32]:
+        """Return an action for each observation of an env, shape (n, m).
+
+        Args:
+            observations: Pictures, shape (n, H, W, 3); states, shape (n, k), for a policy without
+                pictures; a mapping with `image` and `state` for one with both.
+
+        Raises:
+            CloningError: If an input is missing or has another shape.
+        """
+        if isinstance(observations, Mapping):
+            named = cast("Mapping[str, NDArray[Any]]", observations)
+            return self.predict_many(named.get("image"), named.get("state"))
+        values: NDArray[Any] = np.asarray(observations)
+        return self.predict_many(*((None, values) if self.card.eyes == "none" else (values,)))
 
 
 def _words(layout: Layout) -> tuple[str, ...]:

@@ -199,7 +199,7 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
     target: tuple[tuple[float, ...], ...]
 
 
-def judge(
+def evaluate(
     policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None = None
 ) -> EvaluationResult:
     """Compare a policy with the driver of demonstrations.
@@ -216,7 +216,7 @@ def judge(
     policy.card.require_layouts(data.action_layout, data.state_layout)
     chosen = np.flatnonzero(np.ones(len(data), np.bool_) if which is None else which)
     if not len(chosen):
-        raise CloningError("There is no step to judge the policy on.")
+        raise CloningError("There is no step to evaluate the policy on.")
     pictures = None if data.pictures is None else data.pictures[chosen]
     states = None if data.states is None else data.states[chosen]
     target = data.actions[chosen].astype(np.float64)

@@ -175,8 +175,8 @@ def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]
     return mask
 
 
-def judged_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
-    """Return a mask of the steps to hold out for judging a policy: the last ones.
+def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
+    """Return a mask of the steps to hold out to evaluate a policy on: the last ones.
 
     Args:
         episodes: Number of steps of each episode, in order.

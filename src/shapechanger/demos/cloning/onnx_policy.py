@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import PolicyError, prepare
+from shapechanger.demos.cloning.card import ActingClone, CloneCard
+from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.onnx_file import OnnxNetwork, export_network
 
 if TYPE_CHECKING:
@@ -24,20 +24,6 @@ _CARD: Final = "shapechanger-clone"
 _PICTURE: Final = "picture"
 _STATE: Final = "state"
 _OUTPUT: Final = "output"
-
-
-class OnboardCard(msgspec.Struct, frozen=True, kw_only=True):
-    """Card of an exported policy.
-
-    Attributes:
-        clone: Card of the policy.
-        body: Kind of robot that it learned in, such as "car"; "" for any.
-        control_hz: Actions per second that it learned with; None if unknown.
-    """
-
-    clone: CloneCard
-    body: str = ""
-    control_hz: float | None = None
 
 
 def export_clone(
@@ -84,12 +70,12 @@ def export_clone(
             out = self.network.hands(self.network.perceive(seen, named.get(_STATE)))
             return torch.softmax(out, dim=1) if card.classes else torch.tanh(out)
 
-    whole = OnboardCard(clone=card, body=body, control_hz=control_hz)
-    facts = {_CARD: msgspec.json.encode(whole).decode()}
+    card = msgspec.structs.replace(card, body=body, control_hz=control_hz)
+    facts = {_CARD: msgspec.json.encode(card).decode()}
     export_network(Whole(), inputs, _OUTPUT, path, facts)
 
 
-class OnnxClone:
+class OnnxClone(ActingClone):
     """A cloned policy from a file of `export_clone`.
 
     Attributes:
@@ -107,55 +93,22 @@ class OnnxClone:
     """
 
     def __init__(self, path: Path) -> None:
-        self._network = OnnxNetwork(path, OnboardCard, _shapes, PolicyError, _CARD)
-        whole = self._network.card
-        self.card, self.body, self.control_hz = whole.clone, whole.body, whole.control_hz
+        self._network = OnnxNetwork(path, CloneCard, _shapes, PolicyError, _CARD)
+        self.card = self._network.card
+        self.body, self.control_hz = self.card.body, self.card.control_hz
         self.digest = self._network.digest
 
-    def predict(
-        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return the action for one picture and state, as `CameraPolicy.predict` does.
-
-        Args:
-            picture: Red, green and blue, shape (H, W, 3); None for a policy without pictures.
-            state: Shape (k,), NaN for unknown values; None for a policy without a state.
-
-        Returns:
-            Action, shape (m,).
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
-        """
-        given: dict[str, NDArray[Any]] = {}
-        if self.card.eyes != "none":
-            self.card.require_picture(picture)
-            given[_PICTURE] = prepare(np.asarray(picture)[np.newaxis], self.card.framing)
-        known = self.card.known_states(None if state is None else state[np.newaxis])
-        if known is not None:
-            given[_STATE] = known
-        return self.card.actions(self._network.run(given))[0]
-
-    def act(self, observations: Any) -> NDArray[np.float32]:
-        """Return an action for each observation, as `CameraPolicy.act` does."""
-        pictures, states = self.card.inputs_of(observations)
-        n = len(states if pictures is None else pictures)  # pyright: ignore[reportArgumentType]
-        each = [None] * n
-        return np.stack(
-            [
-                self.predict(picture, state)
-                for picture, state in zip(
-                    each if pictures is None else pictures,
-                    each if states is None else states,
-                    strict=True,
-                )
-            ]
-        )
+        """Return the outputs of the network, as `ActingClone` describes them."""
+        seen, known = self.card.prepared(pictures, states)
+        given = {_PICTURE: seen, _STATE: known}
+        return self._network.run({name: part for name, part in given.items() if part is not None})
 
 
-def _shapes(whole: OnboardCard) -> dict[str, list[int]]:
+def _shapes(card: CloneCard) -> dict[str, list[int]]:
     """Return the shapes of inputs and output that a card states."""
-    card = whole.clone
     shapes: dict[str, list[int]] = {}
     if card.eyes != "none":
         shapes[_PICTURE] = list(card.framing.shape)

@@ -14,8 +14,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepare
+from shapechanger.demos.cloning.card import ActingClone, CloneCard
+from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra, no_policy_file
 from shapechanger.files import cannot_write, write_atomic
@@ -36,7 +36,7 @@ KIND: Final = "clone"
 _CHUNK: Final = 256  # Examples at a time, to bound the memory.
 
 
-class CameraPolicy:
+class CameraPolicy(ActingClone):
     """A policy for pictures, states or both.
 
     Attributes:
@@ -78,64 +78,10 @@ class CameraPolicy:
             torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
             return cls(CameraNetwork(card), card)
 
-    def predict(
-        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
-    ) -> NDArray[np.float32]:
-        """Return the action for one picture and state, as `predict_many` does for several.
-
-        Args:
-            picture: Red, green and blue, shape (H, W, 3).
-            state: Shape (k,).
-
-        Returns:
-            Action, shape (m,). For a vehicle: steering (-1 is left) and throttle (1 is forward).
-        """
-        return self.predict_many(
-            None if picture is None else picture[np.newaxis],
-            None if state is None else state[np.newaxis],
-        )[0]
-
-    def predict_many(
-        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
-    ) -> NDArray[np.float32]:
-        """Return an action for each picture and state.
-
-        Args:
-            pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared; None for a policy
-                without pictures.
-            states: Shape (n, k), NaN for unknown values; None for a policy without a state.
-
-        Returns:
-            Actions, shape (n, m).
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
-        """
-        return self.card.actions(self.outputs(pictures, states))
-
-    def act(self, observations: Any) -> NDArray[np.float32]:
-        """Return an action for each observation of an env, shape (n, m).
-
-        Args:
-            observations: As of `CloneCard.inputs_of`.
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
-        """
-        return self.predict_many(*self.card.inputs_of(observations))
-
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
-
-        Args:
-            pictures: As in `predict_many`.
-            states: As in `predict_many`.
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
-        """
+        """Return the outputs of the network, as `ActingClone` describes them."""
         out = self.logits(pictures, states)
         return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
 
@@ -143,7 +89,8 @@ class CameraPolicy:
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> Tensor:
         """Return the outputs of the last layer, from which `outputs` are computed."""
-        small, known = self._prepared(pictures), self._state_tensor(states)
+        small, states = self.card.prepared(pictures, states)
+        known = None if states is None else torch.as_tensor(states)
         n = len(small) if small is not None else len(known) if known is not None else 0
         found = torch.empty(n, self.network.hands.in_features)
         with torch.inference_mode():
@@ -155,16 +102,6 @@ class CameraPolicy:
                     None if known is None else known[some],
                 )
             return self.network.hands(found)
-
-    def _prepared(self, pictures: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
-        self.card.require_picture(pictures)
-        if self.card.eyes == "none" or pictures is None:
-            return None
-        return prepare(pictures, self.card.framing)
-
-    def _state_tensor(self, states: NDArray[np.floating] | None) -> Tensor | None:
-        known = self.card.known_states(states)
-        return None if known is None else torch.as_tensor(known)
 
     def described(
         self, *, command: str = "", identity: Mapping[str, Identity] | None = None, **data: Any
