@@ -166,7 +166,8 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
 def _kind_of(value: Any) -> str:
     if isinstance(value, str) and value.lower().endswith(_ENDINGS):
         return _PICTURES[0]
-    return _KINDS.get(type(value), "list")
+    kind: Any = type(value)
+    return _KINDS.get(kind, "list")
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
@@ -449,7 +450,7 @@ def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
     return dict(zip(names, kinds, strict=True))
 
 
-def _list(value: Any, kind: type, what: str) -> list[Any]:
+def _list(value: Any, kind: Any, what: str) -> list[Any]:
     try:
         return msgspec.convert(value, list[kind])
     except msgspec.ValidationError as error:
