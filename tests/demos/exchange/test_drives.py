@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext
-from shapechanger.demos.exchange.drives import Record, episode_of, stretches
+from shapechanger.demos.exchange.drives import SourceRecord, episode_of, stretches
 from shapechanger.demos.exchange.exports import kept_steps
 from tests.demos.exchange.small import header, picture
 
@@ -28,7 +28,7 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
 ) -> None:
     context = ImportContext()
     records = [
-        Record(
+        SourceRecord(
             name=str(n),
             step=Step(action=(0.0 if finite else math.nan, n), driver="person"),
             picture=data,
@@ -48,7 +48,9 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
 @given(st.lists(st.none() | st.integers(0, 2**60), min_size=1, max_size=20))
 def test_stretches_are_all_records_in_order_and_without_jumps(times_ns: list[int | None]) -> None:
     records = [
-        Record(name=str(n), number=n, step=Step(action=(0.0,), driver="person", captured_ns=ns))
+        SourceRecord(
+            name=str(n), number=n, step=Step(action=(0.0,), driver="person", captured_ns=ns)
+        )
         for n, ns in enumerate(times_ns)
     ]
     found = stretches([records], "record", ImportContext())

@@ -21,7 +21,7 @@ from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.drives import (
-    Record,
+    SourceRecord,
     as_json,
     episode_of,
     features_of,
@@ -251,9 +251,9 @@ class _Table:
         self._lines = table[1:]
         self._context = context
 
-    def records(self, frames: Path) -> list[Record]:
+    def records(self, frames: Path) -> list[SourceRecord]:
         """Return the lines that can be read, with their pictures; the others are left out."""
-        found: list[Record] = []
+        found: list[SourceRecord] = []
         before, shown, known = -1, "", set[str]()
         for position, (line, cells) in enumerate(self._lines):
             try:
@@ -280,7 +280,7 @@ class _Table:
                 known.add(frame)
         return found
 
-    def _record(self, name: str, position: int, cells: Sequence[str]) -> Record:
+    def _record(self, name: str, position: int, cells: Sequence[str]) -> SourceRecord:
         if len(cells) != len(self.names):
             hint = " (decimal commas need another separator)" if self._separator == "," else ""
             raise DemosError(f"{len(cells)} cells instead of {len(self.names)}{hint}.")
@@ -300,7 +300,7 @@ class _Table:
             terms = {term: float(value) for term, value in known.pop("terms", {}).items()}
         except (ValueError, TypeError) as error:
             raise DemosError(f"terms must be numbers ({error}).") from error
-        return Record(
+        return SourceRecord(
             name=name,
             step=Step(terms=terms, **known),
             number=number,

@@ -1,6 +1,6 @@
 """The way from records to episodes, which all formats share.
 
-A reader fills `Record`s from its file. Here their actions, drivers and pictures are checked, rates
+A reader fills `SourceRecord`s from its file. Here their actions, drivers and pictures are checked, rates
 are measured, and sessions are split where time jumps.
 
 Times may be rounded, and records may be missing, so a median of periods is not the rate: at times
@@ -55,7 +55,7 @@ _WHOLE: Final = ((1.0, 0.005), (5.0, 0.025))
 
 
 @dataclass(slots=True, kw_only=True)
-class Record:
+class SourceRecord:
     """A record of a source, before it is checked.
 
     Attributes:
@@ -80,7 +80,7 @@ class Record:
 
 
 def episode_of(
-    records: Iterable[Record],
+    records: Iterable[SourceRecord],
     header: EpisodeHeader,
     context: ImportContext,
     *,
@@ -105,7 +105,7 @@ def episode_of(
 
 
 def _rows(
-    records: Iterable[Record],
+    records: Iterable[SourceRecord],
     size: tuple[int, int] | None,
     context: ImportContext,
     what: str,
@@ -160,8 +160,8 @@ def _fault(step: Step) -> str:
 
 
 def with_pictures(
-    records: Sequence[Record], what: str, context: ImportContext
-) -> tuple[list[Record], tuple[int, int] | None]:
+    records: Sequence[SourceRecord], what: str, context: ImportContext
+) -> tuple[list[SourceRecord], tuple[int, int] | None]:
     """Return the records with a whole picture, or with none, and the most frequent size.
 
     All pictures are decoded, so that rates and jumps are those of the records that remain.
@@ -188,21 +188,24 @@ def with_pictures(
     return [record for record in records if not record.fault], common
 
 
-class Stretch(NamedTuple):
+class TimedRecords(NamedTuple):
     """Records that follow each other without a pause, with their rate.
 
     `has_times` tells whether the source states them, and `timed` whether they are believed.
     """
 
-    records: list[Record]
+    records: list[SourceRecord]
     hz: float
     has_times: bool
     timed: bool
 
 
 def stretches(
-    parts: Sequence[list[Record]], what: str, context: ImportContext, stated_hz: float | None = None
-) -> list[Stretch]:
+    parts: Sequence[list[SourceRecord]],
+    what: str,
+    context: ImportContext,
+    stated_hz: float | None = None,
+) -> list[TimedRecords]:
     """Measure the rates of sessions, or take a stated one, and split them where time jumps.
 
     What is odd about the times is reported. Times that contradict the stated rate are left out.
@@ -211,7 +214,7 @@ def stretches(
     periods = [_periods_ns(*pair) for pair in zip(times, parts, strict=True)]
     names = [f"{what} {part[0].name}" for part in parts]
     rates, believed = _rates(names, periods, context, stated_hz)
-    found: list[Stretch] = []
+    found: list[TimedRecords] = []
     pauses_s: list[float] = []
     backwards: list[tuple[float, str]] = []
     for known, part, hz in zip(times, parts, rates, strict=True):
@@ -230,7 +233,7 @@ def stretches(
                 continue
             starts.append(number)
         for start, end in pairwise([*starts, len(part)]):
-            found.append(Stretch(part[start:end], hz, bool(known), timed))
+            found.append(TimedRecords(part[start:end], hz, bool(known), timed))
     if pauses_s:
         context.note(
             f"A new episode begins after {counted(len(pauses_s), 'pause')}, of "
@@ -244,7 +247,7 @@ def stretches(
     return found
 
 
-def _times_ns(part: Sequence[Record], what: str, context: ImportContext) -> list[int]:
+def _times_ns(part: Sequence[SourceRecord], what: str, context: ImportContext) -> list[int]:
     """Return the time of each record, ns; an empty list if one is unknown."""
     times = [ns for record in part if (ns := record.step.captured_ns) is not None]
     if 0 < len(times) < len(part):
@@ -255,7 +258,7 @@ def _times_ns(part: Sequence[Record], what: str, context: ImportContext) -> list
     return times if len(times) == len(part) else []
 
 
-def _periods_ns(times: Sequence[int], part: Sequence[Record]) -> list[float]:
+def _periods_ns(times: Sequence[int], part: Sequence[SourceRecord]) -> list[float]:
     """Return the time from one record to the next, ns, per number that they are apart."""
     pairs = zip(pairwise(times), pairwise(part), strict=False)
     return [(later - now) / max(1, b.number - a.number) for (now, later), (a, b) in pairs]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Driver, EpisodeHeader, Step
 from shapechanger.demos.exchange.drives import (
-    Record,
+    SourceRecord,
     as_json,
     choose_camera,
     episode_of,
@@ -294,7 +294,7 @@ def _records(
     header: EpisodeHeader,
     drivers: Sequence[Driver],
     unpacked: dict[Path, int],
-) -> Iterator[Record]:
+) -> Iterator[SourceRecord]:
     """Yield the records of an episode; `unpacked` counts the bytes of pictures of each file."""
     stored = kept.camera.key if kept.camera is not None and kept.camera.kind == "image" else ""
     times = located.times
@@ -312,7 +312,7 @@ def _records(
         reward = float(row[_REWARD][0]) if _REWARD in row else math.nan
         done = DONE in row and bool(row[DONE][0])
         ended = bool(row[_TERMINATED][0]) if _TERMINATED in row else done
-        record = Record(
+        record = SourceRecord(
             name=f"{frame} of episode {located.number}",
             step=Step(
                 action=tuple(row[_ACTION].tolist()),

@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.drives import (
-    Record,
+    SourceRecord,
     as_json,
     episode_of,
     unreadable,
@@ -283,7 +283,7 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
     )
 
 
-def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Record]:
+def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[SourceRecord]:
     """Yield the records of an episode."""
     group, size = f"episode_{number}", parts.header.image_size
     with open_hdf5(main) as file:
@@ -297,7 +297,7 @@ def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Rec
             for place, step in enumerate(range(part.start, part.stop)):
                 at = {name: values[place] for name, values in chunk.items()}
                 reward = float(at[_REWARD]) if _REWARD in at else math.nan
-                record = Record(
+                record = SourceRecord(
                     name=f"{step} of {group}",
                     step=Step(
                         action=tuple(actions[place].tolist()),
@@ -338,7 +338,7 @@ def _flat(
     return np.concatenate(flat, axis=1)
 
 
-def _add_infos(record: Record, at: Mapping[str, Any], reward: float) -> None:
+def _add_infos(record: SourceRecord, at: Mapping[str, Any], reward: float) -> None:
     """Complete a record of an own dataset; it has a fault if its infos cannot be read."""
     try:
         more = json.loads(at[_MORE])

@@ -32,7 +32,7 @@ from msgspec.structs import replace
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.drives import (
-    Record,
+    SourceRecord,
     as_json,
     choose_camera,
     episode_of,
@@ -187,7 +187,9 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
     return camera
 
 
-def _record(line: _Line, sensed: Sequence[str], camera: str, context: ImportContext) -> Record:
+def _record(
+    line: _Line, sensed: Sequence[str], camera: str, context: ImportContext
+) -> SourceRecord:
     """Return a record; it has a fault if it has no valid action."""
     mode = line.fields.get(_MODE, _PERSON_DRIVES)
     by_person = mode == _PERSON_DRIVES
@@ -213,7 +215,7 @@ def _record(line: _Line, sensed: Sequence[str], camera: str, context: ImportCont
         captured_ns=line.time_ns,
     )
     name, frame = str(line.number), line.fields.get(camera)
-    return Record(name=name, number=line.number, step=step, frame=frame, fault=fault)
+    return SourceRecord(name=name, number=line.number, step=step, frame=frame, fault=fault)
 
 
 def _pair(line: _Line, names: Sequence[str]) -> tuple[float, float] | None:
@@ -232,7 +234,7 @@ def _sensed(value: Any) -> float:
         return math.nan
 
 
-def _find_pictures(records: Sequence[Record], images: Path, context: ImportContext) -> None:
+def _find_pictures(records: Sequence[SourceRecord], images: Path, context: ImportContext) -> None:
     """Find the picture of each record by its name, the `frame`; others get a fault."""
     shown = Counter(str(record.frame) for record in records if not record.fault)
     offsets: dict[int, int] = {}
@@ -261,10 +263,10 @@ def _find_pictures(records: Sequence[Record], images: Path, context: ImportConte
 
 
 def _parts(
-    records: Sequence[Record], sessions: Mapping[int, str], *, restarts: bool
-) -> list[list[Record]]:
+    records: Sequence[SourceRecord], sessions: Mapping[int, str], *, restarts: bool
+) -> list[list[SourceRecord]]:
     """Return the records of each session, and of each start of the car if times restart with it."""
-    parts: list[list[Record]] = []
+    parts: list[list[SourceRecord]] = []
     for record in records:
         before = parts[-1][-1] if parts else None
         was_ns, now_ns = before and before.step.captured_ns, record.step.captured_ns
