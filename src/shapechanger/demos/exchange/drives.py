@@ -1,7 +1,7 @@
 """The way from records to episodes, which all formats share.
 
-A reader fills `SourceRecord`s from its file. Here their actions, drivers and pictures are checked, rates
-are measured, and sessions are split where time jumps.
+A reader fills `SourceRecord`s from its file. Here their actions, drivers and pictures are checked,
+rates are measured, and sessions are split where time jumps.
 
 Times may be rounded, and records may be missing, so a median of periods is not the rate: at times
 in whole milliseconds it is off by up to 2 % at 20 Hz. The rate is the mean over the periods near
