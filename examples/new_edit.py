@@ -15,11 +15,10 @@ import tyro
 
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import Edit, from_json, interpolate, register_edit, to_json
+from shapechanger.morphology import Edit, from_json, interpolate, to_json
 from shapechanger.morphology.spec.elements import select
 
 
-@register_edit
 class TurnHinge(Edit, frozen=True):
     """Turn the axis of hinges about the vertical of their body.
 

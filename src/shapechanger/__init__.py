@@ -15,7 +15,7 @@ The names below are the public interface; each is imported on first use and may 
   `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity`,
   `StartHeight`, `PlaceBody`, `PlaceGeom`, `TotalMass`, `AddMotor`, `AddFreeJoint` and `AddFloor`
   are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body to another,
-  `certify` proves what a shift changes, and `register_edit` adds your own edit.
+  `certify` proves what a shift changes.
 - Envs: `from_mjcf` makes one of your own robot and task, `make_vec` many at once; `examine`
   runs the exam that every env passes.
 - Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,
@@ -67,7 +67,6 @@ if TYPE_CHECKING:
         TotalMass,
         compile_body,
         interpolate,
-        register_edit,
         reshape,
     )
     from shapechanger.morphology.certificate import Certificate, certify
@@ -121,7 +120,6 @@ __all__ = [
     "load_policy",
     "make_plan",
     "make_vec",
-    "register_edit",
     "reshape",
     "run_study",
     "save_policy",
@@ -141,8 +139,7 @@ _MODULES: Final = {
         *("JointRange", "Lock", "Mass", "Radius", "Remove", "Split", "StartHeight", "Stiffness"),
         *("Stretch", "compile_body", "interpolate", "reshape"),
         *("PlaceBody", "PlaceGeom", "TotalMass", "AddMotor", "AddFreeJoint", "AddFloor"),
-        "register_edit",
-    ),
+        ),
     "morphology.certificate": ("Certificate", "certify"),
     "policy": ("load_policy", "save_policy"),
     "robot.client.client": ("RobotClient",),

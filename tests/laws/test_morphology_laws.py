@@ -369,12 +369,14 @@ _ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
 
 def test_every_edit_has_a_strategy() -> None:
     """A new kind of edit must be added here."""
-    assert tuple(_ANY_EDIT) == EDITS
+    assert {kind for kind in EDITS.values() if kind.__module__.startswith("shapechanger.")} == {
+        *_ANY_EDIT
+    }
 
 
 @law
 @given(data=st.data())
-@pytest.mark.parametrize("kind", EDITS)
+@pytest.mark.parametrize("kind", _ANY_EDIT)
 def test_edits_round_trip_through_json(kind: type[Edit], data: st.DataObject) -> None:
     """For each kind of edit, with any values and amounts."""
     edit = data.draw(_ANY_EDIT[kind])

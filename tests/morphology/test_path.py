@@ -72,7 +72,8 @@ _STEP = 1e-5
 def test_all_kinds_are_covered() -> None:
     """A new kind of edit must be added to these tests."""
     rigging = (AddMotor, AddFreeJoint, AddFloor)  # The leg has motors, freedom and a floor.
-    assert (*(type(edit) for edit in ONE_OF_EACH), *rigging) == EDITS
+    shipped = {kind for kind in EDITS.values() if kind.__module__.startswith("shapechanger.")}
+    assert {*(type(edit) for edit in ONE_OF_EACH), *rigging} == shipped
 
 
 def test_the_ends_are_the_bodies_themselves() -> None:

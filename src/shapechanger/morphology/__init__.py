@@ -17,18 +17,16 @@ except ImportError as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.morphology.body import (
-    EDITS,
     Body,
     as_body,
     compile_body,
     from_json,
     interpolate,
     reason_of,
-    register_edit,
     reshape,
     to_json,
 )
-from shapechanger.morphology.edits.edit import Edit
+from shapechanger.morphology.edits import EDITS, Edit
 from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
 from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
@@ -80,7 +78,6 @@ __all__ = [
     "interpolate",
     "name_elements",
     "reason_of",
-    "register_edit",
     "reshape",
     "to_json",
 ]

@@ -10,67 +10,24 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Hashable, Iterable, Mapping
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, cast
 
 import msgspec
 import mujoco
+import numpy as np
 
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
-from shapechanger.morphology.edits.edit import Edit, Vector
-from shapechanger.morphology.edits.joints import JointRange, Lock
-from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
-from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
-from shapechanger.morphology.edits.rigging import AddFloor, AddFreeJoint, AddMotor
-from shapechanger.morphology.edits.switches import require_effect
-from shapechanger.morphology.edits.values import (
-    Damping,
-    Density,
-    Friction,
-    Gear,
-    Gravity,
-    Mass,
-    Radius,
-    StartHeight,
-    Stiffness,
-    Stretch,
-)
+from shapechanger.morphology.edits import EDITS, Edit
+from shapechanger.morphology.edits.edit import part_of_the_way
 from shapechanger.morphology.spec.carried import Carried
-from shapechanger.morphology.spec.explicit import make_explicit
+from shapechanger.morphology.spec.explicit import make_explicit, write_out_orientations
 
 Body = tuple[Edit, ...]
 """The edits, in order, that make a body from the model of its family."""
 
-EDITS: Final[tuple[type[Edit], ...]] = (
-    *(Stretch, Radius, Cut, Remove, Split, AddSegment, AddLimb),
-    *(Mass, Density, Gear, Damping, Stiffness, Friction),
-    *(JointRange, Lock, Gravity, StartHeight),
-    *(PlaceBody, PlaceGeom, TotalMass),
-    *(AddMotor, AddFreeJoint, AddFloor),
-)
-"""The edits of Shapechanger; `register_edit` adds others."""
-
-_TAGS: Final[dict[str, type[Edit]]] = {str(edit.__struct_config__.tag): edit for edit in EDITS}
-
 _WRONG_SPARSE: Final = "4.0.0"
-_E = TypeVar("_E", bound=type[Edit])
-
-
-def register_edit(kind: _E) -> _E:
-    """Let JSON name an edit of your own, as worker processes and files need; a class decorator.
-
-    Args:
-        kind: A frozen subclass of `Edit`; its name in JSON follows from its class.
-
-    Raises:
-        MorphologyError: If another edit has this name in JSON.
-    """
-    tag = str(kind.__struct_config__.tag)
-    known = _TAGS.get(tag)
-    # A module that is imported again defines its classes again.
-    if (known is not None and known.__qualname__ != kind.__qualname__) or known in EDITS:
-        raise MorphologyError(f"There is an edit {tag!r} already: give {kind.__name__} a new name.")
-    _TAGS[tag] = kind
-    return kind
+# A motor that only one of two bodies has exists between them, with a gear that fades to zero.
+_ZERO_WHERE_NONE: Final = "gear"
 
 
 def to_json(body: Iterable[Edit]) -> str:
@@ -122,9 +79,9 @@ def _edit(item: Any) -> Edit:
     if not isinstance(item, Mapping) or "edit" not in item:
         raise MorphologyError(f'An edit is an object with the key "edit", got {item!r}.')
     fields = dict(cast("Mapping[str, Any]", item))
-    kind = _TAGS.get(str(fields["edit"]))
+    kind = EDITS.get(str(fields["edit"]))
     if kind is None:
-        raise UnknownName("edit", str(fields["edit"]), _TAGS)
+        raise UnknownName("edit", str(fields["edit"]), EDITS)
     for name in fields:
         if name not in ("edit", *kind.__struct_fields__):
             raise UnknownName(f"field of {fields['edit']!r}", name, kind.__struct_fields__)
@@ -132,10 +89,6 @@ def _edit(item: Any) -> Edit:
         return msgspec.convert(fields, kind)
     except msgspec.ValidationError as error:
         raise MorphologyError(f"{fields['edit']}: {error}") from error
-
-
-# A motor that only one of two bodies has exists between them, with a gear that fades to zero.
-_ZERO_WHERE_NONE: Final = frozenset({"gear"})
 
 
 def interpolate(a: Body, b: Body, alpha: float) -> Body:
@@ -177,7 +130,7 @@ def _key(edit: Edit) -> Hashable:
     return type(edit), tuple(
         (name, None if isinstance(value, int | float | tuple) else value)
         for name, value in values.items()
-        if value is not None and name not in _ZERO_WHERE_NONE
+        if value is not None and name != _ZERO_WHERE_NONE
     )
 
 
@@ -189,13 +142,10 @@ def _between(x: Edit, y: Edit, alpha: float) -> Edit:
         new: Any = getattr(y, field)
         if old == new:
             continue
-        if field in _ZERO_WHERE_NONE:
+        if field == _ZERO_WHERE_NONE:
             old, new = old or 0.0, new or 0.0
-        if isinstance(old, tuple):
-            pairs = zip(cast("Vector", old), cast("Vector", new), strict=True)
-            changes[field] = tuple(p + alpha * (q - p) for p, q in pairs)
-        else:
-            changes[field] = old + alpha * (new - old)
+        value: Any = part_of_the_way(np.array(old, float), np.array(new, float), alpha)
+        changes[field] = tuple(value.tolist()) if isinstance(old, tuple) else float(value)
     return msgspec.structs.replace(x, **changes)
 
 
@@ -217,8 +167,9 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
     make_explicit(result)
     carried = Carried(result)
     for edit in effective:
-        require_effect(result, edit)
+        edit.require_effect(result)
         edit.apply(result)
+        write_out_orientations(result)  # An edit of the user's may turn an element by other means.
         edit.follow_in_keyframes(result, carried.keyframes)
     carried.put_back(result)
     return result

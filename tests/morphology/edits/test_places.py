@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
-from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import Edit, Mass, PlaceBody, PlaceGeom, TotalMass, reshape
+from shapechanger.morphology import Mass, PlaceBody, PlaceGeom, TotalMass
 from tests.morphology.models import (
     ant,
     built,
@@ -90,51 +87,6 @@ def test_a_written_mass_keeps_its_density() -> None:
     model = limb('<geom name="rod" type="cylinder" size=".1" fromto="0 0 0 0 0 .4" mass="2"/>')
     after = built(model, PlaceGeom("rod", (0.0, 0.0, 0.0), (0.0, 0.0, 0.8), radius=0.2))
     assert after.body("link").mass == pytest.approx(16.0)
-
-
-@pytest.mark.parametrize(
-    ("edit", "sentence"),
-    [
-        (PlaceGeom("sole", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "'sole' is no capsule or cylinder"),
-        (PlaceGeom("trunk", radius=0.1), "'trunk' is no sphere, capsule or cylinder"),
-    ],
-)
-def test_shapes_without_ends_or_radius_are_refused(edit: Edit, sentence: str) -> None:
-    """The error names the geom."""
-    with pytest.raises(MorphologyError, match=sentence):
-        reshape(leg(), [edit])
-
-
-def test_unknown_elements_are_refused() -> None:
-    """With the nearest spelling."""
-    with pytest.raises(UnknownName, match="Did you mean 'shin'"):
-        reshape(leg(), [PlaceGeom("shinn", radius=0.1)])
-    with pytest.raises(UnknownName, match="Did you mean 'thigh'"):
-        reshape(leg(), [PlaceBody("tigh", (0.0, 0.0, 0.0))])
-
-
-@pytest.mark.parametrize(
-    ("make", "sentence"),
-    [
-        (lambda: PlaceGeom("a"), "takes two ends, a middle or a radius"),
-        (lambda: PlaceGeom("a", start=(0.0, 0.0, 0.0)), "has a start and an end"),
-        (lambda: PlaceGeom("a", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "two different ends"),
-        (
-            lambda: PlaceGeom("a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
-            "two different ends or by its middle",
-        ),
-        (lambda: PlaceGeom("a", middle=(0.0, 0.0, math.nan)), "The middle of a geom must be"),
-        (lambda: PlaceGeom("a", radius=0.0), "A radius must be above zero"),
-        (lambda: PlaceGeom("a", radius=math.inf), "A radius must be above zero"),
-        (lambda: PlaceBody("a", (0.0, 0.0, math.inf)), "The place of a body must be"),
-        (lambda: TotalMass(0.0), "A robot cannot have a mass of 0.0 kg"),
-        (lambda: TotalMass(math.nan), "A robot cannot have a mass of nan kg"),
-    ],
-)
-def test_numbers_out_of_range_are_refused(make: Callable[[], Any], sentence: str) -> None:
-    """When the edit is made."""
-    with pytest.raises(MorphologyError, match=sentence):
-        make()
 
 
 def test_the_total_mass_is_set() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import AddLimb, Split
+from shapechanger.morphology.spec.explicit import make_explicit
 from shapechanger.morphology.spec.grafting import copy_geom, copy_limb, move_limb, move_point
 from tests.morphology.models import built, leg, posed, spec_of
 from tests.morphology.scenes import EVERYTHING
@@ -175,6 +176,7 @@ def test_a_copied_geom_equals_the_original() -> None:
         fluidcoef=".6 .3 1.6 1.1 1.2"/></body>
         <body name="b"><freejoint/></body></worldbody></mujoco>"""
     )
+    make_explicit(spec)
     copy_geom(spec, spec.geom("a"), spec.body("b"), "b")
     model = built(spec)
     for field in [name for name in dir(model) if name.startswith("geom_")]:

@@ -8,6 +8,7 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Cut, Radius, Stretch
+from shapechanger.morphology.spec.explicit import make_explicit
 from shapechanger.morphology.spec.geometry import (
     anchor,
     far_end,
@@ -61,18 +62,19 @@ def test_the_anchor_in_the_parents_frame() -> None:
     """The pose of the body is applied."""
     spec = gantry()
     model = built(spec)
+    make_explicit(spec)
     body, joint = model.body("boom"), model.joint("swing")
     turned = np.empty(3)
     mujoco.mju_rotVecQuat(turned, joint.pos, body.quat)
-    np.testing.assert_allclose(held_at(spec, spec.body("boom")), body.pos + turned, atol=1e-12)
+    np.testing.assert_allclose(held_at(spec.body("boom")), body.pos + turned, atol=1e-12)
 
 
 def test_the_far_end_is_the_end_of_an_axis() -> None:
     """It is the end farther from the anchor; spheres have none."""
     spec = leg()
-    np.testing.assert_allclose(far_end(spec, spec.body("shin")), [0.0, 0.0, -0.25])
+    np.testing.assert_allclose(far_end(spec.body("shin")), [0.0, 0.0, -0.25])
     with pytest.raises(MorphologyError, match="'trunk' has no capsule or cylinder, so it has no"):
-        far_end(spec, spec.body("trunk"))
+        far_end(spec.body("trunk"))
 
 
 def test_children_move_along_with_a_stretch() -> None:

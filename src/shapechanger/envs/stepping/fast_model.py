@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.stepping.watch import ModelWatch, forget_steps
-from shapechanger.morphology.certificate.contacts import (
+from shapechanger.morphology.certificate.numbers import (
     colliding_pairs,
     geoms_of_pairs,
     mixed_parameters,

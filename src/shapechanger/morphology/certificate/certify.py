@@ -7,28 +7,56 @@ the same commands. A shift that changes neither is refused.
 
 from __future__ import annotations
 
-from typing import Any, cast
+import copy
+from collections.abc import Iterator
+from typing import Any, Final
 
 import msgspec
 import mujoco
+import numpy as np
 
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.morphology.certificate.changes import (
     Change,
     compare,
-    differ_in_names,
+    differences,
     fingerprint,
     grouped,
 )
-from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
+from shapechanger.morphology.certificate.numbers import moved_numbers, names_of
 from shapechanger.morphology.certificate.rollout import (
     Certifiable,
     Rollout,
-    Wrapped,
     attribute,
     compare_rollouts,
 )
 from shapechanger.own_modules import modules_of_env, own_modules
+
+# `mj_setConst` gives the same bits on an untouched model; the margin is for models that were
+# compiled elsewhere and loaded from a file.
+_STALE: Final = 1e-6
+# What `mj_setConst` computes, and what goes wrong if it is stale.
+_CONSTANTS: Final = {
+    "body_subtreemass": "centres of mass are wrong",
+    "body_invweight0": "constraints have the wrong softness",
+    "body_sameframe": "body_ipos or body_iquat is ignored",
+    "body_margin": "contacts may be missed",
+    "dof_M0": "lengths and gains derived from it are wrong",
+    "dof_invweight0": "constraints have the wrong softness",
+    "geom_rbound": "contacts may be missed",
+    "geom_sameframe": "geom_pos or geom_quat is ignored",
+    "geom_fluid": "forces of the fluid are those of the old shape",
+    "site_sameframe": "site_pos or site_quat is ignored",
+    "jnt_actuatorid": "the actuator's damping or armature is ignored",
+    "tendon_length0": "lengths derived from it are wrong",
+    "tendon_invweight0": "constraints have the wrong softness",
+    "tendon_actuatorid": "the actuator's damping or armature is ignored",
+}
+_FLAGS: Final = {
+    "flg_gravcomp": "body_gravcomp is ignored",
+    "flg_surfacevel": "geom_surfacevel is ignored",
+    "flg_adhesion": "geom_adhesion and pair_adhesion are ignored",
+}
 
 
 class Certificate(msgspec.Struct, frozen=True):
@@ -75,28 +103,23 @@ class Certificate(msgspec.Struct, frozen=True):
     @property
     def verdict(self) -> str:
         """Verdict in one sentence."""
+        both, steps = f"{self.source} and {self.target}", f"{self.rollout.steps} steps"
         alike = self.source_fingerprint == self.target_fingerprint
         if self.is_empty and alike and self.rollout.identical:
             return (
-                f"{self.source} and {self.target} behave alike: both models have the fingerprint "
-                f"{self.source_fingerprint}, and {self.rollout.steps} steps gave the same numbers."
+                f"{both} behave alike: both models have the fingerprint "
+                f"{self.source_fingerprint}, and {steps} gave the same numbers."
             )
         if self.is_empty:
-            return (
-                f"{self.source} and {self.target} behave alike: their models and "
-                f"{self.rollout.steps} steps differ by rounding only"
-                f"{'' if alike else ', or in names'}."
-            )
+            names = "" if alike else ", or in names"
+            return f"{both} behave alike: their models and {steps} differ by rounding only{names}."
         if self.same_model:
             return (
-                f"The models of {self.source} and {self.target} are the same "
-                f"({self.source_fingerprint}); only what is sensed, done or rewarded differs."
+                f"The models of {both} are the same ({self.source_fingerprint}); only what is "
+                "sensed, done or rewarded differs."
             )
         if self.rollout.differs_by_rounding:
-            return (
-                f"The models of {self.source} and {self.target} differ, but "
-                f"{self.rollout.steps} steps did not show it."
-            )
+            return f"The models of {both} differ, but {steps} did not show it."
         return f"{self.target} behaves differently from {self.source}."
 
     def __str__(self) -> str:
@@ -106,13 +129,17 @@ class Certificate(msgspec.Struct, frozen=True):
             f"{self.target} [{self.target_fingerprint}]",
             self.verdict,
         ]
+        files = [
+            [f"{name} [{digest}]" for name, digest in each.items()]
+            for each in (self.source_files, self.target_files)
+        ]
         for title, sentences in (
             ("Changes", [item.sentence for item in grouped(self.changes)]),
             ("Rollout", [str(self.rollout)]),
             (f"Does not fit together in {self.source}", self.source_inconsistencies),
             (f"Does not fit together in {self.target}", self.target_inconsistencies),
-            (f"Own files of {self.source}", _listed(self.source_files)),
-            (f"Own files of {self.target}", _listed(self.target_files)),
+            (f"Own files of {self.source}", files[0]),
+            (f"Own files of {self.target}", files[1]),
         ):
             if sentences:
                 lines += [f"{title}:", *(f"  {sentence}" for sentence in sentences)]
@@ -136,8 +163,8 @@ class Certificate(msgspec.Struct, frozen=True):
 
 
 def certify(
-    source: Certifiable | Wrapped,
-    target: Certifiable | Wrapped,
+    source: Certifiable,
+    target: Certifiable,
     *,
     steps: int = 100,
     seed: int = 0,
@@ -164,10 +191,11 @@ def certify(
     for env in (source, target):
         if not hasattr(getattr(env, "unwrapped", env), "model"):
             raise MorphologyError(f"{_label(env)} has no model to compare.")
-    one, two = cast("list[mujoco.MjModel]", [attribute(env, "model") for env in (source, target)])
-    changes = compare(one, two, standing_height=(_height(source), _height(target)))
-    renamed = not changes and differ_in_names(one, two)
-    rollout = compare_rollouts(source, target, steps=steps, seed=seed, renamed=renamed)
+    one: mujoco.MjModel = attribute(source, "model")
+    two: mujoco.MjModel = attribute(target, "model")
+    heights = attribute(source, "standing_height", None), attribute(target, "standing_height", None)
+    changes = compare(one, two, standing_height=heights)
+    renamed = not changes and bool(differences(moved_numbers(one), moved_numbers(two)))
     names = labels or (_label(source), _label(target))
     certificate = Certificate(
         source=names[0],
@@ -175,9 +203,9 @@ def certify(
         source_fingerprint=fingerprint(one),
         target_fingerprint=fingerprint(two),
         changes=changes,
-        rollout=rollout,
+        rollout=compare_rollouts(source, target, steps=steps, seed=seed, renamed=renamed),
         source_inconsistencies=inconsistencies(one),
-        target_inconsistencies=(*inconsistencies(two), *lone_masses(one, two)),
+        target_inconsistencies=inconsistencies(two, one),
         source_files=own_modules(modules_of_env(source)),
         target_files=own_modules(modules_of_env(target)),
     )
@@ -189,22 +217,88 @@ def certify(
     return certificate
 
 
-def _listed(files: dict[str, str]) -> list[str]:
-    """Return files with their hashes."""
-    return [f"{name} [{digest}]" for name, digest in files.items()]
-
-
-def _height(env: Certifiable | Wrapped) -> float | None:
-    """Return the standing height, if the environment states it."""
-    try:
-        return attribute(env, "standing_height")
-    except AttributeError:
-        return None
-
-
 def _label(env: Any) -> str:
     """Return the label of an environment, its registered id, or the name of its class."""
     spec = getattr(env, "spec", None)
     inner = getattr(env, "unwrapped", env)
     own = getattr(inner, "label", None)
     return str(own or getattr(spec, "id", None) or type(inner).__name__)
+
+
+def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None) -> tuple[str, ...]:
+    """Return the inconsistencies of a compiled model that was written to, one sentence each.
+
+    Writing mass without inertia, or either without calling `mujoco.mj_setConst`, leaves an
+    inconsistent model: MuJoCo softens contacts and limits by inverse weights that no longer hold,
+    copies frames that no longer coincide, and ignores gravity compensation, adhesion or an
+    actuator's damping if there was none when the model was compiled.
+
+    Args:
+        model: The model.
+        source: Another model with the same bodies, whose masses must not differ alone.
+    """
+    names, owner, found = names_of(model), model.geom_bodyid, list[str]()
+    moving = np.flatnonzero(model.body_treeid >= 0).tolist()
+    for i in (i for i in moving if model.body_mass[i] > 0.0):
+        small, middle, large = sorted(model.body_inertia[i].tolist())
+        what = f"{names['bodies'][i]}: mass {model.body_mass[i]:.4g} kg"
+        if small < 0.0 or (large == 0.0 and model.body_dofnum[i] > 0):
+            found.append(f"{what} comes with inertia {small:.3g} kg·m².")
+        elif small + middle < large * (1.0 - _STALE):
+            found.append(
+                f"{what} comes with principal moments {small:.3g}, {middle:.3g}, {large:.3g} "
+                "kg·m², of which the largest is more than the other two together."
+            )
+    late = model.geom_contype & ~model.body_contype[owner]
+    late |= model.geom_conaffinity & ~model.body_conaffinity[owner]
+    for i in np.flatnonzero(late).tolist():
+        found.append(
+            f"{names['geoms'][i]}: geom_contype or geom_conaffinity has bits that its body was "
+            "compiled without, so they are ignored. Compile the model again."
+        )
+    found += _stale_constants(model, names)
+    before = names_of(source)["bodies"] if source else []
+    for i in moving:
+        if source is None or names["bodies"][i] not in before:
+            continue
+        j = before.index(names["bodies"][i])
+        old, new = float(source.body_mass[j]), float(model.body_mass[i])
+        same_inertia = np.array_equal(source.body_inertia[j], model.body_inertia[i])
+        if old != new and same_inertia and model.body_inertia[i].any():
+            found.append(
+                f"{names['bodies'][i]}: mass goes from {old:.4g} to {new:.4g} kg, but its inertia "
+                f"stays {model.body_inertia[i].max():.3g} kg·m²: scale both."
+            )
+    return tuple(found)
+
+
+def _stale_constants(model: mujoco.MjModel, names: dict[str, list[str]]) -> Iterator[str]:
+    """Yield a sentence for each array that `mj_setConst` would change."""
+    fresh = copy.deepcopy(model)
+    try:
+        mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
+    except mujoco.FatalError as error:
+        yield f"MuJoCo cannot derive its constants from the model: {error}."
+        return
+    remedy = "Call mujoco.mj_setConst after writing to a compiled model."
+    kinds = {"body": "bodies", "geom": "geoms", "site": "sites", "jnt": "joints"}
+    owners = {prefix: names[kind] for prefix, kind in (kinds | {"tendon": "tendons"}).items()}
+    owners["dof"] = [names["joints"][joint] for joint in model.dof_jntid.tolist()]
+    for array, consequence in _CONSTANTS.items():
+        rows = len(getattr(model, array))
+        if not rows:
+            continue
+        old, new = (
+            getattr(each, array).reshape(rows, -1).astype(np.float64) for each in (model, fresh)
+        )
+        scale = np.maximum(np.abs(old), np.abs(new))
+        gap = np.abs(old - new) / np.where(scale > 0.0, scale, 1.0)
+        if gap.max() > _STALE:  # The element that changes most is named.
+            at = np.unravel_index(int(np.argmax(gap)), gap.shape)
+            yield (
+                f"{owners[array.partition('_')[0]][at[0]]}: {array} is {old[at]:.4g}, but the "
+                f"model makes it {new[at]:.4g}, so {consequence}. {remedy}"
+            )
+    for flag, consequence in _FLAGS.items():
+        if getattr(fresh, flag) and not getattr(model, flag):
+            yield f"{flag} is not set, so {consequence}. {remedy}"

@@ -10,13 +10,7 @@ from typing import Final
 import msgspec
 import mujoco
 
-from shapechanger.morphology.certificate.fields import (
-    MOVED,
-    SENSED,
-    Field,
-    Numbers,
-    Values,
-)
+from shapechanger.morphology.certificate.fields import MOVED, SENSED, Field, Numbers, Values
 from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
 
 Amount = float | str | tuple[float | str, ...] | None
@@ -34,9 +28,6 @@ _ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `R
 _HEX_DIGITS: Final = 16
 
 _KINDS: Final = MOVED | SENSED
-_FIELDS: Final = {
-    (section, field.quantity): field for section, kind in _KINDS.items() for field in kind.fields
-}
 _TITLES: Final = frozenset(kind.title for kind in _KINDS.values())
 # Quantities whose ratios mean nothing.
 _WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
@@ -72,19 +63,10 @@ def change(
     after: Sequence[float | str] | None,
     unit: str = "",
 ) -> Change:
-    """Describe a change in a sentence.
-
-    Args:
-        quantity: What changes, such as "length".
-        element: Its element, such as "shank_4"; "" for the whole model.
-        before: Values before; None if the element was missing.
-        after: Values after; None if the element is missing.
-        unit: Unit of the values; "" for none.
-    """
+    """Describe a change of a quantity of an element, which has it before, after, or both."""
     old, new = _plain(before), _plain(after)
-    return Change(
-        quantity, element, old, new, unit, f"{element}: {_words(quantity, old, new, unit)}"
-    )
+    words = _words(quantity, old, new, unit)
+    return Change(quantity, element, old, new, unit, f"{element}: {words}")
 
 
 def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
@@ -96,9 +78,8 @@ def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
     merged: list[Change] = []
     for (_, text), members in groups.items():
         names = ", ".join(member.element for member in members)
-        merged.append(
-            msgspec.structs.replace(members[0], element=names, sentence=f"{names}: {text}")
-        )
+        sentence = f"{names}: {text}"
+        merged.append(msgspec.structs.replace(members[0], element=names, sentence=sentence))
     return tuple(merged)
 
 
@@ -132,16 +113,14 @@ def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
 
 def _shown(amount: Amount, digits: int) -> str:
     """Format an amount with so many significant digits; equal numbers of a list are shown once."""
-    if not isinstance(amount, tuple):
-        return "none" if amount is None else _one(amount, digits)
-    texts = [_one(value, digits) for value in amount]
-    if not texts:
+    if isinstance(amount, tuple):
+        texts = [_shown(value, digits) for value in amount] or ["none"]
+        if len(texts) == 1:
+            return texts[0]
+        return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
+    if amount is None:
         return "none"
-    return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
-
-
-def _one(value: float | str, digits: int) -> str:
-    return value if isinstance(value, str) else f"{value:.{digits}g}"
+    return amount if isinstance(amount, str) else f"{amount:.{digits}g}"
 
 
 def _ratio(before: Amount, after: Amount) -> float | None:
@@ -189,7 +168,13 @@ def compare(
         found = found if differences(*unnamed) else ()
     if not found:
         return tuple(changes)
-    changes += _totals(source, target)
+    if source.nbody != target.nbody:
+        sizes = (float(source.nbody),), (float(target.nbody),)
+        changes.append(change("dimensions", "nbody", *sizes, "1"))
+    old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
+    # The order of the bodies may change the last digit of the sum.
+    if not math.isclose(old, new, rel_tol=ROUNDING):
+        changes.append(change("total mass", "robot", (old,), (new,), "kg"))
     changes += _lengths(source, target, one, two)
     if found[0].quantity == "derived constant" and changes:
         return tuple(changes)
@@ -202,108 +187,6 @@ def _is_round(item: Change, one: Numbers, two: Numbers) -> bool:
     geoms = [numbers["geoms"].get(item.element, {}) for numbers in (one, two)]
     types = {geom.get("type", ("",))[0] for geom in geoms}
     return item.quantity == "size" and len(types) == 1 and types <= set(_ROUND)
-
-
-def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
-    """Return the differences of the numbers of two models, element by element.
-
-    Constants that MuJoCo derives count if nothing else differs.
-    """
-    found: list[Change] = []
-    for section in one:
-        if section != "derived":
-            found += _section(section, one[section], two[section])
-    if not found and "derived" in one:
-        pairs = {
-            name: (old["values"], two["derived"][name]["values"])
-            for name, old in one["derived"].items()
-        }
-        found = [
-            change("derived constant", name, *pair)
-            for name, pair in pairs.items()
-            if not _equal(*pair)
-        ]
-    return tuple(found)
-
-
-def differ_in_names(source: mujoco.MjModel, target: mujoco.MjModel) -> bool:
-    """Return whether two models that move equally call something that decides it differently."""
-    return bool(differences(moved_numbers(source), moved_numbers(target)))
-
-
-def _section(
-    section: str, before: dict[str, dict[str, Values]], after: dict[str, dict[str, Values]]
-) -> list[Change]:
-    """Return the differences within one section."""
-    found: list[Change] = []
-    kind, scales = _KINDS[section], _scales(before, after)
-    for element in dict.fromkeys((*before, *after)):
-        old, new = before.get(element), after.get(element)
-        if old is None or new is None:
-            field = _FIELDS.get((section, kind.described_by))
-            there, then = (
-                None if fields is None else fields.get(kind.described_by, ("there",))
-                for fields in (old, new)
-            )
-            unit = field.unit if field and isinstance(field.unit, str) else ""
-            found.append(change(kind.title, element, there, then, unit))
-            continue
-        found += [
-            _difference(section, element, quantity, old, new)
-            for quantity in dict.fromkeys((*old, *new))
-            if not _equal(old.get(quantity), new.get(quantity), scales[quantity])
-        ]
-    old_order, new_order = (
-        [name for name in names if name in other]
-        for names, other in ((before, after), (after, before))
-    )
-    if old_order != new_order:
-        found.append(change("order", section, old_order, new_order))
-    return found
-
-
-def _difference(
-    section: str, element: str, quantity: str, before: dict[str, Values], after: dict[str, Values]
-) -> Change:
-    """Describe one field that differs, in its usual unit."""
-    field = _FIELDS.get((section, quantity), Field(quantity, ""))
-    old, new, unit = before.get(quantity), after.get(quantity), field.unit
-    if field.padded and old is not None and new is not None:
-        count = max(len(_stripped(old)), len(_stripped(new)), 1)
-        old, new = old[:count], new[:count]
-    if isinstance(unit, tuple):
-        sliding, turning = unit
-        kinds = {"slide": sliding, "hinge": turning, "ball": turning}
-        unit = kinds.get(str(before["type"][0]), "")
-    if unit == "deg":
-        old, new = (
-            None if values is None else tuple(math.degrees(float(value)) for value in values)
-            for values in (old, new)
-        )
-    return change(quantity, element, old, new, unit)
-
-
-def _stripped(values: Values) -> Values:
-    """Return values without the zeros at their end."""
-    count = len(values)
-    while count and values[count - 1] == 0.0:
-        count -= 1
-    return values[:count]
-
-
-def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
-    """Return the differences of the number of bodies and of the total mass."""
-    found: list[Change] = []
-    if source.nbody != target.nbody:
-        sizes = (float(source.nbody),), (float(target.nbody),)
-        found.append(change("dimensions", "nbody", *sizes, "1"))
-    before, after = (
-        math.fsum(model.body_mass[model.body_treeid >= 0].tolist()) for model in (source, target)
-    )
-    # The order of the bodies may change the last digit of the sum.
-    if not math.isclose(before, after, rel_tol=ROUNDING):
-        found.append(change("total mass", "robot", (before,), (after,), "kg"))
-    return found
 
 
 def _lengths(
@@ -340,6 +223,75 @@ def _segments(model: mujoco.MjModel) -> dict[str, tuple[str, str, str, list[floa
             label = body if model.body_geomnum[owner] == 1 else geom
             found[geom] = (kind, body, label, model.geom_size[i].tolist())
     return found
+
+
+def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
+    """Return the differences of the numbers of two models, element by element.
+
+    Constants that MuJoCo derives count if nothing else differs.
+    """
+    found: list[Change] = []
+    for section in one:
+        if section != "derived":
+            found += _section(section, one[section], two[section])
+    if not found and "derived" in one:
+        for name, fields in one["derived"].items():
+            old, new = fields["values"], two["derived"][name]["values"]
+            if not _equal(old, new):
+                found.append(change("derived constant", name, old, new))
+    return tuple(found)
+
+
+def _section(
+    section: str, before: dict[str, dict[str, Values]], after: dict[str, dict[str, Values]]
+) -> list[Change]:
+    """Return the differences within one section."""
+    found: list[Change] = []
+    kind, scales = _KINDS[section], _scales(before, after)
+    table = {field.quantity: field for field in kind.fields}
+    for element in dict.fromkeys((*before, *after)):
+        old, new = before.get(element), after.get(element)
+        if old is None or new is None:
+            field = table.get(kind.described_by)
+            there, then = (
+                None if fields is None else fields.get(kind.described_by, ("there",))
+                for fields in (old, new)
+            )
+            unit = field.unit if field and isinstance(field.unit, str) else ""
+            found.append(change(kind.title, element, there, then, unit))
+            continue
+        for quantity in dict.fromkeys((*old, *new)):
+            if not _equal(old.get(quantity), new.get(quantity), scales[quantity]):
+                field = table.get(quantity, Field(quantity, ""))
+                found.append(_difference(field, element, old, new))
+    orders = [
+        [name for name in names if name in other]
+        for names, other in ((before, after), (after, before))
+    ]
+    if orders[0] != orders[1]:
+        found.append(change("order", section, *orders))
+    return found
+
+
+def _difference(
+    field: Field, element: str, before: dict[str, Values], after: dict[str, Values]
+) -> Change:
+    """Describe one field that differs, in its usual unit."""
+    old, new, unit = before.get(field.quantity), after.get(field.quantity), field.unit
+    if field.padded and old is not None and new is not None:
+        used = [i for values in (old, new) for i, value in enumerate(values) if value != 0.0]
+        count = max(used, default=0) + 1
+        old, new = old[:count], new[:count]
+    if isinstance(unit, tuple):
+        sliding, turning = unit
+        kinds = {"slide": sliding, "hinge": turning, "ball": turning}
+        unit = kinds.get(str(before["type"][0]), "")
+    if unit == "deg":
+        old, new = (
+            None if values is None else tuple(math.degrees(float(value)) for value in values)
+            for values in (old, new)
+        )
+    return change(field.quantity, element, old, new, unit)
 
 
 def _scales(*sections: dict[str, dict[str, Values]]) -> dict[str, float]:
@@ -387,10 +339,10 @@ def fingerprint(model: mujoco.MjModel) -> str:
     differently: numbers count up to rounding. It does not change with colours, cameras, lights, or
     anything else without effect.
     """
-    return digest_of(moved_numbers(model))
+    return _digest_of(moved_numbers(model))
 
 
-def digest_of(numbers: Numbers) -> str:
+def _digest_of(numbers: Numbers) -> str:
     """Return the first 16 hex digits of the SHA-256 of numbers, which are rounded."""
     rounded: list[object] = []
     for section, elements in numbers.items():
@@ -430,7 +382,7 @@ class ModelNumbers:
             drawn: Whether frames are observed.
         """
         moved, sensed = moved_numbers(model), sensed_numbers(model, drawn=drawn)
-        return digest_of(moved), digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
+        return _digest_of(moved), _digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
 
     @staticmethod
     def changes(old: bytes, new: bytes) -> tuple[str, ...]:

@@ -1,8 +1,4 @@
-"""Compare two environments that start from one seed and get the same commands.
-
-A rollout shows what a compiled model does not: noise and delay of sensors, another start, another
-reward. Any object with the methods of `Certifiable` will do; Gymnasium is not needed.
-"""
+"""Compare two environments that start from one seed and get the same commands."""
 
 from __future__ import annotations
 
@@ -10,7 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, SupportsFloat, cast
 
 import msgspec
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,10 +13,7 @@ if TYPE_CHECKING:
     from shapechanger.layout import Layout
 
 _Floats = NDArray[np.float64]
-_Commands = NDArray[np.float32]
-
 _LARGEST: Final = float(np.finfo(np.float64).max)
-
 # Models that differ by rounding part slowly: HalfCheetah-v1 with its masses written out differs
 # from the original by 4e-16 kg, its observations by at most 1e-11 after 10 steps and by 0.2 after
 # 94, and no step of six of Gymnasium's robots parts by more than 230 times as much as those before
@@ -30,113 +22,27 @@ _TOLERANCE: Final = 1e-8  # Of a number up to 1; of a larger one this part.
 _GROWTH: Final = 1e4
 
 
-class _Env(Protocol):
-    """An environment that can be reset and stepped."""
+class Certifiable(Protocol):
+    """Protocol of an environment whose shifts can be certified, or of a wrapper around one.
 
-    def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]: ...
-
-    def step(self, action: Any, /) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]: ...
-
-
-class Certifiable(_Env, Protocol):
-    """Protocol of an environment whose shifts can be certified.
-
-    Attributes:
-        model: The compiled model that it steps.
-        standing_height: Height of its trunk when it stands, m; None if it does not stand.
-        observation_layout: Meaning of each number of an observation.
-        action_layout: Meaning of each number of an action.
+    The environment has a `model`, an `observation_layout`, an `action_layout`, and, if it stands, a
+    `standing_height`, m. Gymnasium is not needed.
     """
 
-    model: mujoco.MjModel
-    standing_height: float | None
-    observation_layout: Layout
-    action_layout: Layout
-
-
-class Wrapped(_Env, Protocol):
-    """Protocol of a wrapper around a `Certifiable`, whose observations and actions count."""
-
-    @property
-    def unwrapped(self) -> Any:
-        """The environment inside all wrappers."""
+    def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode, as in Gymnasium."""
         ...
 
-
-def attribute(env: Certifiable | Wrapped, name: str) -> Any:
-    """Return an attribute of an environment, or of the one inside its wrappers.
-
-    Args:
-        env: The environment.
-        name: Name of the attribute.
-
-    Raises:
-        AttributeError: If neither has it.
-    """
-    return getattr(env, name) if hasattr(env, name) else getattr(cast(Any, env).unwrapped, name)
-
-
-def matched_commands(
-    source: Layout, target: Layout, steps: int, seed: int
-) -> tuple[_Commands, _Commands]:
-    """Draw commands for two robots: the same for motors of the same name, zero for the others.
-
-    The numbers of a motor depend on the seed and its name alone. They lie where the ranges of the
-    two overlap.
-
-    Args:
-        source: Layout of the actions of the one.
-        target: Layout of the actions of the other.
-        steps: How many commands to draw.
-        seed: Seed of the draw.
-
-    Returns:
-        The commands of each, shape (steps, size of its layout).
-    """
-    old, new = _ranges(source), _ranges(target)
-    drawn: dict[str, _Floats] = {}
-    for name in old:
-        if name in new:
-            low, high = max(old[name][0], new[name][0]), min(old[name][1], new[name][1])
-            share = np.random.default_rng([seed, *name.encode()]).random(steps)
-            drawn[name] = low + (high - low) * share
-    return _as_commands(old, drawn, steps), _as_commands(new, drawn, steps)
-
-
-def _as_commands(
-    ranges: dict[str, tuple[float, float]], drawn: dict[str, _Floats], steps: int
-) -> _Commands:
-    """Return commands in single precision, which spaces of double precision accept too."""
-    commands = np.zeros((steps, len(ranges)), np.float32)
-    for place, (name, bounds) in enumerate(ranges.items()):
-        low, high = np.asarray(bounds, np.float32)
-        commands[:, place] = np.clip(drawn.get(name, np.zeros(steps)), low, high)
-    return commands
-
-
-def _ranges(layout: Layout) -> dict[str, tuple[float, float]]:
-    """Return a finite range for each number: to -1 or 1, or beyond, where it has no bound."""
-    found: dict[str, tuple[float, float]] = {}
-    for name, low, high in zip(number_names(layout), layout.low, layout.high, strict=True):
-        bottom = low if np.isfinite(low) else min(-1.0, high - 1.0)
-        top = high if np.isfinite(high) else max(1.0, low + 1.0)
-        found[name] = (float(bottom), float(top))
-    return found
-
-
-def number_names(layout: Layout) -> list[str]:
-    """Return one name per number of a vector: `camera[0]`, `camera[1]` for a block."""
-    names: list[str] = []
-    for feature in layout:
-        blocks = [f"{feature.name}[{i}]" for i in range(feature.size)]
-        names += blocks if feature.shape else [feature.name]
-    return names
+    def step(self, action: Any, /) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Give a command, as in Gymnasium."""
+        ...
 
 
 class Rollout(msgspec.Struct, frozen=True):
     """Comparison of the responses of two environments to the same commands.
 
-    Step 0 is the reset; step n follows the n-th command.
+    It shows what a compiled model does not: noise and delay of sensors, another start, another
+    reward. Step 0 is the reset; step n follows the n-th command.
 
     Attributes:
         steps: Commands given before the first of the two ended its episode.
@@ -172,13 +78,8 @@ class Rollout(msgspec.Struct, frozen=True):
     @property
     def identical(self) -> bool:
         """Return whether both gave the same numbers, the same rewards and the same end."""
-        return (
-            self.first_step is None
-            and not self.only_in_source
-            and not self.only_in_target
-            and self.reward_difference == 0.0
-            and self.source_ended == self.target_ended
-        )
+        apart = self.only_in_source or self.only_in_target or self.reward_difference
+        return self.first_step is None and not apart and self.source_ended == self.target_ended
 
     @property
     def differs_by_rounding(self) -> bool:
@@ -210,9 +111,75 @@ class Rollout(msgspec.Struct, frozen=True):
         return " ".join(sentences)
 
 
+def attribute(env: Any, name: str, *default: Any) -> Any:
+    """Return an attribute of an environment, or of the one inside its wrappers.
+
+    Args:
+        env: The environment.
+        name: Name of the attribute.
+        *default: The result if neither has it.
+
+    Raises:
+        AttributeError: If neither has it, and there is no default.
+    """
+    own = hasattr(env, name) or not hasattr(env, "unwrapped")
+    return getattr(env if own else env.unwrapped, name, *default)
+
+
+def matched_commands(
+    source: Layout, target: Layout, steps: int, seed: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Draw commands for two robots: the same for motors of the same name, zero for the others.
+
+    The numbers of a motor depend on the seed and its name alone. They lie where the ranges of the
+    two overlap.
+
+    Args:
+        source: Layout of the actions of the one.
+        target: Layout of the actions of the other.
+        steps: How many commands to draw.
+        seed: Seed of the draw.
+
+    Returns:
+        The commands of each, shape (steps, size of its layout).
+    """
+    ranges = _ranges(source), _ranges(target)
+    drawn: dict[str, _Floats] = {}
+    for name in ranges[0].keys() & ranges[1].keys():
+        (low, high), (new_low, new_high) = ranges[0][name], ranges[1][name]
+        low, high = max(low, new_low), min(high, new_high)
+        share = np.random.default_rng([seed, *name.encode()]).random(steps)
+        drawn[name] = low + (high - low) * share
+    one, two = (np.zeros((steps, len(own)), np.float32) for own in ranges)
+    for commands, own in ((one, ranges[0]), (two, ranges[1])):
+        for place, (name, bounds) in enumerate(own.items()):
+            low, high = np.asarray(bounds, np.float32)
+            commands[:, place] = np.clip(drawn.get(name, np.zeros(steps)), low, high)
+    return one, two  # Spaces of double precision accept single precision too.
+
+
+def _ranges(layout: Layout) -> dict[str, tuple[float, float]]:
+    """Return a finite range for each number: to -1 or 1, or beyond, where it has no bound."""
+    found: dict[str, tuple[float, float]] = {}
+    for name, low, high in zip(_number_names(layout), layout.low, layout.high, strict=True):
+        bottom = low if np.isfinite(low) else min(-1.0, high - 1.0)
+        top = high if np.isfinite(high) else max(1.0, low + 1.0)
+        found[name] = (float(bottom), float(top))
+    return found
+
+
+def _number_names(layout: Layout) -> list[str]:
+    """Return one name per number of a vector: `camera[0]`, `camera[1]` for a block."""
+    names: list[str] = []
+    for feature in layout:
+        blocks = [f"{feature.name}[{i}]" for i in range(feature.size)]
+        names += blocks if feature.shape else [feature.name]
+    return names
+
+
 def compare_rollouts(
-    source: Certifiable | Wrapped,
-    target: Certifiable | Wrapped,
+    source: Certifiable,
+    target: Certifiable,
     *,
     steps: int = 100,
     seed: int = 0,
@@ -233,9 +200,9 @@ def compare_rollouts(
             differ in names alone are matched by their places.
     """
     actions, seen = (_layouts(source, target, side, renamed) for side in ("action", "observation"))
-    for_source, for_target = matched_commands(actions[0], actions[1], steps, seed)
+    for_source, for_target = matched_commands(*actions, steps, seed)
     one, two = _drive(source, for_source, seed), _drive(target, for_target, seed)
-    old, new = (number_names(layout) for layout in seen)
+    old, new = (_number_names(layout) for layout in seen)
     sizes = one.observations.shape[1], two.observations.shape[1]
     if (len(old), len(new)) != sizes:  # A wrapper has changed the numbers: use their places.
         old, new = ([f"observation[{place}]" for place in range(size)] for size in sizes)
@@ -244,20 +211,14 @@ def compare_rollouts(
     done = min(len(one.rewards), len(two.rewards))
     before = one.observations[: done + 1, [old.index(name) for name in shared]]
     after = two.observations[: done + 1, [new.index(name) for name in shared]]
-    gaps = _gap(before, after)
-    rewards = _gap(one.rewards[:done], two.rewards[:done])
+    gaps, excess = _gaps(before, after)
+    # The first reward is that of the first step.
+    rewards, reward_excess = _gaps(one.rewards[:done, None], two.rewards[:done, None])
     ended = one.ended and len(one.rewards) == done, two.ended and len(two.rewards) == done
     parted = np.flatnonzero(gaps.any(axis=1)).tolist()
     first = parted[0] if parted else None
     # The first of equal differences.
     largest, feature = np.unravel_index(int(np.argmax(gaps)), gaps.shape) if parted else (0, 0)
-    excess = np.maximum(
-        _excess(gaps, before, after),
-        # The first reward is that of the first step.
-        np.append(
-            0.0, _excess(rewards[:, None], one.rewards[:done, None], two.rewards[:done, None])
-        ),
-    )
     return Rollout(
         steps=done,
         source_ended=ended[0],
@@ -271,21 +232,16 @@ def compare_rollouts(
         largest_feature=shared[feature] if parted else "",
         largest_step=int(largest) if parted else None,
         reward_difference=float(rewards.max(initial=0.0)),
-        beyond_rounding=_beyond_rounding(excess, ended[0] != ended[1]),
+        beyond_rounding=_beyond_rounding(
+            np.maximum(excess, np.append(0.0, reward_excess)), ended[0] != ended[1]
+        ),
     )
 
 
 def _layouts(
-    source: Certifiable | Wrapped, target: Certifiable | Wrapped, side: str, renamed: bool
+    source: Certifiable, target: Certifiable, side: str, renamed: bool
 ) -> tuple[Layout, Layout]:
-    """Return the layouts of a side, twice the source's if they differ in names alone.
-
-    Args:
-        source: The source.
-        target: The target.
-        side: "action" or "observation".
-        renamed: Whether the two are one robot under other names.
-    """
+    """Return the layouts of actions or observations; twice the source's if names alone differ."""
     one: Layout = attribute(source, f"{side}_layout")
     two: Layout = attribute(target, f"{side}_layout")
     kinds = [
@@ -295,17 +251,18 @@ def _layouts(
     return one, one if renamed and kinds[0] == kinds[1] else two
 
 
-def _excess(gaps: _Floats, before: _Floats, after: _Floats) -> _Floats:
-    """Return the largest gap of each step, in multiples of the tolerance of its number.
+def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
+    """Return absolute differences, (n, numbers), and the largest of each step in tolerances, (n,).
 
-    Args:
-        gaps: Absolute differences, shape (n, numbers).
-        before: Numbers of the source, of the same shape.
-        after: Numbers of the target.
+    Of numbers that are not finite, and differ, it is the largest finite number.
     """
+    same = (before == after) | (np.isnan(before) & np.isnan(after))
+    with np.errstate(invalid="ignore"):
+        gaps = np.where(same, 0.0, np.abs(before - after))
+    gaps = np.nan_to_num(gaps, nan=_LARGEST, posinf=_LARGEST)
     known = np.nan_to_num(np.maximum(np.abs(before), np.abs(after)), nan=1.0, posinf=1.0)
     scale = np.maximum(known.max(axis=0, initial=0.0), 1.0)
-    return (np.minimum(gaps / scale, 1.0) / _TOLERANCE).max(axis=1, initial=0.0)
+    return gaps, (np.minimum(gaps / scale, 1.0) / _TOLERANCE).max(axis=1, initial=0.0)
 
 
 def _beyond_rounding(excess: _Floats, one_ended: bool) -> int | None:
@@ -330,7 +287,7 @@ class _Episode(NamedTuple):
     ended: bool
 
 
-def _drive(env: Certifiable | Wrapped, commands: _Commands, seed: int) -> _Episode:
+def _drive(env: Certifiable, commands: NDArray[np.float32], seed: int) -> _Episode:
     """Reset an environment and give it commands until they, or the episode, are over."""
     observation, _ = env.reset(seed=seed)
     observations, rewards, ended = [_flat(observation)], list[float](), False
@@ -350,11 +307,3 @@ def _flat(observation: Any) -> _Floats:
         parts = cast("Mapping[str, Any]", observation)
         return np.concatenate([_flat(parts[key]) for key in sorted(parts)])
     return np.array(observation, np.float64).ravel()  # A copy, should the env reuse its memory.
-
-
-def _gap(one: _Floats, two: _Floats) -> _Floats:
-    """Return absolute differences; the largest finite number where one is not finite."""
-    same = (one == two) | (np.isnan(one) & np.isnan(two))
-    with np.errstate(invalid="ignore"):
-        gap = np.where(same, 0.0, np.abs(one - two))
-    return np.nan_to_num(gap, nan=_LARGEST, posinf=_LARGEST)

@@ -8,21 +8,26 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar, cast
 
 import msgspec
+import mujoco
 import numpy as np
 from msgspec.structs import force_setattr
 
 from shapechanger.errors import MorphologyError
 
 if TYPE_CHECKING:
-    import mujoco
-
     from shapechanger.morphology.spec.keyframes import Keyframes
 
 Vector = tuple[float, float, float]
+_N = TypeVar("_N", float, np.ndarray)
 
+EDITS: Final[dict[str, type[Edit]]] = {}
+"""The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` enters itself."""
+
+# Of modules whose kinds of edits cannot be replaced.
+_SHIPPED: Final = "shapechanger."
 # A limb a hundred times longer or shorter is a typing mistake, and the softness of MuJoCo's
 # contacts, which is absolute, does not fit it.
 _SMALLEST_FACTOR: Final = 0.01
@@ -46,14 +51,34 @@ class Edit(
 ):
     """One change to a model.
 
+    A subclass with an `apply` is known to JSON by the snake case of its name, as worker processes
+    and files need, once its module is imported.
+
     Attributes:
         amount: Share of the change that is made, 0 (none) to 1 (all).
+        needs: Flag of the model that disables what the edit changes, and the word for it.
 
     Raises:
-        MorphologyError: If the amount, or a number of the edit, is out of its range.
+        MorphologyError: If the amount, or a number of the edit, is out of its range; of a subclass,
+            if another one has its name.
     """
 
+    needs: ClassVar[tuple[mujoco.mjtDisableBit, str] | None] = None
     amount: float = 1.0
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        super().__init_subclass__(**settings)
+        if "apply" not in vars(cls):
+            return  # A base of several kinds.
+        tag = _tag(cls.__name__)
+        known = EDITS.get(tag, cls)
+        # A module that is imported again, perhaps under another name, defines its classes again.
+        ours = known.__module__.startswith(_SHIPPED) and known.__module__ != cls.__module__
+        if ours or known.__qualname__ != cls.__qualname__:
+            raise MorphologyError(
+                f"There is an edit {tag!r} already: give {cls.__name__} a new name."
+            )
+        EDITS[tag] = cls
 
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
@@ -87,6 +112,21 @@ class Edit(
             keyframes: Its keyframes.
         """
 
+    def require_effect(self, spec: mujoco.MjSpec) -> None:
+        """Refuse an edit of something that the model's options switch off.
+
+        Args:
+            spec: The specification.
+
+        Raises:
+            MorphologyError: If the edit would change nothing.
+        """
+        if self.needs is not None and spec.option.disableflags & int(self.needs[0]):
+            raise MorphologyError(
+                f"{type(self).__name__} would change nothing, because the model switches "
+                f"{self.needs[1]} off: change its <flag> first."
+            )
+
     def partly(self, alpha: float) -> Edit:
         """Return the edit with its amount scaled by `alpha`, 0 to 1."""
         return msgspec.structs.replace(self, amount=self.amount * alpha)
@@ -98,14 +138,8 @@ def _as_python(value: Any) -> Any:
     return tuple(cast("list[Any]", plain)) if isinstance(plain, list) else plain
 
 
-def part_of_the_way(old: float, new: float, amount: float) -> float:
-    """Interpolate between two values; exactly `new` at the end.
-
-    Args:
-        old: Value at an amount of 0.
-        new: Value at an amount of 1.
-        amount: 0 to 1.
-    """
+def part_of_the_way(old: _N, new: _N, amount: float) -> _N:
+    """Interpolate between two values or vectors; exactly `new` at an `amount` of 1."""
     return new if amount == 1.0 else old + amount * (new - old)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import ClassVar, Final
 
 import mujoco
 
@@ -28,6 +28,7 @@ class JointRange(Edit, frozen=True):
         upper: New upper limit, rad or m; None keeps the old one.
     """
 
+    needs: ClassVar = (mujoco.mjtDisableBit.mjDSBL_LIMIT, "limits of joints")
     joint: str
     lower: float | None = None
     upper: float | None = None
@@ -97,7 +98,7 @@ class Lock(Edit, frozen=True):
                 joint.name: positions[joint.name] - reference_of(joint) for joint in joints
             }
             for joint in joints:
-                displace(spec, joint, displacements[joint.name])
+                displace(joint, displacements[joint.name])
                 remove_joint(spec, joint, displacements)
             return
         for joint in joints:

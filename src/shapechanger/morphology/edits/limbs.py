@@ -54,6 +54,7 @@ from shapechanger.morphology.spec.references import (
     require_removable,
     require_unnamed,
 )
+from shapechanger.morphology.spec.strength import add_motor
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.keyframes import Keyframes
@@ -93,7 +94,7 @@ class Cut(Edit, frozen=True):
                 continue  # It was part of a limb that has been cut off.
             require_limb(body, "cut")
             require_geometry(spec, body)
-            plane = Plane(spec, body, self.keep)
+            plane = Plane(body, self.keep)
             if self.keep < 1.0:
                 release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, name)})
                 self._cut_geoms(spec, body, plane)
@@ -117,10 +118,10 @@ class Cut(Edit, frozen=True):
                     spec.delete(geom)
                 else:
                     part = max(1.0 - self.amount, _SMALLEST_PART)
-                    resize_geom(spec, geom, place_of(geom), part)
+                    resize_geom(geom, place_of(geom), part)
             elif piece.share < 1.0:
                 share = part_of_the_way(1.0, piece.share, self.amount)
-                shorten(spec, geom, piece.near, share, piece.axis)
+                shorten(geom, piece.near, share, piece.axis)
 
     def _cut_point(self, spec: mujoco.MjSpec, plane: Plane, point: Point) -> None:
         """Pull a point at the far end to the new end, and remove any other one."""
@@ -135,7 +136,7 @@ class Cut(Edit, frozen=True):
         """Remove a limb beyond the cut; at an amount below 1, pull it in and make it smaller."""
         if self.amount < 1.0:
             share = part_of_the_way(1.0, self.keep, self.amount)
-            there = held_at(spec, child)
+            there = held_at(child)
             child.pos = child.pos + (stretched(there, anchor(body), share) - there)
         _take_away(spec, child, self.amount)
 
@@ -195,7 +196,7 @@ class Split(Edit, frozen=True):
         (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
         require_limb(body, "split")
         require_geometry(spec, body)
-        plane = Plane(spec, body, self.at)
+        plane = Plane(body, self.at)
         pieces = {geom.name: plane.piece_of(geom) for geom in body.geoms}
         cut = [name for name, piece in pieces.items() if 0.0 < piece.share < 1.0]
         require_divisible(spec, body, cut)
@@ -228,18 +229,18 @@ class Split(Edit, frozen=True):
         place: np.ndarray,
     ) -> None:
         """Divide a geom between both parts."""
-        whole = volume(spec, geom)
+        whole = volume(geom)
         copy = copy_geom(spec, geom, part, self._far_half(geom.name))
         # About its near end, which then goes to where the geom is cut.
         move_by(copy, -piece.near)
-        shorten(spec, copy, np.zeros(3), 1.0 - piece.share, piece.axis)
+        shorten(copy, np.zeros(3), 1.0 - piece.share, piece.axis)
         end = piece.near + 2.0 * (place_of(geom) - piece.near)
         offset = piece.near + piece.share * (end - piece.near) - place
         if float(np.linalg.norm(offset)) > _ON_THE_AXIS_M:
             move_by(copy, offset)
-        shorten(spec, geom, piece.near, piece.share, piece.axis)
+        shorten(geom, piece.near, piece.share, piece.axis)
         # The rounded ends at the split overlap. Their mass grows with the amount of the split.
-        volumes = [volume(spec, half) for half in (geom, copy)]
+        volumes = [volume(half) for half in (geom, copy)]
         rounded_end = 0.5 * (sum(volumes) - whole)
         for half, own in zip((geom, copy), volumes, strict=True):
             without = 1.0 - rounded_end / own
@@ -283,13 +284,13 @@ class AddSegment(Edit, frozen=True):
         """Add the segment."""
         (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
         require_geometry(spec, body)
-        place = far_end(spec, body)
+        place = far_end(body)
         model_geom = _long_geom(body)
         part = _new_segment(spec, body, self.name, place)
         geom = copy_geom(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         if not math.isnan(geom.mass):
-            geom.density, geom.mass = geom.mass / volume(spec, model_geom), math.nan
+            geom.density, geom.mass = geom.mass / volume(model_geom), math.nan
         # MuJoCo takes either both ends or a pose.
         geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
         geom.fromto = [0.0, 0.0, 0.0, *self.end]
@@ -423,12 +424,4 @@ def _add_hinge(
     strength = max(amount, _SMALLEST_PART)
     set_limits(hinge, strength * edit.lower, strength * edit.upper)
     if edit.gear is not None:
-        motor = spec.add_actuator(
-            name=edit.name,
-            target=edit.name,
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-            ctrlrange=[-1.0, 1.0],
-            gear=[strength * edit.gear, 0.0, 0.0, 0.0, 0.0, 0.0],
-        )
-        motor.set_to_motor()
+        add_motor(spec, edit.name, strength * edit.gear)

@@ -53,7 +53,7 @@ class PlaceBody(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Move every body that fits."""
         for body in select("body", self.body, limbs_and_trunks(spec)):
-            body.pos = _between(body.pos, self.to, self.amount)
+            body.pos = part_of_the_way(np.array(body.pos), np.array(self.to, float), self.amount)
 
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
         """Place the bodies that float in every keyframe too."""
@@ -63,7 +63,8 @@ class PlaceBody(Edit, frozen=True):
 
     def _placed(self, pose: np.ndarray) -> np.ndarray:
         """Return the position of a free joint, shape (7,), at the new place."""
-        return np.concatenate([_between(pose[:3], self.to, self.amount), pose[3:]])
+        place = part_of_the_way(pose[:3], np.array(self.to, float), self.amount)
+        return np.concatenate([place, pose[3:]])
 
 
 class PlaceGeom(Edit, frozen=True):
@@ -108,31 +109,29 @@ class PlaceGeom(Edit, frozen=True):
             if geom.parent.parent is not None:
                 require_geometry(spec, geom.parent)
                 release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, geom.parent.name)})
-            before = volume(spec, geom)
+            before = volume(geom)
             if self.start is not None and self.end is not None:
-                self._place_ends(spec, geom, np.array(self.start), np.array(self.end))
+                self._place_ends(geom, np.array(self.start, float), np.array(self.end, float))
             if self.middle is not None:
                 place = place_of(geom)
-                move_by(geom, _between(place, self.middle, self.amount) - place)
+                to = np.array(self.middle, float)
+                move_by(geom, part_of_the_way(place, to, self.amount) - place)
             if self.radius is not None:
                 self._set_radius(geom, self.radius)
-            keep_density(spec, geom, before)
+            keep_density(geom, before)
 
-    def _place_ends(
-        self, spec: mujoco.MjSpec, geom: mujoco.MjsGeom, start: np.ndarray, end: np.ndarray
-    ) -> None:
+    def _place_ends(self, geom: mujoco.MjsGeom, start: np.ndarray, end: np.ndarray) -> None:
         """Set both ends of the axis."""
-        old = axis_ends(spec, geom)
+        old = axis_ends(geom)
         if old is None:
             raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
         # Which end of an axis comes first means nothing: each goes to the nearer one.
         if not has_ends(geom) and _apart(old, (start, end)) > _apart(old, (end, start)):
             old = old[::-1]
-        ends = [_between(o, n, self.amount) for o, n in zip(old, (start, end), strict=True)]
+        ends = [part_of_the_way(o, n, self.amount) for o, n in zip(old, (start, end), strict=True)]
         geom.size = [geom.size[0], 0.0, 0.0]
         # MuJoCo takes either both ends or a pose.
         geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
-        geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         geom.fromto = np.concatenate(ends)
 
     def _set_radius(self, geom: mujoco.MjsGeom, radius: float) -> None:
@@ -174,13 +173,6 @@ class TotalMass(Edit, frozen=True):
         for body in limbs_and_trunks(spec):
             if body.name in names:
                 scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)
-
-
-def _between(old: np.ndarray, new: Vector | np.ndarray, amount: float) -> np.ndarray:
-    """Return a point part of the way between two; exactly the second at the end."""
-    return np.array(
-        [part_of_the_way(float(o), float(n), amount) for o, n in zip(old, new, strict=True)]
-    )
 
 
 def _apart(old: tuple[np.ndarray, np.ndarray], new: tuple[np.ndarray, np.ndarray]) -> float:

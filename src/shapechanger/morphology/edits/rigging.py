@@ -7,13 +7,14 @@ collections leave the floor to a scene.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import ClassVar, Final
 
 import mujoco
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import Edit
 from shapechanger.morphology.spec.elements import limbs_and_trunks, require_free_name, select
+from shapechanger.morphology.spec.strength import add_motor
 
 _J: Final = mujoco.mjtJoint
 _MOVES_JOINT: Final = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
@@ -36,6 +37,7 @@ class AddMotor(Edit, frozen=True):
             allows the joint (`effort` in URDF, `actuatorfrcrange` in MJCF).
     """
 
+    needs: ClassVar = (mujoco.mjtDisableBit.mjDSBL_ACTUATION, "actuators")
     joint: str
     gear: float | None = None
 
@@ -69,17 +71,8 @@ class AddMotor(Edit, frozen=True):
                 "a joint that follows another one needs none."
             )
         for joint in joints:
-            require_free_name(spec, "actuator", joint.name)
             gear = self._gear_of(joint) * max(self.amount, _WEAKEST_PART)
-            motor = spec.add_actuator(
-                name=joint.name,
-                target=joint.name,
-                trntype=mujoco.mjtTrn.mjTRN_JOINT,
-                ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-                ctrlrange=[-1.0, 1.0],
-                gear=[gear, 0.0, 0.0, 0.0, 0.0, 0.0],
-            )
-            motor.set_to_motor()
+            add_motor(spec, joint.name, gear)
 
     def _gear_of(self, joint: mujoco.MjsJoint) -> float:
         """Return the gear of a joint's motor."""

@@ -7,7 +7,7 @@ words for these are the operations `scale` and `abs` of domain randomization.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, ClassVar, Final, Literal
 
 import mujoco
 import numpy as np
@@ -37,6 +37,7 @@ from shapechanger.morphology.spec.strength import is_motor, scale_clamps, scale_
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.keyframes import Keyframes
 
+_D: Final = mujoco.mjtDisableBit
 _J: Final = mujoco.mjtJoint
 # Share of an axis that is vertical from which a slide raises its body.
 _VERTICAL: Final = 1.0 - 1e-6
@@ -72,10 +73,10 @@ class ValueEdit(Edit, frozen=True, tag=None):
     @staticmethod
     def _possible(value: float) -> bool:
         """Return whether the number can be set to this."""
-        return math.isfinite(value) and value >= 0.0
+        return value >= 0.0
 
     def changed(self, old: float) -> float:
-        """The new value in place of `old`."""
+        """Return the new value in place of `old`."""
         new = old * self.scale if self.scale is not None else self.to
         assert new is not None  # `check` requires one of the two.
         return part_of_the_way(old, new, self.amount)
@@ -89,7 +90,7 @@ class Mass(ValueEdit, frozen=True):
 
     @staticmethod
     def _possible(value: float) -> bool:
-        return math.isfinite(value) and value > 0.0
+        return value > 0.0
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
@@ -133,9 +134,11 @@ class Gear(ValueEdit, frozen=True):
     force of the joint or tendon scales along where all of its actuators are changed.
     """
 
+    needs: ClassVar = (_D.mjDSBL_ACTUATION, "actuators")
+
     @staticmethod
     def _possible(value: float) -> bool:
-        return math.isfinite(value) and value != 0.0
+        return value != 0.0
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every actuator that fits."""
@@ -167,21 +170,35 @@ class Gear(ValueEdit, frozen=True):
 class Damping(ValueEdit, frozen=True):
     """Change the damping of joints: N·m·s/rad of a hinge, N·s/m of a slide."""
 
+    needs: ClassVar = (_D.mjDSBL_DAMPER, "dampers")
+
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every joint that fits."""
-        for joint in select("joint", self.element, spec.joints):
-            _require_own_values(joint, "damping")
-            joint.damping = _first_changed(self, joint.damping)
+        _change_resistance(spec, self, "damping")
 
 
 class Stiffness(ValueEdit, frozen=True):
     """Change the stiffness of joints: N·m/rad of a hinge, N/m of a slide."""
 
+    needs: ClassVar = (_D.mjDSBL_SPRING, "springs")
+
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every joint that fits."""
-        for joint in select("joint", self.element, spec.joints):
-            _require_own_values(joint, "stiffness")
-            joint.stiffness = _first_changed(self, joint.stiffness)
+        _change_resistance(spec, self, "stiffness")
+
+
+def _change_resistance(spec: mujoco.MjSpec, edit: ValueEdit, field: str) -> None:
+    """Change the linear coefficient of joints, and higher ones by a scale."""
+    for joint in select("joint", edit.element, spec.joints):
+        if all(number > 0.0 for number in joint.springdamper):
+            raise MorphologyError(
+                f"{joint.name!r} takes its {field} from its springdamper, which would swallow the "
+                "change: write stiffness and damping out in the model."
+            )
+        numbers = np.array(getattr(joint, field))
+        count = 1 if edit.scale is None else len(numbers)
+        numbers[:count] = [edit.changed(float(number)) for number in numbers[:count]]
+        setattr(joint, field, numbers)
 
 
 class Friction(ValueEdit, frozen=True):
@@ -195,7 +212,17 @@ class Friction(ValueEdit, frozen=True):
         component: Which coefficient.
     """
 
+    needs: ClassVar = (_D.mjDSBL_CONTACT, "contacts")
     component: Literal["sliding", "torsional", "rolling"] = "sliding"
+
+    def require_effect(self, spec: mujoco.MjSpec) -> None:
+        """Refuse it where contacts are switched off, or their parameters overridden."""
+        super().require_effect(spec)
+        if spec.option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
+            raise MorphologyError(
+                "Friction would change nothing, because the model overrides the parameters of all "
+                "contacts: change its <flag> first."
+            )
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every geom that fits."""
@@ -204,25 +231,6 @@ class Friction(ValueEdit, frozen=True):
             friction = np.array(geom.friction)
             friction[place] = self.changed(float(friction[place]))
             geom.friction = friction
-
-
-def _require_own_values(joint: mujoco.MjsJoint, what: str) -> None:
-    """Refuse a joint whose resistance the compiler derives from its inertia."""
-    if all(number > 0.0 for number in joint.springdamper):
-        raise MorphologyError(
-            f"{joint.name!r} takes its {what} from its springdamper, which would swallow the "
-            "change: write stiffness and damping out in the model."
-        )
-
-
-def _first_changed(edit: ValueEdit, polynomial: np.ndarray) -> np.ndarray:
-    """The linear coefficient changed; higher ones, where a model has them, in proportion."""
-    old = np.array(polynomial)
-    new = old.copy()
-    new[0] = edit.changed(float(old[0]))
-    if edit.scale is not None:
-        new[1:] = [edit.changed(float(x)) for x in old[1:]]
-    return new
 
 
 class Stretch(Edit, frozen=True):
@@ -277,7 +285,7 @@ class Radius(Edit, frozen=True):
             require_geometry(spec, body)
             release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
             for geom in body.geoms:
-                thicken_geom(spec, geom, factor)
+                thicken_geom(geom, factor)
 
 
 # Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
@@ -293,6 +301,7 @@ class Gravity(Edit, frozen=True):
             vector corresponds to a sloping floor.
     """
 
+    needs: ClassVar = (_D.mjDSBL_GRAVITY, "gravity")
     to: Vector
 
     def check(self) -> None:
@@ -305,10 +314,8 @@ class Gravity(Edit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Set the model's gravity."""
-        spec.option.gravity = [
-            part_of_the_way(old, new, self.amount)
-            for old, new in zip(spec.option.gravity.tolist(), self.to, strict=True)
-        ]
+        old = np.array(spec.option.gravity)
+        spec.option.gravity = part_of_the_way(old, np.array(self.to, float), self.amount)
 
 
 class StartHeight(Edit, frozen=True):
@@ -339,7 +346,7 @@ class StartHeight(Edit, frozen=True):
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
         """Raise or lower the trunks in every keyframe too, because robots start in one."""
         for joint in (joint for body in self._trunks(spec) for joint in body.joints):
-            axis = rotation(orientation(spec, joint.parent)) @ joint.axis
+            axis = rotation(orientation(joint.parent)) @ joint.axis
             vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
             if joint.type == _J.mjJNT_FREE:
                 keyframes.change(joint.name, self._raised)

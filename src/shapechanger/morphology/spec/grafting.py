@@ -13,7 +13,7 @@ import numpy as np
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import require_free_name, subtree
 from shapechanger.morphology.spec.explicit import resolve_frames
-from shapechanger.morphology.spec.geometry import Point, has_ends, orientation, rotation
+from shapechanger.morphology.spec.geometry import Point, has_ends, rotation
 from shapechanger.morphology.spec.references import (
     COUPLINGS,
     Element,
@@ -26,10 +26,8 @@ from shapechanger.morphology.spec.references import (
 _O: Final = mujoco.mjtObj
 # In a name while another element still has it; no name of a model has it.
 _OLD: Final = "~old"
-# Set apart: names are unique, and orientations are written in units that belong to each element.
-_APART: Final = frozenset(
-    {"name", "alt", "ialt", "quat", "iquat", "classname", "childclass", "info"}
-)
+# Names are unique, and all orientations are written out as quaternions.
+_APART: Final = frozenset({"name", "alt", "ialt", "classname", "childclass", "info"})
 _IN_DEGREES: Final = ("range", "ref", "springref")
 _POINTS: Final = ("joint", "geom", "site", "camera", "light")
 
@@ -58,7 +56,7 @@ def copy_limb(
     inside = elements_of(limb)
     release_drawings(spec, inside, skins=False)
     copied = _Copies(spec, limb, suffix, turn, inside)
-    copy = _copy_body(spec, limb, limb.parent.add_frame(quat=turn), lambda name: name + suffix)
+    copy = _copy_body(limb, limb.parent.add_frame(quat=turn), lambda name: name + suffix)
     resolve_frames(spec)
     copied.copy_holders()
     return copy
@@ -81,7 +79,7 @@ def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody)
         for kind in _POINTS:
             for element in getattr(body, f"{kind}s"):
                 element.name += _OLD
-    moved = _copy_body(spec, limb, parent, lambda name: name.removesuffix(_OLD))
+    moved = _copy_body(limb, parent, lambda name: name.removesuffix(_OLD))
     spec.delete(limb)
     return moved
 
@@ -101,7 +99,7 @@ def copy_geom(
         MorphologyError: If the name is taken.
     """
     require_free_name(spec, "geom", name)
-    return _copy_point(spec, geom, body, name)
+    return _copy_point(geom, body, name)
 
 
 def move_point(spec: mujoco.MjSpec, point: Point, body: mujoco.MjsBody) -> Any:
@@ -117,39 +115,38 @@ def move_point(spec: mujoco.MjSpec, point: Point, body: mujoco.MjsBody) -> Any:
     """
     name = point.name
     point.name = name + _OLD  # References are by name.
-    moved = _copy_point(spec, point, body, name)
+    moved = _copy_point(point, body, name)
     spec.delete(point)
     return moved
 
 
 def _copy_body(
-    spec: mujoco.MjSpec,
     body: mujoco.MjsBody,
     place: mujoco.MjsBody | mujoco.MjsFrame,
     renamed: Callable[[str], str],
 ) -> mujoco.MjsBody:
     """Copy a body with all that hangs on it."""
     copy = place.add_body()
-    _copy_fields(spec, body, copy)
+    _copy_fields(body, copy)
     copy.name = renamed(body.name)
     for kind in _POINTS:
         for element in getattr(body, f"{kind}s"):
-            _copy_point(spec, element, copy, element.name and renamed(element.name))
+            _copy_point(element, copy, element.name and renamed(element.name))
     for child in body.bodies:
-        _copy_body(spec, child, copy, renamed)
+        _copy_body(child, copy, renamed)
     return copy
 
 
-def _copy_point(spec: mujoco.MjSpec, point: Any, body: mujoco.MjsBody, name: str) -> Any:
+def _copy_point(point: Any, body: mujoco.MjsBody, name: str) -> Any:
     """Copy an element that is on a body."""
     kind = type(point).__name__.removeprefix("Mjs").lower()
     copy = getattr(body, f"add_{kind}")()
-    _copy_fields(spec, point, copy)
+    _copy_fields(point, copy)
     copy.name = name
     return copy
 
 
-def _copy_fields(spec: mujoco.MjSpec, old: Any, new: Any) -> None:
+def _copy_fields(old: Any, new: Any) -> None:
     """Copy all but the name of an element to a new one of its kind.
 
     Raises:
@@ -159,10 +156,6 @@ def _copy_fields(spec: mujoco.MjSpec, old: Any, new: Any) -> None:
         raise MorphologyError(f"{old.name!r} is driven by a plugin, so it cannot be copied.")
     for field in _fields_of(old.__class__):
         setattr(new, field, getattr(old, field))
-    if hasattr(old, "quat"):
-        new.quat = orientation(spec, old)
-    if isinstance(old, mujoco.MjsBody):
-        new.iquat = orientation(spec, old, old.ialt, old.iquat)
     # Limits of attached models can have other units than those of elements that are added.
     turns = isinstance(old, mujoco.MjsJoint) and old.type != mujoco.mjtJoint.mjJNT_SLIDE
     if turns and old.compiler.degree != new.compiler.degree:
@@ -228,22 +221,19 @@ class _Copies:
                 inside.add((_O.mjOBJ_ACTUATOR, actuator.name))
         for sensor in list(spec.sensors):
             self._copy_if_inside(sensor, "sensor")
-        for reference in self._references:
-            holder, kind = reference.holder, reference.kind
-            holders = {"camera": _O.mjOBJ_CAMERA, "light": _O.mjOBJ_LIGHT}
-            if (holders.get(kind), holder.name) in inside and self._is_inside(reference):
-                copy = getattr(spec, kind)(holder.name + self._suffix)
-                copy.targetbody = reference.name + self._suffix
-
-    def _is_inside(self, reference: Any) -> bool:
-        return (reference.target, reference.name) in self._inside
+        holders = {"camera": _O.mjOBJ_CAMERA, "light": _O.mjOBJ_LIGHT}
+        for mention in self._references:
+            name = mention.holder.name
+            if (holders.get(mention.kind), name) in inside and mention.element in inside:
+                copy = getattr(spec, mention.kind)(name + self._suffix)
+                copy.targetbody = mention.element[1] + self._suffix
 
     def _names_inside(self, holder: Any, *fields: str) -> bool:
         """Return whether an element names one of the limb, in some of its fields or in any."""
         return any(
-            self._is_inside(reference)
-            for reference in self._references
-            if reference.holder == holder and (not fields or reference.field in fields)
+            each.element in self._inside
+            for each in self._references
+            if each.holder == holder and (not fields or each.field in fields)
         )
 
     def _require_own_follower(self, equality: mujoco.MjsEquality) -> None:
@@ -262,10 +252,12 @@ class _Copies:
         if not self._names_inside(holder):
             return
         copy = copy_holder(self._spec, holder, kind, self._suffix)
-        for reference in self._references:
-            if reference.holder == holder:
-                turned = kind in ("equality", "actuator")
-                setattr(copy, reference.field, self._renamed(reference, turned))
+        for mention in (each for each in self._references if each.holder == holder):
+            if kind in ("equality", "actuator"):
+                name = self._name(*mention.element)
+            else:
+                name = mention.element[1] + self._suffix * (mention.element in self._inside)
+            setattr(copy, mention.field, name)
 
     def _copy_tendon(self, tendon: mujoco.MjsTendon) -> None:
         """Copy a tendon, with the points of its path outside of the limb turned."""
@@ -285,12 +277,6 @@ class _Copies:
                 beside = self._name(_O.mjOBJ_SITE, side.name) if side else ""
                 copy.wrap_geom(self._name(_O.mjOBJ_GEOM, name), beside)
 
-    def _renamed(self, reference: Any, turned: bool) -> str:
-        """Return the name that a copy refers to."""
-        if turned:
-            return self._name(reference.target, reference.name)
-        return reference.name + self._suffix * self._is_inside(reference)
-
     def _name(self, kind: mujoco.mjtObj, name: str) -> str:
         """Return the name of the copy of an element; of one that is shared, its own.
 
@@ -304,7 +290,7 @@ class _Copies:
         if point is None or point.parent != self._parent or self._parent.parent is None:
             return name
         require_free_name(self._spec, "site" if kind == _O.mjOBJ_SITE else "geom", new)
-        copy = _copy_point(self._spec, point, self._parent, new)
+        copy = _copy_point(point, self._parent, new)
         matrix = rotation(self._turn)
         if has_ends(copy):
             copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
@@ -333,7 +319,7 @@ def copy_holder(spec: mujoco.MjSpec, holder: Any, kind: str, suffix: str) -> Any
     if holder.name:
         require_free_name(spec, kind, holder.name + suffix)
     copy = getattr(spec, f"add_{kind}")()
-    _copy_fields(spec, holder, copy)
+    _copy_fields(holder, copy)
     copy.name = holder.name and holder.name + suffix
     return copy
 
@@ -351,9 +337,9 @@ def share_contacts(
     """
     halves = {(_O.mjOBJ_BODY, body.name): part.name}
     halves |= {(_O.mjOBJ_GEOM, near): far for near, far in cut.items()}
-    for reference in references(spec):
-        far = halves.get((reference.target, reference.name))
-        kind = {"exclusion": "exclude", "contact pair": "pair"}.get(reference.kind)
-        if far and kind:
-            copy = copy_holder(spec, reference.holder, kind, f"_of_{part.name}")
-            setattr(copy, reference.field, far)
+    for mention in references(spec, "exclusion", "contact pair"):
+        far = halves.get(mention.element)
+        if far:
+            kind = "exclude" if mention.kind == "exclusion" else "pair"
+            copy = copy_holder(spec, mention.holder, kind, f"_of_{part.name}")
+            setattr(copy, mention.field, far)

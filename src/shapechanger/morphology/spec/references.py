@@ -8,7 +8,7 @@ meanwhile, and keyframes are kept by name (`loops`, `keyframes`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
 import mujoco
@@ -46,6 +46,13 @@ _WRAPS: Final = {
     _W.mjWRAP_SPHERE: _O.mjOBJ_GEOM,
     _W.mjWRAP_CYLINDER: _O.mjOBJ_GEOM,
 }
+_ON_BODIES: Final = {
+    _O.mjOBJ_JOINT: "joints",
+    _O.mjOBJ_GEOM: "geoms",
+    _O.mjOBJ_SITE: "sites",
+    _O.mjOBJ_CAMERA: "cameras",
+    _O.mjOBJ_LIGHT: "lights",
+}
 # Sensors of all geoms of a body, so of both parts after a split.
 _OF_ALL_GEOMS: Final = (
     *(mujoco.mjtSensor.mjSENS_GEOMDIST, mujoco.mjtSensor.mjSENS_GEOMNORMAL),
@@ -60,73 +67,97 @@ class Mention(NamedTuple):
         holder: The element that names.
         kind: Its kind, for messages and for `copies`.
         field: Its field that holds the name; `path` of a tendon.
-        target: Kind of the named element.
-        name: Name of the named element.
+        element: The named element.
     """
 
     holder: Any
     kind: str
     field: str
-    target: mujoco.mjtObj
-    name: str
+    element: Element
 
     def __str__(self) -> str:
-        if not self.holder.name and self.name.startswith(MARK):
+        name = self.element[1]
+        if not self.holder.name and name.startswith(MARK):
             return f"the {self.kind}"
-        named = f"{self.holder.name!r}" if self.holder.name else f"of {self.name!r}"
-        return f"the {self.kind} {named}"
+        return f"the {self.kind} " + (
+            f"{self.holder.name!r}" if self.holder.name else f"of {name!r}"
+        )
 
 
-def references(spec: mujoco.MjSpec) -> list[Mention]:
+def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
+    """Return the elements that a tendon passes, side sites included, in order."""
+    found: list[Element] = []
+    for wrap in path_of(tendon):
+        if wrap.type in _WRAPS:
+            found.append((_WRAPS[wrap.type], wrap.target.name))
+        if side := wrap.sidesite:
+            found.append((_O.mjOBJ_SITE, side.name))
+    return found
+
+
+def path_of(tendon: mujoco.MjsTendon) -> list[Any]:
+    """Return the parts of a tendon's path, in order."""
+    return [tendon.path[i] for i in range(len(tendon.path))]
+
+
+def _bound(equality: mujoco.MjsEquality) -> mujoco.mjtObj:
+    pins = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
+    return (
+        equality.objtype if equality.type in pins else COUPLINGS.get(equality.type, _O.mjOBJ_FLEX)
+    )
+
+
+# The elements of a specification, what a message calls one, and the fields in which it names
+# others: the kind of the named ones, or a function that returns it or one kind for each name.
+_HOLDERS: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
+    ("equalities", "equality", {"name1": _bound, "name2": _bound}),
+    ("excludes", "exclusion", {"bodyname1": _O.mjOBJ_BODY, "bodyname2": _O.mjOBJ_BODY}),
+    ("pairs", "contact pair", {"geomname1": _O.mjOBJ_GEOM, "geomname2": _O.mjOBJ_GEOM}),
+    (
+        "actuators",
+        "actuator",
+        {
+            "target": lambda actuator: _TARGETS.get(actuator.trntype, _O.mjOBJ_UNKNOWN),
+            "refsite": _O.mjOBJ_SITE,
+            "slidersite": _O.mjOBJ_SITE,
+        },
+    ),
+    (
+        "sensors",
+        "sensor",
+        {"objname": lambda sensor: sensor.objtype, "refname": lambda sensor: sensor.reftype},
+    ),
+    ("cameras", "camera", {"targetbody": _O.mjOBJ_BODY}),
+    ("lights", "light", {"targetbody": _O.mjOBJ_BODY}),
+    ("skins", "skin", {"bodyname": _O.mjOBJ_BODY}),
+    ("flexes", "flex", {"vertbody": _O.mjOBJ_BODY, "nodebody": _O.mjOBJ_BODY}),
+    ("tuples", "tuple", {"objname": lambda group: [_O(kind) for kind in group.objtype]}),
+)
+
+
+def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
     Keyframes refer to joints and actuators by their order; see `keyframes`.
+
+    Args:
+        spec: The specification.
+        *kinds: Kinds of holders, such as "actuator"; all by default.
     """
-    return [reference for reference in _all_references(spec) if reference.name]
-
-
-def _all_references(spec: mujoco.MjSpec) -> Iterator[Mention]:
-    """Yield every reference, those to nothing included."""
-    for tendon in spec.tendons:
-        for wrap in path_of(tendon):
-            if wrap.type in _WRAPS:
-                yield Mention(tendon, "tendon", "path", _WRAPS[wrap.type], wrap.target.name)
-            if side := wrap.sidesite:
-                yield Mention(tendon, "tendon", "path", _O.mjOBJ_SITE, side.name)
-    for equality in spec.equalities:
-        target = COUPLINGS.get(equality.type, equality.objtype)
-        if equality.type not in (*COUPLINGS, _E.mjEQ_CONNECT, _E.mjEQ_WELD):
-            target = _O.mjOBJ_FLEX
-        for field in ("name1", "name2"):
-            yield Mention(equality, "equality", field, target, getattr(equality, field))
-    for exclude in spec.excludes:
-        for field in ("bodyname1", "bodyname2"):
-            name = getattr(exclude, field)
-            yield Mention(exclude, "exclusion", field, _O.mjOBJ_BODY, name)
-    for pair in spec.pairs:
-        for field in ("geomname1", "geomname2"):
-            yield Mention(pair, "contact pair", field, _O.mjOBJ_GEOM, getattr(pair, field))
-    for actuator in spec.actuators:
-        target = _TARGETS.get(actuator.trntype, _O.mjOBJ_UNKNOWN)
-        yield Mention(actuator, "actuator", "target", target, actuator.target)
-        for field in ("refsite", "slidersite"):
-            yield Mention(actuator, "actuator", field, _O.mjOBJ_SITE, getattr(actuator, field))
-    for sensor in spec.sensors:
-        yield Mention(sensor, "sensor", "objname", _plain(sensor.objtype), sensor.objname)
-        yield Mention(sensor, "sensor", "refname", _plain(sensor.reftype), sensor.refname)
-    for camera in spec.cameras:
-        yield Mention(camera, "camera", "targetbody", _O.mjOBJ_BODY, camera.targetbody)
-    for light in spec.lights:
-        yield Mention(light, "light", "targetbody", _O.mjOBJ_BODY, light.targetbody)
-    for skin in spec.skins:
-        for name in skin.bodyname:
-            yield Mention(skin, "skin", "bodyname", _O.mjOBJ_BODY, name)
-    for flex in spec.flexes:
-        for name in {*flex.vertbody, *flex.nodebody}:
-            yield Mention(flex, "flex", "vertbody", _O.mjOBJ_BODY, name)
-    for group in spec.tuples:
-        for kind, name in zip(group.objtype, group.objname, strict=True):
-            yield Mention(group, "tuple", "objname", _plain(_O(kind)), name)
+    found = [
+        Mention(tendon, "tendon", "path", element)
+        for tendon in spec.tendons
+        for element in path_elements(tendon)
+    ]
+    for elements, kind, fields in _HOLDERS:
+        for holder in getattr(spec, elements):
+            for field, of in fields.items():
+                target, value = of(holder) if callable(of) else of, getattr(holder, field)
+                names = [value] if isinstance(value, str) else list(value)
+                targets = target if isinstance(target, list) else [target] * len(names)
+                for named, name in zip(targets, names, strict=True):
+                    found.append(Mention(holder, kind, field, (_plain(named), name)))
+    return [each for each in found if each.element[1] and (not kinds or each.kind in kinds)]
 
 
 def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
@@ -134,36 +165,13 @@ def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
     return _O.mjOBJ_BODY if kind == _O.mjOBJ_XBODY else kind
 
 
-def path_of(tendon: mujoco.MjsTendon) -> list[Any]:
-    """Return what a tendon passes, in order."""
-    return [tendon.path[i] for i in range(len(tendon.path))]
-
-
-def path_elements(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> set[Element]:
-    """Return the elements that a tendon passes, side sites included."""
-    return {
-        (reference.target, reference.name)
-        for reference in references(spec)
-        if reference.kind == "tendon" and reference.holder == tendon
-    }
-
-
 def elements_of(limb: mujoco.MjsBody) -> set[Element]:
     """Return all elements of a limb."""
-    return {element for body in subtree(limb) for element in own_elements(body)}
-
-
-def own_elements(body: mujoco.MjsBody) -> set[Element]:
-    """Return a body and the elements on it."""
-    found = {(_O.mjOBJ_BODY, body.name)}
-    for kind, elements in (
-        (_O.mjOBJ_JOINT, body.joints),
-        (_O.mjOBJ_GEOM, body.geoms),
-        (_O.mjOBJ_SITE, body.sites),
-        (_O.mjOBJ_CAMERA, body.cameras),
-        (_O.mjOBJ_LIGHT, body.lights),
-    ):
-        found |= {(kind, element.name) for element in elements}
+    found: set[Element] = set()
+    for body in subtree(limb):
+        found.add((_O.mjOBJ_BODY, body.name))
+        for kind, elements in _ON_BODIES.items():
+            found |= {(kind, element.name) for element in getattr(body, elements)}
     return found
 
 
@@ -181,49 +189,39 @@ def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool 
     Raises:
         MorphologyError: If one of the bodies carries a part of a flex.
     """
-    found: dict[str, mujoco.MjsSkin] = {}
-    for reference in references(spec):
-        if (reference.target, reference.name) not in touched:
-            continue
-        if reference.kind == "flex":
+    mentions = [each for each in references(spec, "flex", "skin") if each.element in touched]
+    for mention in mentions:
+        if mention.kind == "flex":
             raise MorphologyError(
-                f"{reference.name!r} carries a part of {reference}, which would not follow: "
+                f"{mention.element[1]!r} carries a part of {mention}, which would not follow: "
                 "remove the flex first."
             )
-        if reference.kind == "skin" and skins:
-            found[reference.holder.name] = reference.holder
-    for skin in found.values():
+    for skin in {each.holder.name: each.holder for each in mentions if skins}.values():
         spec.delete(skin)
 
 
 # --- Elements that go -------------------------------------------------------------------------
 
 
-def require_unnamed(
-    spec: mujoco.MjSpec, element: Element, why: str, kinds: Iterable[str] | None = None
-) -> None:
+def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str) -> None:
     """Refuse an edit that would leave a reference to an element without its meaning.
 
     Args:
         spec: Specification that contains it.
         element: The element.
         why: The reason, as the end of a sentence, such as "lies beyond the cut".
-        kinds: Kinds of references to refuse; None for all.
+        *kinds: Kinds of references to refuse; all by default.
 
     Raises:
         MorphologyError: If anything names the element.
     """
-    for reference in references(spec):
-        named = (reference.target, reference.name) == element
-        if named and (kinds is None or reference.kind in kinds):
+    for mention in references(spec, *kinds):
+        if mention.element == element:
+            # The place of a pin has no name of its own.
+            name = "A pin" if element[1].startswith(MARK) else repr(element[1])
             raise MorphologyError(
-                f"{name_of(element)} {why}, but {reference} names it: change or remove it first."
+                f"{name} {why}, but {mention} names it: change or remove it first."
             )
-
-
-def name_of(element: Element) -> str:
-    """Return what a message calls an element; the place of a pin has no name of its own."""
-    return "A pin" if element[1].startswith(MARK) else repr(element[1])
 
 
 def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
@@ -268,8 +266,8 @@ def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
     """
     gone = elements_of(limb)
     for tendon in spec.tendons:
-        crosses = not path_elements(spec, tendon).isdisjoint(gone)
-        if crosses and not moves_only(spec, tendon, gone) and does_something(spec, tendon):
+        crosses = not gone.isdisjoint(path_elements(tendon))
+        if crosses and not moves_only(spec, tendon, gone) and _does_something(spec, tendon):
             raise MorphologyError(
                 f"The tendon {tendon.name!r} also moves what stays when {limb.name!r} is removed: "
                 "remove or reroute the tendon first."
@@ -301,7 +299,7 @@ def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Elem
         tendon: The tendon.
         elements: The elements of the limb.
     """
-    staying = path_elements(spec, tendon) - elements
+    staying = {*path_elements(tendon)} - elements
     if any(kind == _O.mjOBJ_JOINT for kind, _ in staying):
         return False
     # All points elsewhere are on bodies that are fixed to each other.
@@ -316,15 +314,14 @@ def _carrier(body: mujoco.MjsBody) -> mujoco.MjsBody:
     return body
 
 
-def does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
+def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
     """Return whether a tendon acts or is used; the humanoid's do neither."""
     lower, upper = tendon.range
     automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
     acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
     if tendon.limited == mujoco.mjtLimited.mjLIMITED_TRUE or automatic or acts or tendon.armature:
         return True
-    named = {r.name for r in references(spec) if r.target == _O.mjOBJ_TENDON}
-    return bool(tendon.name) and tendon.name in named
+    return any(each.element == (_O.mjOBJ_TENDON, tendon.name) for each in references(spec))
 
 
 # --- Joints that are locked -------------------------------------------------------------------
@@ -364,7 +361,7 @@ def remove_joint(
             length = sum(coefficients[j] * displacements[j] for j in coefficients)
             _hold(spec, _E.mjEQ_TENDON, tendon.name, length)
             gone.add((_O.mjOBJ_TENDON, tendon.name))
-        elif does_something(spec, tendon):
+        elif _does_something(spec, tendon):
             raise MorphologyError(
                 f"{name!r} is tied to other joints by the tendon {tendon.name!r}, so it cannot "
                 "be removed alone."
@@ -437,15 +434,10 @@ def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[s
         MorphologyError: If a reference would mean one of the parts only.
     """
     for name in cut:
-        require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", ("tendon", "sensor"))
-    for reference in references(spec):
-        if (reference.target, reference.name) != (_O.mjOBJ_BODY, body.name):
-            continue
-        holder = reference.holder
-        whole = reference.kind == "actuator" or (
-            reference.kind == "sensor" and holder.type in _OF_ALL_GEOMS
-        )
-        if whole:
+        require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", "tendon", "sensor")
+    for mention in references(spec, "actuator", "sensor"):
+        whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
+        if whole and mention.element == (_O.mjOBJ_BODY, body.name):
             raise MorphologyError(
-                f"{body.name!r} cannot be split: {reference} is about all of its geoms."
+                f"{body.name!r} cannot be split: {mention} is about all of its geoms."
             )

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
+from shapechanger.morphology.spec.elements import require_free_name
 from shapechanger.morphology.spec.references import references
 
 _GAIN: Final = mujoco.mjtGain
@@ -18,6 +19,29 @@ _LINEAR_GAINS: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE)
 _TERMS: Final = slice(0, 3)
 # Peak force and, where that is negative, the force that it is derived from.
 _MUSCLE_FORCE: Final = slice(2, 4)
+
+
+def add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
+    """Add a motor to the joint of its name, with controls from -1 to 1.
+
+    Args:
+        spec: The specification.
+        name: Name of the joint and of the motor.
+        gear: Torque, N·m, or force, N, for a control of 1.
+
+    Raises:
+        MorphologyError: If an actuator has the name.
+    """
+    require_free_name(spec, "actuator", name)
+    motor = spec.add_actuator(
+        name=name,
+        target=name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        ctrlrange=[-1.0, 1.0],
+        gear=[gear, 0.0, 0.0, 0.0, 0.0, 0.0],
+    )
+    motor.set_to_motor()
 
 
 def is_motor(actuator: mujoco.MjsActuator) -> bool:
@@ -71,20 +95,13 @@ def scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
         spec: The specification.
         factors: New force over the old one, by the names of actuators.
     """
-    driven = [
-        ((reference.target, reference.name), reference.holder.name)
-        for reference in references(spec)
-        if reference.kind == "actuator"
-    ]
+    driven = [(each.element, each.holder.name) for each in references(spec, "actuator")]
     for kind, elements in (
         (mujoco.mjtObj.mjOBJ_JOINT, spec.joints),
         (mujoco.mjtObj.mjOBJ_TENDON, spec.tendons),
     ):
         for element in elements:
-            scales = {
-                factors.get(actuator, 1.0)
-                for target, actuator in driven
-                if target == (kind, element.name)
-            }
+            target = (kind, element.name)
+            scales = {factors.get(name, 1.0) for driven_one, name in driven if driven_one == target}
             if len(scales) == 1 and np.any(element.actfrcrange):
                 element.actfrcrange = element.actfrcrange * abs(scales.pop())

@@ -1,0 +1,510 @@
+"""The table of the numbers that decide a model's motion, and the fingerprint of all of them."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.morphology.certificate import compare, fingerprint
+from shapechanger.morphology.certificate.changes import differences
+from shapechanger.morphology.certificate.fields import MOVED, Field, made_arrays
+from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
+from shapechanger.morphology.spec.elements import name_elements
+from tests.morphology.scenes import EVERYTHING, asset, asset_spec, everything
+
+_CLOTH = """
+<mujoco>
+  <option><flag override="enable" sleep="enable"/></option>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1" pos="0 0 -.1"/>
+    <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" pos="0 0 1" dim="2"
+              radius=".01" mass="1"><edge equality="true"/></flexcomp>
+  </worldbody>
+</mujoco>
+"""
+
+# Springs that yield, a moving belt, a delayed motor, and other things that few models have.
+_RARE = """
+<mujoco>
+  <worldbody>
+    <geom name="belt" type="box" size="1 1 .1" surfacevel="1 0 0 0 0 0"/>
+    <site name="hook" pos="0 0 1"/>
+    <body pos="0 0 .15">
+      <joint name="hinge" axis="0 1 0" stiffness="1" springyield=".1"/>
+      <geom size=".1"/><site name="eye" pos="0 0 .2"/>
+    </body>
+  </worldbody>
+  <tendon><spatial name="rope" stiffness="1" springyield=".1" actuatorfrcrange="-1 1">
+    <site site="eye"/><site site="hook"/></spatial></tendon>
+  <actuator>
+    <motor name="slow" joint="hinge" delay=".01" nsample="4" damping=".1" armature=".2"/>
+    <motor name="winch" tendon="rope"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def _rare() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(_RARE)
+
+
+def _cloth() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(_CLOTH)
+
+
+def _array(model: mujoco.MjModel, name: str) -> Any:
+    """Return an array of a model or of its options; None for one that is made."""
+    if name.startswith("opt_"):
+        found = getattr(model.opt, name.removeprefix("opt_"), None)
+        return None if found is None else np.asarray(found)
+    return getattr(model, name, None)
+
+
+def _write(model: mujoco.MjModel, field: Field, rows: Any = slice(None)) -> None:
+    """Change the numbers of a field in some rows."""
+    new = np.array(_array(model, field.array))
+    if field.array.startswith("opt_") and new.ndim == 0:
+        setattr(model.opt, field.array.removeprefix("opt_"), new * 1.1 if new % 1 else new + 1)
+        return
+    old = new[rows]
+    if new.dtype.kind == "b":
+        new[rows] = ~old
+    elif new.dtype.kind == "f":
+        new[rows] = np.where(old != 0, old * 1.1, 0.01)
+    else:
+        new[rows] = old + 1
+    _array(model, field.array)[:] = new
+
+
+# Numbers of the table that MuJoCo has in an array; the others are made of several.
+_WRITTEN = [
+    (section, field)
+    for section, kind in MOVED.items()
+    for field in kind.fields
+    if field.of is None and field.array and _array(everything(), field.array) is not None
+]
+
+
+@pytest.mark.parametrize(("section", "field"), _WRITTEN, ids=lambda x: getattr(x, "array", x))
+def test_a_number_counts_where_the_table_says_so_and_nowhere_else(
+    section: str, field: Field
+) -> None:
+    """Writing to an array changes the elements that list its quantity, and the fingerprint."""
+    listed = 0
+    for load in (everything, _cloth, _rare):
+        nominal, model = load(), load()
+        before = moved_numbers(nominal)
+        _write(model, field)
+        after = moved_numbers(model)
+        for element, fields in before[section].items():
+            if field.quantity in fields and field.quantity in after[section].get(element, {}):
+                listed += 1
+                assert after[section][element][field.quantity] != fields[field.quantity], element
+                assert fingerprint(model) != fingerprint(nominal)
+                assert compare(nominal, model)
+        mask = made_arrays(nominal).get(field.where)
+        values = _array(nominal, field.array)
+        if mask is None or values.ndim == 0 or len(mask) != len(values):
+            continue
+        ignored, model = ~np.asarray(mask).astype(bool), load()
+        _write(model, field, ignored)
+        if np.array_equal(made_arrays(model)[field.where], mask):  # Else it makes itself count.
+            assert moved_numbers(model)[section] == before[section]
+    assert listed
+
+
+# Changes of what several numbers of the table are made of: array, row, factor and offset.
+_MADE: list[tuple[str, int, float, float]] = [
+    *(
+        ("body_gravcomp", 4, 1.0, 0.1),
+        ("body_invweight0", 4, 1.1, 0.0),
+        ("jnt_limited", 2, 0.0, 0.0),
+    ),
+    *(("body_subtreemass", 4, 1.1, 0.0), ("dof_M0", 3, 1.1, 0.0), ("dof_invweight0", 3, 1.1, 0.0)),
+    *(("geom_rbound", 4, 1.1, 0.0), ("geom_friction", 0, 1.1, 0.0), ("geom_solref", 0, 1.1, 0.0)),
+    *(("geom_solimp", 0, 1.01, 0.0), ("geom_condim", 0, 2.0, 0.0), ("geom_margin", 0, 1.0, 0.1)),
+    *(("geom_gap", 0, 1.0, 0.1), ("geom_contype", 3, 0.0, 0.0), ("geom_conaffinity", 8, 0.0, 0.0)),
+    *(("mesh_vert", 0, 1.0, 0.1), ("hfield_data", 0, 1.0, 0.1), ("hfield_size", 0, 1.1, 0.0)),
+    *(("pair_friction", 0, 1.1, 0.0), ("pair_dim", 0, 2.0, 0.0), ("pair_solref", 0, 1.1, 0.0)),
+    *(("pair_solimp", 0, 1.01, 0.0), ("pair_margin", 0, 1.0, 0.1), ("pair_gap", 0, 1.0, 0.1)),
+    *(("exclude_signature", 0, 0.0, 0.0), ("eq_obj1id", 2, 1.0, 1.0), ("wrap_prm", -1, 1.1, 0.0)),
+    *(
+        ("wrap_objid", 0, 1.0, 1.0),
+        ("tendon_limited", 0, 0.0, 0.0),
+        ("tendon_length0", 0, 1.1, 0.0),
+    ),
+    *(("tendon_invweight0", 0, 1.1, 0.0), ("tendon_actfrclimited", 0, 1.0, 1.0)),
+    *(("actuator_trnid", 0, 1.0, 1.0), ("actuator_ctrllimited", 0, 0.0, 0.0)),
+    *(("actuator_forcelimited", 0, 0.0, 0.0), ("actuator_length0", 0, 1.0, 0.1)),
+    ("actuator_acc0", 0, 1.1, 0.0),
+]
+
+
+@pytest.mark.parametrize(("array", "row", "factor", "offset"), _MADE, ids=str)
+def test_whatever_a_number_is_made_of_counts(
+    array: str, row: int, factor: float, offset: float
+) -> None:
+    model = everything()
+    values = getattr(model, array)
+    values[row] = factor * values[row] + offset
+    assert fingerprint(model) != fingerprint(everything())
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("integrator", mujoco.mjtIntegrator.mjINT_RK4),
+        ("cone", mujoco.mjtCone.mjCONE_ELLIPTIC),
+        ("jacobian", mujoco.mjtJacobian.mjJAC_DENSE),
+        ("solver", mujoco.mjtSolver.mjSOL_CG),
+        ("disableactuator", 1),
+        ("disableflags", mujoco.mjtDisableBit.mjDSBL_GRAVITY),
+        ("enableflags", mujoco.mjtEnableBit.mjENBL_SPECULATIVE),
+    ],
+)
+def test_switches_count(option: str, value: int) -> None:
+    model = everything()
+    setattr(model.opt, option, value)
+    assert fingerprint(model) != fingerprint(everything())
+
+
+def test_the_mix_counts_where_there_is_something_to_mix() -> None:
+    """The weight of a geom's solver parameters is nothing between equal ones."""
+    alike, apart = everything(), everything()
+    apart.geom_solref[0, 0] *= 2.0
+    for model, counts in ((alike, False), (apart, True)):
+        nominal = fingerprint(model)
+        model.geom_solmix[0] *= 0.5
+        assert (fingerprint(model) != nominal) is counts
+
+
+def test_values_are_found_by_name() -> None:
+    """Values have the keys section, element and field."""
+    effective = moved_numbers(everything())
+    assert effective["bodies"]["hand"]["parent"] == ("arm",)
+    assert effective["joints"]["wrist"]["joint range"] == (-1.0, 1.0)
+    assert effective["joints"]["root"]["rest position"] == (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+    assert effective["geoms"]["arm"]["size"] == (0.03, 0.15, 0.0)
+    assert effective["actuators"]["ball"]["gear"][:3] == (1.0, 2.0, 3.0)
+    assert effective["actuators"]["jet"]["second site"] == ("shoulder",)
+    assert effective["actuators"]["pose"]["target"] == ("shoulder",)
+    assert effective["tendons"]["couple"]["path elements"] == ("knee", "axle")
+    assert effective["tendons"]["string"]["path side sites"][1] == "bypass"
+    assert effective["equalities"]["mirror"]["and"] == ("wrist",)
+    assert effective["equalities"]["glue"]["between"] == ("glued",)
+    assert effective["contacts"]["floor + leg"]["contact friction"][:3] == (0.7, 0.6, 0.0)
+    assert effective["sizes"]["nv"]["dimensions"] == (13.0,)
+    for name in ("ant", "humanoid", "hopper", "reacher", "swimmer", "pusher"):
+        model = asset(name)
+        assert len(moved_numbers(model)["joints"]) == model.njnt
+        assert len(moved_numbers(model)["actuators"]) == model.nu
+
+
+def test_signs_of_zeros_and_of_quaternions_are_ignored() -> None:
+    model = everything()
+    nominal = moved_numbers(model)
+    for array in (model.body_pos, model.jnt_pos, model.geom_margin, model.qpos0, model.wrap_prm):
+        array[array == 0.0] = -0.0
+    assert repr(moved_numbers(model)) == repr(nominal)
+    for array in (model.body_quat, model.body_iquat, model.geom_quat, model.site_quat):
+        array *= -1.0
+    assert moved_numbers(model) == nominal
+
+
+def _set(model: mujoco.MjModel, flags: str, bit: int) -> None:
+    setattr(model.opt, flags, getattr(model.opt, flags) | bit)
+
+
+_UNSEEN: dict[str, Callable[[mujoco.MjModel], object]] = {
+    "colour": lambda m: m.geom_rgba.fill(0.5),
+    "material": lambda m: m.geom_matid.fill(-1),
+    "material colour": lambda m: m.mat_rgba.fill(0.1),
+    "texture": lambda m: m.tex_data.fill(7),
+    "camera": lambda m: m.cam_pos.fill(3.0),
+    "light": lambda m: m.light_pos.fill(3.0),
+    "visual": lambda m: setattr(m.vis.map, "znear", 0.5),
+    "extent": lambda m: setattr(m.stat, "extent", 99.0),
+    "size of a plane": lambda m: m.geom("floor").size.fill(9.0),
+    "geom group": lambda m: m.geom_group.fill(3),
+    "site size": lambda m: m.site_size.fill(1.0),
+    "site without a use": lambda m: m.site("decor").pos.fill(1.0),
+    "geom without a use": lambda m: m.geom("paint").size.fill(1.0),
+    "tendon width": lambda m: m.tendon_width.fill(0.5),
+    "softness of friction that is zero": lambda m: m.dof_solimp.__setitem__(-1, 0.7),
+    "mass of what cannot move": lambda m: m.body("stand").mass.fill(9.0),
+    "control range without a limit": lambda m: m.actuator("servo").ctrlrange.fill(7.0),
+    "bias that the type ignores": lambda m: m.actuator("motor").biasprm.fill(7.0),
+    "tendon range without a limit": lambda m: m.tendon_range.__setitem__(1, 7.0),
+    "geom parameters under a pair": lambda m: m.geom("leg").friction.fill(0.5),
+    "magnetic field": lambda m: m.opt.magnetic.fill(0.5),
+    "override that is off": lambda m: m.opt.o_friction.fill(0.5),
+    "energy flag": lambda m: _set(m, "enableflags", mujoco.mjtEnableBit.mjENBL_ENERGY),
+    "sensor flag": lambda m: _set(m, "disableflags", mujoco.mjtDisableBit.mjDSBL_SENSOR),
+    "bits of a geom that was compiled without": lambda m: m.geom_contype.__setitem__(10, 1),
+    "yield of a joint without plasticity": lambda m: m.jnt_springyield.__setitem__(2, 0.1),
+    "delay without a history": lambda m: m.actuator_delay.__setitem__(0, 0.1),
+}
+# Written to a compiled model, these count after `mj_setConst`.
+_CURABLE: dict[str, Callable[[mujoco.MjModel], object]] = {
+    "surface velocity": lambda m: m.geom_surfacevel.__setitem__(0, 0.5),
+    "adhesion": lambda m: m.geom_adhesion.__setitem__(0, 0.5),
+    "adhesion of a pair": lambda m: m.pair_adhesion.__setitem__(0, 0.5),
+    "damping of an actuator": lambda m: m.actuator_damping.__setitem__(0, 0.5),
+    "armature of an actuator": lambda m: m.actuator_armature.__setitem__(0, 0.5),
+}
+
+
+@pytest.mark.parametrize("what", [*_UNSEEN, *_CURABLE])
+def test_values_without_effect_are_left_out(what: str) -> None:
+    """They change neither the numbers nor a simulated motion."""
+    nominal, written = everything(), everything()
+    (_UNSEEN | _CURABLE)[what](written)
+    assert moved_numbers(written) == moved_numbers(nominal)
+    moved: list[Any] = []
+    for model in (nominal, written):
+        data, random = mujoco.MjData(model), np.random.default_rng(0)
+        data.qvel[:], data.ctrl[:] = random.normal(size=model.nv), random.uniform(size=model.nu)
+        mujoco.mj_step(model, data, nstep=60)
+        moved.append(data.qpos)
+    np.testing.assert_array_equal(*moved)
+    if what in _CURABLE:
+        mujoco.mj_setConst(written, mujoco.MjData(written))
+        assert fingerprint(written) != fingerprint(nominal)
+
+
+@pytest.mark.parametrize(("density", "viscosity"), [(1.2, 0.0), (0.0, 0.1), (0.0, 0.0)])
+def test_wind_and_fluid_shapes_count_only_in_a_medium(density: float, viscosity: float) -> None:
+    for edit in (lambda m: m.opt.wind.fill(3.0), lambda m: m.geom_fluid[:, 3].fill(7.0)):
+        model = everything()
+        model.opt.wind[:] = 0.0
+        model.opt.density, model.opt.viscosity = density, viscosity
+        still = moved_numbers(model)
+        edit(model)
+        assert (moved_numbers(model) != still) == bool(density or viscosity)
+
+
+def test_empty_bodies_are_left_out() -> None:
+    """Bodies that hold only a camera are left out; parents of shapes stay."""
+    xml = (
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/>{}<body name='b'><freejoint/>"
+        "<geom size='.1'/>{}</body></worldbody></mujoco>"
+    )
+    mount = "<body name='mount'><camera/></body>"
+    shelf = "<body name='shelf'><body name='stone'><geom size='.1'/></body></body>"
+    plain, mounted, shelved = (
+        moved_numbers(mujoco.MjModel.from_xml_string(xml.format(*parts)))
+        for parts in (("", ""), ("", mount), (shelf, ""))
+    )
+    assert mounted == plain
+    assert list(shelved["bodies"]) == ["b", "shelf", "stone"]
+
+
+def test_sleep_and_disabled_actuators_are_marked() -> None:
+    model = everything()
+    assert "sleep policy" not in moved_numbers(model)["bodies"]["trunk"]
+    _set(model, "enableflags", mujoco.mjtEnableBit.mjENBL_SLEEP)
+    model.actuator("motor").group[:] = 3
+    model.opt.disableactuator = 1 << 3
+    numbers = moved_numbers(model)
+    assert "sleep policy" in numbers["bodies"]["trunk"]
+    assert numbers["options"]["simulation"]["switched on"] == ("sleep",)
+    actuators = numbers["actuators"]
+    assert [name for name in actuators if "switched off" in actuators[name]] == ["motor"]
+
+
+@pytest.mark.parametrize("array", ["flex_friction", "flex_vert", "geom_pos"])
+def test_flexes_and_all_that_they_can_touch_count(array: str) -> None:
+    model = _cloth()
+    nominal = moved_numbers(model)
+    assert any(fields["between"] == ("cloth",) for fields in nominal["equalities"].values())
+    getattr(model, array).fill(0.1)
+    assert moved_numbers(model) != nominal
+
+
+def test_plugins_are_included() -> None:
+    """The configuration of an engine plugin is part of the model."""
+    xml = (
+        "<mujoco><extension><plugin plugin='mujoco.pid'><instance name='pid'>"
+        "<config key='kp' value='{}'/></instance></plugin></extension>"
+        "<worldbody><body><joint name='j'/><geom size='.1'/></body></worldbody>"
+        "<actuator><plugin joint='j' plugin='mujoco.pid' instance='pid' actdim='0'/></actuator>"
+        "</mujoco>"
+    )
+    models = [mujoco.MjModel.from_xml_string(xml.format(kp)) for kp in ("1", "2")]
+    assert moved_numbers(models[0]) != moved_numbers(models[1])
+
+
+# --- Fingerprints -------------------------------------------------------------------------------
+
+
+def test_a_fingerprint_is_the_same_in_every_process() -> None:
+    """It is a short hexadecimal number, and does not depend on the hash seed of Python."""
+    script = (
+        f"import sys; sys.path[:] = {sys.path!r}\n"
+        "import mujoco\n"
+        "from shapechanger.morphology.certificate import fingerprint\n"
+        "print(fingerprint(mujoco.MjModel.from_xml_string(sys.stdin.read())))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", script], input=EVERYTHING, check=True, capture_output=True, text=True
+    )
+    assert run.stdout.strip() == fingerprint(everything())
+    assert re.fullmatch("[0-9a-f]{16}", fingerprint(everything()))
+
+
+def test_bodies_have_different_fingerprints() -> None:
+    names = ["ant", "hopper", "humanoid", "inverted_pendulum", "reacher", "swimmer", "walker2d_v5"]
+    assert len({fingerprint(asset(name)) for name in names}) == len(names)
+    assert all(fingerprint(asset(name)) == fingerprint(asset(name)) for name in names)
+
+
+_ROUNDED = ("body_", "geom_", "site_", "jnt_", "dof_", "qpos", "actuator_", "tendon_", "mesh_vert")
+
+
+@pytest.mark.parametrize("name", ["ant", "humanoid", "everything"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_bits_do_not_count(name: str, seed: int) -> None:
+    """Another processor rounds every number in its own way, and a computed zero is not zero."""
+    model = everything() if name == "everything" else asset(name)
+    nominal, random = fingerprint(model), np.random.default_rng(seed)
+    for array in (each for each in dir(model) if each.startswith(_ROUNDED)):
+        values = getattr(model, array)
+        if not isinstance(values, np.ndarray) or not values.size:
+            continue
+        if values.dtype == np.float32:  # Computed in double precision, so few are another number.
+            values.flat[random.integers(values.size)] *= 1.0 + np.finfo(np.float32).eps
+        elif values.dtype == np.float64:
+            noise = random.uniform(-4e-16, 4e-16, values.shape)
+            computed = array in ("body_pos", "body_ipos", "geom_pos", "site_pos", "jnt_axis")
+            values[:] = values * (1.0 + noise) + (0.1 * noise if computed else 0.0)
+    assert fingerprint(model) == nominal
+    model.body_mass[-1] *= 1.0 + 1e-6
+    assert fingerprint(model) != nominal
+
+
+_SHANK = "left_ankle_geom"
+# Edits of the ant, and whether they change how it moves.
+_EDITS: dict[str, tuple[bool, Callable[[mujoco.MjSpec], object]]] = {
+    "longer leg": (True, lambda s: setattr(s.geom(_SHANK), "fromto", [0, 0, 0, 0.5, 0.5, 0])),
+    "denser torso": (True, lambda s: setattr(s.geom("torso_geom"), "density", 9.0)),
+    "narrower joint": (True, lambda s: s.joint("hip_1").__setattr__("range", [-10, 10])),
+    "another motor": (
+        True,
+        lambda s: s.add_actuator(
+            name="more", target="hip_1", trntype=mujoco.mjtTrn.mjTRN_JOINT
+        ).set_to_motor(),
+    ),
+    "rougher foot": (True, lambda s: setattr(s.geom(_SHANK), "friction", [1.5, 0.5, 0.5])),
+    "feet that collide": (True, lambda s: setattr(s.geom(_SHANK), "conaffinity", 1)),
+    "camera": (False, lambda s: s.body("torso").add_camera(name="eye", pos=[0, 0, 3])),
+    "light": (False, lambda s: s.worldbody.add_light(name="sun", pos=[0, 0, 3])),
+    "site": (False, lambda s: s.body("torso").add_site(name="sticker")),
+    "drawn geom": (
+        False,
+        lambda s: s.worldbody.add_geom(name="dot", size=[1, 0, 0], contype=0, conaffinity=0),
+    ),
+    "sensor": (
+        False,
+        lambda s: s.add_sensor(
+            name="angle",
+            type=mujoco.mjtSensor.mjSENS_JOINTPOS,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            objname="hip_1",
+        ),
+    ),
+    "keyframe": (False, lambda s: s.add_key(name="start")),
+    "custom number": (False, lambda s: s.add_numeric(name="seven", data=[7.0])),
+    "friction below the floor's": (
+        False,
+        lambda s: setattr(s.geom(_SHANK), "friction", [0.2, 0.5, 0.5]),
+    ),
+    "torsional friction that nothing uses": (
+        False,
+        lambda s: setattr(s.geom(_SHANK), "friction", [1.0, 0.9, 0.5]),
+    ),
+    "harder contact than the time step allows": (
+        False,
+        lambda s: setattr(s.geom("floor"), "solref", [0.001, 1.0]),
+    ),
+}
+
+
+@pytest.mark.parametrize("edit", _EDITS)
+def test_edits_of_the_ant_change_its_fingerprint_and_looks_do_not(edit: str) -> None:
+    spec = asset_spec("ant")
+    moves, change = _EDITS[edit]
+    change(spec)
+    assert (fingerprint(spec.compile()) != fingerprint(asset("ant"))) == moves
+
+
+# --- Names --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "walker2d_v5"])
+def test_names_equal_those_of_name_elements(name: str) -> None:
+    spec = asset_spec(name)
+    name_elements(spec)
+    named = spec.compile()
+    assert names_of(named) == names_of(asset(name))
+    assert fingerprint(named) == fingerprint(asset(name))
+
+
+def test_names_that_repeat_are_numbered() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body name='a'>"
+        "<joint/><joint axis='1 0 0'/><geom size='1'/><geom size='2'/>"
+        "<geom name='a_geom_2' size='1'/><site/>"
+        "<body><geom size='1'/></body><body/></body></worldbody>"
+        "<equality><connect body1='a' anchor='0 0 0'/></equality></mujoco>"
+    )
+    names = names_of(model)
+    assert names["bodies"] == ["world", "a", "a_part", "a_part_2"]
+    assert names["joints"] == ["a_joint", "a_joint_2"]
+    assert names["geoms"] == ["a_geom", "a_geom_3", "a_geom_2", "a_part_geom"]
+    assert names["sites"] == ["a_site"]
+    assert names["equalities"] == ["equality"]
+
+
+# --- What is sensed -----------------------------------------------------------------------------
+
+_PLAIN = """<mujoco>
+  <asset><texture name="sky" type="skybox" builtin="flat" width="4" height="4"/></asset>
+  <worldbody><body name="leg"><joint name="knee"/>
+    <geom name="shin" size="0.1" rgba="1 0 0 1"/><site name="toe" pos="0 0 0.1"/>
+    <camera name="eye" pos="0 0 1"/><light pos="0 0 3"/></body></worldbody>
+  <sensor><jointpos name="angle" joint="knee" cutoff="1"/><force site="toe"/></sensor>
+  <keyframe><key name="home" qpos="0.5"/></keyframe>
+  <custom><numeric name="target" data="1 2"/></custom>
+</mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "drawn"),
+    [
+        ("0 0 0.1", "0 0 0.2", False),
+        ('cutoff="1"', 'cutoff="2"', False),
+        ('qpos="0.5"', 'qpos="0.6"', False),
+        ('data="1 2"', 'data="1 3"', False),
+        ('jointpos name="angle"', 'jointvel name="angle"', False),
+        ('0 0 1"/><light', '0 0 2"/><light', True),
+        ("1 0 0 1", "0 1 0 1", True),
+        ("0 0 3", "0 0 4", True),
+    ],
+)
+def test_each_change_counts_where_it_can_be_read(old: str, new: str, drawn: bool) -> None:
+    """Cameras, colours and lights count only where frames are observed."""
+    assert old in _PLAIN
+    one, two = (
+        mujoco.MjModel.from_xml_string(text) for text in (_PLAIN, _PLAIN.replace(old, new, 1))
+    )
+    for frames in (False, True):
+        models = sensed_numbers(one, drawn=frames), sensed_numbers(two, drawn=frames)
+        assert bool(differences(*models)) == (frames or not drawn)
+        assert not differences(models[0], sensed_numbers(one, drawn=frames))
