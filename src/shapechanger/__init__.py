@@ -15,7 +15,7 @@ The names below are the public interface; each is imported on first use and may 
   `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity`,
   `StartHeight`, `PlaceBody`, `PlaceGeom`, `TotalMass`, `AddMotor`, `AddFreeJoint` and `AddFloor`
   are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body to another,
-  `certify` proves what a shift changes.
+  `certify` proves what a shift changes. Subclass `morphology.Edit` for your own.
 - Envs: `from_mjcf` makes one of your own robot and task, `make_vec` many at once; `examine`
   runs the exam that every env passes.
 - Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,

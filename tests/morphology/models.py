@@ -78,22 +78,18 @@ GANTRY = """
 
 
 def spec_of(text: str) -> mujoco.MjSpec:
-    """Return the spec of an MJCF text."""
     return mujoco.MjSpec.from_string(text)
 
 
 def leg() -> mujoco.MjSpec:
-    """Return a new leg on a trunk."""
     return spec_of(LEG)
 
 
 def gantry() -> mujoco.MjSpec:
-    """Return a new body with several joints."""
     return spec_of(GANTRY)
 
 
 def uncoupled_gantry() -> mujoco.MjSpec:
-    """Return a new body with several joints that move independently."""
     spec = gantry()
     for equality in list(spec.equalities):
         spec.delete(equality)
@@ -101,12 +97,10 @@ def uncoupled_gantry() -> mujoco.MjSpec:
 
 
 def ant() -> mujoco.MjSpec:
-    """Return Gymnasium's ant, with all elements named."""
     return ANT.load(os.path.join(ASSETS, "ant.xml"))
 
 
 def pendulum() -> mujoco.MjSpec:
-    """Return Gymnasium's inverted pendulum, with all elements named."""
     return PENDULUM.load(os.path.join(ASSETS, "inverted_pendulum.xml"))
 
 
@@ -120,7 +114,6 @@ def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
 
 
 def built(spec: mujoco.MjSpec, *edits: Edit) -> mujoco.MjModel:
-    """Return the compiled model with some edits."""
     return compile_body(spec, edits)
 
 
@@ -138,7 +131,6 @@ def differing(a: mujoco.MjModel, b: mujoco.MjModel, ignoring: Iterable[str] = ()
 
 
 def mass(model: mujoco.MjModel, *bodies: str) -> float:
-    """Return the mass of some bodies, or of all, kg."""
     if not bodies:
         return float(model.body_mass.sum())
     return float(sum(model.body(name).mass[0] for name in bodies))

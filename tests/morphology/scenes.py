@@ -109,15 +109,12 @@ EVERYTHING = """
 
 
 def everything() -> mujoco.MjModel:
-    """Return a new model with nearly every kind of element."""
     return mujoco.MjModel.from_xml_string(EVERYTHING)
 
 
 def asset(name: str) -> mujoco.MjModel:
-    """Return one of Gymnasium's bodies, such as `ant`."""
     return mujoco.MjModel.from_xml_path(os.path.join(ASSETS, f"{name}.xml"))
 
 
 def asset_spec(name: str) -> mujoco.MjSpec:
-    """Return the spec of one of Gymnasium's bodies."""
     return mujoco.MjSpec.from_file(os.path.join(ASSETS, f"{name}.xml"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,17 +12,11 @@ from shapechanger.morphology import (
     AddLimb,
     AddSegment,
     Cut,
-    Damping,
-    Density,
-    Edit,
-    Friction,
-    Gear,
     Lock,
     Mass,
     Radius,
     Remove,
     Split,
-    Stiffness,
     Stretch,
     name_elements,
 )
@@ -37,29 +30,17 @@ _ELEMENTS = ("bodies", "joints", "geoms", "sites", "cameras", "actuators")
 
 
 def _named(model: str) -> mujoco.MjSpec:
-    """Return the spec with all elements named."""
     spec = asset_spec(model)
     name_elements(spec)
     return spec
 
 
 def _before(model: str) -> mujoco.MjModel:
-    """Return the compiled model with its total mass resolved."""
     return built(_named(model), Mass("*", scale=1.0))
 
 
 def _limbs(spec: mujoco.MjSpec) -> list[str]:
-    """Return the names of all bodies with a parent."""
     return [b.name for b in limbs_and_trunks(spec) if b.parent.parent is not None]
-
-
-def test_all_models_are_included() -> None:
-    """Gymnasium ships these models, some in two versions."""
-    assert {name.removesuffix("_v5") for name in _MODELS} == {
-        *("ant", "half_cheetah", "hopper", "humanoid", "humanoidstandup"),
-        *("inverted_double_pendulum", "inverted_pendulum", "point", "pusher", "reacher"),
-        *("swimmer", "walker2d"),
-    }
 
 
 @pytest.mark.parametrize("model", _MODELS)
@@ -75,20 +56,8 @@ def test_all_names_are_unique(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", _MODELS)
-@pytest.mark.parametrize("kind", [Mass, Density])
-def test_masses_and_inertias_scale(model: str, kind: Any) -> None:
-    """Mass and density scale masses and inertias, and nothing else."""
-    before, after = _before(model), built(_named(model), kind("*", scale=1.5))
-    np.testing.assert_allclose(after.body_mass, 1.5 * before.body_mass, rtol=1e-12)
-    np.testing.assert_allclose(after.body_inertia, 1.5 * before.body_inertia, rtol=1e-9)
-    for field in ("body_pos", "geom_size", "geom_friction", "jnt_range", "dof_armature"):
-        np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
-
-
-@pytest.mark.parametrize("model", _MODELS)
 @pytest.mark.parametrize("edit", [Stretch("*", 1.3), Radius("*", 0.8)])
 def test_densities_are_kept(model: str, edit: Stretch | Radius) -> None:
-    """Stretches and radii keep the density of every body."""
     densities = []
     for model_built in (_before(model), built(_named(model), edit)):
         volumes = _volumes(model_built, _weights(model))
@@ -100,7 +69,7 @@ def _weights(model: str) -> Array:
     """Return the density of each geom, in compiled order."""
     spec = _named(model)
     by_name = {
-        geom.name: geom.density if np.isnan(geom.mass) else geom.mass / volume(geom)
+        geom.name: geom.density if np.isnan(geom.mass) else geom.mass / volume(spec, geom)
         for geom in spec.geoms
     }
     compiled = _before(model)
@@ -124,7 +93,6 @@ def _volumes(model: mujoco.MjModel, weights: Array) -> Array:
 
 @pytest.mark.parametrize("model", _MODELS)
 def test_anchors_scale_with_a_stretch(model: str) -> None:
-    """The distance between anchors of child and parent scales by the factor."""
     before, after = _before(model), built(_named(model), Stretch("*", 1.3))
     for body in range(1, before.nbody):
         parent = int(before.body_parentid[body])
@@ -149,22 +117,6 @@ def _anchor(model: mujoco.MjModel, body: int) -> Array:
     joints = range(first, first + int(model.body_jntnum[body]))
     hinges = [j for j in joints if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE]
     return model.jnt_pos[hinges[0]] if hinges else np.zeros(3)
-
-
-@pytest.mark.parametrize("model", _MODELS)
-@pytest.mark.parametrize(
-    ("edit", "field", "factor"),
-    [
-        (Friction("*", scale=0.5), "geom_friction", [0.5, 1.0, 1.0]),
-        (Gear("*", scale=0.5), "actuator_gear", 0.5),
-        (Damping("*", scale=2.0), "dof_damping", 2.0),
-        (Stiffness("*", scale=2.0), "jnt_stiffness", 2.0),
-    ],
-)
-def test_values_scale(model: str, edit: Edit, field: str, factor: Any) -> None:
-    before, after = _before(model), built(_named(model), edit)
-    np.testing.assert_array_equal(getattr(after, field), getattr(before, field) * factor)
-    assert {*differing(before, after)} <= {field, "actuator_acc0", "actuator_moment0"}
 
 
 @pytest.mark.parametrize("model", _MODELS)

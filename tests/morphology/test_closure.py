@@ -135,7 +135,6 @@ def test_objects_stay_where_a_weld_holds_them() -> None:
 
 
 def test_inactive_equalities_close_nothing() -> None:
-    """A drawn pose stays as it is."""
     text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0").replace(
         "<joint joint1", '<joint active="false" joint1'
     )

@@ -56,7 +56,6 @@ def test_a_body_round_trips_through_json() -> None:
     ["", "{", "stretch", "[1,", b"\xff\xfe\x00", b"[\xc3\x28]", "[" * 100_000],
 )
 def test_invalid_json_is_refused(text: str | bytes) -> None:
-    """Malformed, non-UTF-8 and deeply nested input raises an error."""
     with pytest.raises(MorphologyError, match="A body must be a JSON list of edits: "):
         from_json(text)
 
@@ -65,14 +64,12 @@ def test_invalid_json_is_refused(text: str | bytes) -> None:
     "text", ["1", "null", '"stretch"', "[1]", "[[]]", "{}", '[{"kind":"stretch"}]', "[null]"]
 )
 def test_other_json_is_refused(text: str) -> None:
-    """An edit is an object with the key "edit"."""
     with pytest.raises(MorphologyError, match='An edit is an object with the key "edit", got '):
         from_json(text)
 
 
 @pytest.mark.parametrize("kind", ["strech", "", None, 3, ["stretch"]])
 def test_unknown_kinds_are_refused(kind: object) -> None:
-    """The error lists all kinds and suggests the nearest."""
     with pytest.raises(UnknownName, match=r"No edit matches .* There are: joint_range, lock, cut"):
         from_json(json.dumps([{"edit": kind, "body": "shin"}]))
     with pytest.raises(UnknownName, match=r"Did you mean 'stretch'\?"):
@@ -122,7 +119,6 @@ def test_infinite_numbers_are_refused(number: str) -> None:
 
 
 def test_as_body_accepts_several_forms() -> None:
-    """One edit, iterables of edits, and JSON are accepted."""
     edits = (Lock("hip"), JointRange("knee", lower=-1.0))
     assert as_body(edits) == as_body(list(edits)) == as_body(iter(edits)) == edits
     assert as_body(to_json(edits)) == edits
@@ -132,7 +128,6 @@ def test_as_body_accepts_several_forms() -> None:
 
 @pytest.mark.parametrize("value", [3, None, [3], ["stretch"], Stretch, [Stretch], [b"[]"]])
 def test_other_objects_are_refused(value: Any) -> None:
-    """The error shows a valid body."""
     with pytest.raises(
         MorphologyError, match=r"made of edits such as Stretch\('shank_\*', 1\.5\), "
     ):

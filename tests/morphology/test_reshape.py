@@ -58,7 +58,6 @@ _MISTAKES: list[tuple[Callable[[], mujoco.MjSpec], tuple[Edit, ...]]] = [
 
 @pytest.mark.parametrize(("load", "edit"), _CHANGES, ids=lambda x: type(x).__name__)
 def test_the_given_spec_is_unchanged(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
-    """Edits apply to a copy."""
     spec = load()
     text, before = spec.to_xml(), built(load())
     assert differing(before, built(spec, edit)) != []
@@ -80,7 +79,6 @@ def test_the_given_spec_is_unchanged_after_an_error(
 
 
 def test_edits_are_applied_in_order() -> None:
-    """An edit sees the results of earlier ones."""
     spec = reshape(leg(), [Split("thigh", "half"), Stretch("half", 2.0)])
     assert spec.geom("thigh_of_half") is not None
     with pytest.raises(UnknownName, match="No body matches 'half'"):

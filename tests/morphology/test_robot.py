@@ -65,6 +65,7 @@ def _robot(model: mujoco.MjModel) -> list[str]:
         '<actuator><motor site="tip"/></actuator>',
         '<actuator><motor cranksite="crank" slidersite="tip" cranklength=".1"/></actuator>',
         '<actuator><adhesion body="arm" ctrlrange="0 1"/></actuator>',
+        '<actuator><orientation site="tip" refsite="crank" kp="1"/></actuator>',
     ],
 )
 def test_the_robot_is_what_actuators_move(more: str) -> None:
@@ -98,7 +99,6 @@ def test_what_an_equality_couples_to_the_robot_is_part_of_it(
 
 
 def test_a_flex_couples_no_bodies() -> None:
-    """Equalities of other kinds name no bodies."""
     cloth = (
         '<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2" '
         'radius=".01" pos="0 3 1"><edge equality="true"/></flexcomp></worldbody>'
@@ -191,7 +191,6 @@ def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
 
 
 def test_a_single_tree_is_the_robot() -> None:
-    """All its numbers are the robot's."""
     model = asset("ant")
     assert StartRules(model).robot_places.all()
 

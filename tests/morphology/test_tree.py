@@ -118,7 +118,6 @@ def test_a_body_on_the_world() -> None:
 
 
 def test_without_a_floor() -> None:
-    """Friction is 1 where the world has no geom."""
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
     )

@@ -12,7 +12,6 @@ from shapechanger.errors import MissingExtra
 
 
 def test_the_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Importing the package raises MissingExtra."""
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtra, match=r"pip install 'shapechanger\[sim\]'"):
         importlib.reload(shapechanger.morphology)

@@ -20,7 +20,7 @@ from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError,
 from shapechanger.morphology.edits import EDITS, Edit
 from shapechanger.morphology.edits.edit import part_of_the_way
 from shapechanger.morphology.spec.carried import Carried
-from shapechanger.morphology.spec.explicit import make_explicit, write_out_orientations
+from shapechanger.morphology.spec.explicit import make_explicit
 
 Body = tuple[Edit, ...]
 """The edits, in order, that make a body from the model of its family."""
@@ -169,7 +169,6 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
     for edit in effective:
         edit.require_effect(result)
         edit.apply(result)
-        write_out_orientations(result)  # An edit of the user's may turn an element by other means.
         edit.follow_in_keyframes(result, carried.keyframes)
     carried.put_back(result)
     return result

@@ -21,7 +21,6 @@ from tests.morphology.swing import Noisy, Swing, Wrapper
 
 
 def test_a_longer_arm_is_certified() -> None:
-    """The certificate lists differences of the models and of the rollout."""
     certificate = certify(Swing(standing_height=0.5), Swing(length=0.8, standing_height=0.8))
     assert not certificate.is_empty
     assert not certificate.same_model
@@ -34,13 +33,11 @@ def test_a_longer_arm_is_certified() -> None:
 
 
 def test_an_empty_shift_is_refused() -> None:
-    """Envs that behave alike raise EmptyShift."""
     with pytest.raises(EmptyShift, match="behave alike: both models have the fingerprint"):
         certify(Swing(), Swing())
 
 
 def test_an_env_without_a_model_is_refused() -> None:
-    """The error names the env."""
     with pytest.raises(MorphologyError, match="CartPole-v1 has no model to compare"):
         certify(gymnasium.make("CartPole-v1"), Swing())
 
@@ -54,7 +51,6 @@ def test_an_empty_shift_can_be_allowed() -> None:
 
 
 def test_noise_alone_is_a_shift() -> None:
-    """The certificate states that the models are equal and only observations differ."""
     certificate = certify(Swing(), Noisy(Swing()), labels=("quiet", "noisy"))
     assert certificate.same_model
     assert not certificate.is_empty
@@ -73,7 +69,6 @@ def test_a_difference_beyond_the_rollout_is_stated() -> None:
 
 
 def test_inconsistent_models_are_reported() -> None:
-    """A mass written into a compiled model, without inertia and constants, is reported."""
     target = Swing()
     target.model.body_mass[1] = 5.0
     certificate = certify(Swing(), target, steps=5, labels=("light", "heavy"))
@@ -85,7 +80,6 @@ def test_inconsistent_models_are_reported() -> None:
 
 
 def test_a_certificate_round_trips_through_json() -> None:
-    """Reading a written certificate gives an equal one."""
     certificate = certify(Swing(), Swing(wrist=True, gear=3.0))
     assert Certificate.from_json(certificate.to_json()) == certificate
     assert Certificate.from_json(certificate.to_json().encode()) == certificate
@@ -93,7 +87,6 @@ def test_a_certificate_round_trips_through_json() -> None:
 
 @pytest.mark.parametrize("text", ["{}", "no", '{"source": 1}'])
 def test_invalid_json_is_refused(text: str) -> None:
-    """The error states the reason."""
     with pytest.raises(MorphologyError, match="This is not a certificate: "):
         Certificate.from_json(text)
 
@@ -134,7 +127,6 @@ def test_gymnasium_environments_and_wrappers_are_certified(tmp_path: Path) -> No
 
 
 def test_registered_ids_are_the_labels() -> None:
-    """Envs made with `gymnasium.make` are labelled with their ids."""
     with gymnasium.make("InvertedPendulum-v5") as env:
         inner: Any = env.unwrapped
         inner.observation_layout = Layout(tuple(Feature(f"o{i}", "1") for i in range(4)))
@@ -166,7 +158,6 @@ def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
 
 
 def test_a_small_change_is_a_shift() -> None:
-    """A relative change of mass of 1e-6 is a shift."""
     target = gymnasium.make("shapechanger/HalfCheetah-v1", body=Mass("torso", scale=1.000001))
     certificate = certify(gymnasium.make("shapechanger/HalfCheetah-v1"), target)
     assert "mass" in {change.quantity for change in certificate.changes}

@@ -46,7 +46,6 @@ def _extend(spec: mujoco.MjSpec) -> None:
 
 
 def _of(changes: tuple[Change, ...], quantity: str, element: str) -> Change:
-    """Return the only change of a quantity of an element."""
     (item,) = [c for c in changes if (c.quantity, c.element) == (quantity, element)]
     return item
 
@@ -207,7 +206,6 @@ def test_standing_heights_are_compared_if_both_are_given() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_every_difference_is_listed(seed: int) -> None:
-    """Changes are listed if and only if the effective models differ."""
     random, target = np.random.default_rng(seed), everything()
     prefixes = ("body_", "jnt_", "dof_", "geom_", "tendon_", "actuator_", "eq_", "opt")
     arrays = [

@@ -28,7 +28,6 @@ def test_a_mass_written_into_a_compiled_model_is_found() -> None:
 
 
 def test_set_const_updates_constants_but_not_inertia() -> None:
-    """A changed mass with an old inertia is found only by comparison with the source."""
     model = asset("ant")
     model.body("torso").mass[:] = 3.0
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -78,7 +77,6 @@ _IGNORED: dict[str, tuple[Callable[[mujoco.MjModel], object], str]] = {
 
 @pytest.mark.parametrize("what", _IGNORED)
 def test_writes_without_effect_are_found(what: str) -> None:
-    """Writes that a compiled model ignores, or that make constants stale, are found."""
     edit, message = _IGNORED[what]
     model = mujoco.MjModel.from_xml_string(EVERYTHING.replace('gravcomp=".1"', ""))
     assert inconsistencies(model) == ()
@@ -87,7 +85,6 @@ def test_writes_without_effect_are_found(what: str) -> None:
 
 
 def test_bits_that_were_not_compiled_are_found() -> None:
-    """Enabling collisions of a geom after compilation is found."""
     model = everything()
     model.geom("wheel").contype[:] = 1
     (message,) = inconsistencies(model)

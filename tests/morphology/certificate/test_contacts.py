@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from shapechanger.morphology.certificate.numbers import moved_numbers
-from tests.morphology.scenes import asset, asset_spec
 
 _Contact = dict[str, tuple[float | str, ...]]
 _SHAPES = {
@@ -62,7 +61,6 @@ def _simulated(model: mujoco.MjModel) -> dict[str, list[mujoco.MjContact]]:
 
 
 def _contacts(model: mujoco.MjModel) -> dict[str, _Contact]:
-    """Return the effective contacts of a model."""
     return {
         name: {field.removeprefix("contact "): values for field, values in fields.items()}
         for name, fields in moved_numbers(model)["contacts"].items()
@@ -70,12 +68,10 @@ def _contacts(model: mujoco.MjModel) -> dict[str, _Contact]:
 
 
 def _acting(contact: _Contact) -> list[float]:
-    """Return the friction coefficients that act."""
     return [float(value) for value in contact["friction"] if value]
 
 
 def _assert_equal(ours: _Contact, theirs: mujoco.MjContact) -> None:
-    """Assert that an effective contact has the parameters of the simulated one."""
     assert ours["dimension"] == (theirs.dim,)
     counts = {1: 0, 3: 2, 4: 3, 6: 5}
     np.testing.assert_array_equal(_acting(ours), theirs.friction[: counts[theirs.dim]])
@@ -112,7 +108,6 @@ def _random_geom(random: np.random.Generator, name: str) -> str:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_scenes_have_the_predicted_contacts(seed: int) -> None:
-    """Dimension, friction, softness and margin are as predicted for random geoms."""
     random = np.random.default_rng(seed)
     bodies = "".join(
         f"<body pos='0 0 .05'><freejoint/>{_random_geom(random, f'g{i}')}</body>" for i in range(6)
@@ -159,46 +154,7 @@ def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
     assert set(_contacts(model)) == moving
 
 
-def test_contact_friction_is_the_larger_one() -> None:
-    """Lowering the feet's friction below the floor's has no effect; raising it has."""
-    nominal = _contacts(asset("ant"))
-    spec = asset_spec("ant")
-    for geom in spec.geoms:
-        if "ankle" in geom.name:
-            geom.friction = [0.1, 0.5, 0.5]
-    assert _contacts(spec.compile()) == nominal
-    for geom in spec.geoms:
-        if "ankle" in geom.name:
-            geom.friction = [1.5, 0.5, 0.5]
-    rough = _contacts(spec.compile())
-    changed = {name for name in nominal if rough[name] != nominal[name]}
-    assert len(changed) == 4
-    assert [_acting(rough[name]) for name in sorted(changed)] == [[1.5, 1.5]] * 4
-
-
-@pytest.mark.parametrize(("condim", "acting"), [(1, 0), (3, 1), (4, 2), (6, 3)])
-def test_only_the_friction_that_the_dimension_uses_counts(condim: int, acting: int) -> None:
-    """Each contact dimension uses one more of sliding, torsional and rolling friction."""
-    nominal = _contacts(_scene(ball=f"condim='{condim}'", floor="condim='1'"))
-    for i in range(3):
-        friction = [1.0, 0.005, 0.0001]
-        friction[i] = 2.0
-        written = " ".join(map(str, friction))
-        changed = _scene(ball=f"condim='{condim}' friction='{written}'", floor="condim='1'")
-        assert (_contacts(changed) != nominal) == (i < acting)
-
-
-def test_margins_and_gaps_add_up() -> None:
-    """MuJoCo 4 sums both for all priorities; earlier versions used the larger one."""
-    model = _scene(floor="margin='.02' gap='.1'", ball="margin='.03' gap='.2' priority='1'")
-    contact = _contacts(model)["ball + floor"]
-    assert contact["margin"] == pytest.approx((0.05,))
-    assert contact["gap"] == pytest.approx((0.3,))
-    _assert_equal(contact, _simulated(model)["ball + floor"][0])
-
-
 def test_contacts_are_found_within_margin_and_gap() -> None:
-    """A contact exists up to margin plus gap away."""
     for distance, found in ((0.049, True), (0.051, False)):
         model = _scene(floor="gap='.02'", ball="gap='.01' margin='.02'")
         model.qpos0[2] = 0.1 + distance
@@ -255,7 +211,6 @@ def test_own_softness_of_friction_counts_only_in_elliptic_cones() -> None:
 
 
 def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
-    """Each explicit pair gives a contact, as in MuJoCo."""
     pair = "<pair geom1='floor' geom2='ball'/><pair geom1='ball' geom2='floor' condim='1'/>"
     model = _scene(contact=pair)
     predicted = _contacts(model)

@@ -46,7 +46,6 @@ def test_the_first_difference_is_reported() -> None:
 
 
 def test_the_largest_difference_is_correct() -> None:
-    """Step, feature and value equal those of separate rollouts."""
     source, target = Swing(), Swing(length=0.8)
     rollout = compare_rollouts(source, target, steps=25, seed=3)
     observations = []
@@ -78,7 +77,6 @@ def test_motors_of_the_same_name_get_the_same_commands() -> None:
 
 
 def test_features_of_one_side_are_listed() -> None:
-    """Features of the same name are compared, others are listed."""
     rollout = compare_rollouts(Swing(), Swing(wrist=True), steps=5)
     assert rollout.compared == 2
     assert rollout.only_in_target == ("wrist/angle", "wrist/velocity")
@@ -98,7 +96,6 @@ def test_the_shorter_episode_ends_the_comparison() -> None:
 
 
 def test_another_reward_is_a_difference() -> None:
-    """Equal observations with different rewards are not identical."""
     rollout = compare_rollouts(Swing(), Swing(bonus=1.0), steps=5)
     assert rollout.first_step is None
     assert rollout.reward_difference == pytest.approx(1.0)
@@ -106,7 +103,6 @@ def test_another_reward_is_a_difference() -> None:
 
 
 def test_wrappers_are_included() -> None:
-    """Observations of the outermost wrapper are compared."""
     rollout = compare_rollouts(Swing(), Noisy(Swing()), steps=5)
     assert rollout.first_step == 0
     assert "part at the reset" in str(rollout)
@@ -156,7 +152,6 @@ def test_attributes_are_found_inside_wrappers() -> None:
     ],
 )
 def test_commands_stay_in_range(low: float, high: float, expected: tuple[float, float]) -> None:
-    """Commands cover finite ranges and stay within infinite ones."""
     layout = Layout((Feature("motor", "1", low, high),))
     commands, _ = matched_commands(layout, layout, 1000, 0)
     assert expected[0] <= commands.min() < expected[0] + 0.05 * (expected[1] - expected[0])
@@ -177,7 +172,6 @@ def test_commands_are_in_both_ranges() -> None:
 
 
 def test_a_motor_that_cannot_rest_gets_the_nearest_to_zero() -> None:
-    """Where 0 is out of range, the nearest value is used."""
     extra = Layout((Feature("only", "1", 0.2, 1.0),))
     _, commands = matched_commands(Layout(()), extra, 3, 0)
     np.testing.assert_array_equal(commands, np.full((3, 1), 0.2, np.float32))

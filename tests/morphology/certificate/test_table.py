@@ -186,7 +186,6 @@ def test_the_mix_counts_where_there_is_something_to_mix() -> None:
 
 
 def test_values_are_found_by_name() -> None:
-    """Values have the keys section, element and field."""
     effective = moved_numbers(everything())
     assert effective["bodies"]["hand"]["parent"] == ("arm",)
     assert effective["joints"]["wrist"]["joint range"] == (-1.0, 1.0)
@@ -329,7 +328,6 @@ def test_flexes_and_all_that_they_can_touch_count(array: str) -> None:
 
 
 def test_plugins_are_included() -> None:
-    """The configuration of an engine plugin is part of the model."""
     xml = (
         "<mujoco><extension><plugin plugin='mujoco.pid'><instance name='pid'>"
         "<config key='kp' value='{}'/></instance></plugin></extension>"

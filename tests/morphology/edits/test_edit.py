@@ -28,12 +28,10 @@ def test_edits_are_values() -> None:
 
 
 def test_amounts_multiply() -> None:
-    """Half of half an edit has the amount 0.25."""
     assert Mass("*", scale=2.0).partly(0.5).partly(0.5) == Mass("*", scale=2.0, amount=0.25)
 
 
 def test_the_base_class_is_abstract() -> None:
-    """`Edit.apply` raises NotImplementedError."""
     with pytest.raises(NotImplementedError):
         Edit().apply(leg())
 
@@ -45,7 +43,6 @@ def test_interpolation_ends_exactly() -> None:
 
 
 def test_numpy_numbers_are_values() -> None:
-    """NumPy scalars and arrays become floats and tuples."""
     stretch = Stretch("thigh", np.linspace(0.5, 2.0, 2)[0])
     assert stretch == Stretch("thigh", 0.5)
     assert to_json([stretch]) == to_json([Stretch("thigh", 0.5)])

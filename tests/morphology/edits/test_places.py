@@ -83,7 +83,6 @@ def test_a_floor_can_be_moved() -> None:
 
 
 def test_a_written_mass_keeps_its_density() -> None:
-    """A mass written out is scaled with the volume."""
     model = limb('<geom name="rod" type="cylinder" size=".1" fromto="0 0 0 0 0 .4" mass="2"/>')
     after = built(model, PlaceGeom("rod", (0.0, 0.0, 0.0), (0.0, 0.0, 0.8), radius=0.2))
     assert after.body("link").mass == pytest.approx(16.0)

@@ -37,7 +37,6 @@ URDF = """
 
 
 def urdf() -> mujoco.MjSpec:
-    """Return the arm."""
     return spec_of(URDF)
 
 

@@ -11,10 +11,8 @@ from shapechanger.morphology.spec.elements import (
     require_free_name,
     require_limb,
     select,
-    subtree,
 )
 from tests.morphology.models import ant, differing, leg, spec_of
-from tests.morphology.scenes import asset_spec
 
 _NAMELESS = """
 <mujoco>
@@ -36,7 +34,6 @@ _NAMELESS = """
 
 
 def test_a_name_is_preferred_to_a_pattern() -> None:
-    """A name that is also a glob selects the element of that name."""
     spec = spec_of(
         "<mujoco><worldbody><body name='a*'><geom size='.1'/></body>"
         "<body name='ab'><geom size='.1'/></body></worldbody></mujoco>"
@@ -51,13 +48,6 @@ def test_globs_select_in_model_order() -> None:
     assert [body.name for body in found] == ["shank_1", "shank_4"]
     with pytest.raises(UnknownName, match=r"No body matches 'Shank_1'\. Did you mean 'shank_1'"):
         select("body", "Shank_1", limbs_and_trunks(ant()))
-
-
-def test_the_world_cannot_be_selected() -> None:
-    """The world is neither a limb nor a trunk."""
-    assert [body.name for body in limbs_and_trunks(leg())] == ["trunk", "thigh", "shin"]
-    with pytest.raises(UnknownName, match="There are: trunk, thigh, shin"):
-        select("body", "world", limbs_and_trunks(leg()))
 
 
 def test_trunks_are_no_limbs() -> None:
@@ -75,19 +65,8 @@ def test_trunks_are_no_limbs() -> None:
     [("body", "thigh"), ("joint", "hip"), ("geom", "floor"), ("actuator", "knee"), ("body", "")],
 )
 def test_new_names_must_be_unused(kind: str, name: str) -> None:
-    """Used and empty names are refused."""
     with pytest.raises(MorphologyError, match=f"A new {kind} needs an unused name, got '{name}'"):
         require_free_name(leg(), kind, name)
-
-
-def test_names_are_unique_per_kind() -> None:
-    """A joint may have the name of a body."""
-    require_free_name(leg(), "joint", "thigh")
-
-
-def test_a_subtree_begins_with_its_body() -> None:
-    """Parents come before children."""
-    assert [body.name for body in subtree(leg().body("trunk"))] == ["trunk", "thigh", "shin"]
 
 
 def test_all_elements_get_unique_names() -> None:
@@ -118,11 +97,3 @@ def test_names_change_no_physics() -> None:
     assert differing(before, spec.copy().compile()) == []
     name_elements(spec)
     assert [geom.name for geom in spec.geoms] == names
-
-
-def test_the_ant_has_the_names_that_its_family_gives() -> None:
-    """The family names the shanks, which Gymnasium's file does not."""
-    shanks = [body.name for body in ant().bodies if body.name.startswith("shank")]
-    assert shanks == ["shank_1", "shank_2", "shank_3", "shank_4"]
-    unnamed = asset_spec("ant")
-    assert sum(not body.name for body in unnamed.bodies) == 4

@@ -122,7 +122,6 @@ def test_a_total_mass_does_not_undo_an_edit() -> None:
 
 
 def test_a_total_mass_scales_explicit_inertias() -> None:
-    """Explicit masses and inertias are scaled like those of geoms."""
     spec = spec_of(
         """<mujoco><compiler settotalmass="10"/><worldbody>
         <body name="a"><freejoint/><geom type="capsule" size=".1 .2" mass="1"/>

@@ -71,7 +71,6 @@ def test_a_tendon_with_effect_prevents_the_lock(tendon: str, rest: str) -> None:
 
 
 def test_tendons_over_sites_do_not_tie_joints() -> None:
-    """Spatial tendons do not prevent a lock."""
     rest = '<actuator><motor tendon="rope"/></actuator><sensor><tendonpos tendon="rope"/></sensor>'
     model = built(spec_of(_TIED.format(tendon="", rest=rest)), Lock("b", 0.1))
     assert (model.ntendon, model.nu, model.nsensor) == (1, 1, 1)

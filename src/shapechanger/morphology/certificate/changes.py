@@ -264,12 +264,10 @@ def _section(
             if not _equal(old.get(quantity), new.get(quantity), scales[quantity]):
                 field = table.get(quantity, Field(quantity, ""))
                 found.append(_difference(field, element, old, new))
-    orders = [
-        [name for name in names if name in other]
-        for names, other in ((before, after), (after, before))
-    ]
-    if orders[0] != orders[1]:
-        found.append(change("order", section, *orders))
+    old_order = [name for name in before if name in after]
+    new_order = [name for name in after if name in before]
+    if old_order != new_order:
+        found.append(change("order", section, old_order, new_order))
     return found
 
 

@@ -349,7 +349,7 @@ def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
         springy = getattr(m, f"{of}_stiffness") != 0.0
         found[f"{of}_springy"] = springy | getattr(m, f"{of}_stiffnesspoly").any(axis=1)
         found[f"{of}_yields"] = found[f"{of}_springy"] & (getattr(m, f"{of}_plasticadr") >= 0)
-    return found | _kinds(m)
+    return found | kinds_of(m)
 
 
 def _switches(m: mujoco.MjModel, enumeration: Any, bits: int) -> NDArray[np.str_]:
@@ -362,8 +362,12 @@ def _switches(m: mujoco.MjModel, enumeration: Any, bits: int) -> NDArray[np.str_
     )
 
 
-def _kinds(m: mujoco.MjModel) -> dict[str, list[str]]:
-    """Return the kinds of the elements that indices of several kinds are of; "" for none."""
+def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
+    """Return the kinds of the elements that indices of several kinds are of; "" for none.
+
+    Args:
+        m: The model.
+    """
     targets = {_T.mjTRN_TENDON: "tendons", _T.mjTRN_SITE: "sites", _T.mjTRN_SLIDERCRANK: "sites"}
     targets |= {_T.mjTRN_BODY: "bodies"}
     passed = {_W.mjWRAP_JOINT: "joints", _W.mjWRAP_SITE: "sites", _W.mjWRAP_PULLEY: ""}

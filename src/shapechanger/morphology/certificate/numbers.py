@@ -33,6 +33,7 @@ from shapechanger.morphology.certificate.fields import (
     Kind,
     Numbers,
     Values,
+    kinds_of,
     made_arrays,
 )
 from shapechanger.morphology.spec.elements import unique_namer
@@ -136,7 +137,8 @@ def _bits_match(types: NDArray[Any], affinities: NDArray[Any]) -> NDArray[np.boo
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
     """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
     flat = np.isin(model.geom_type[pairs], _FLAT).all(axis=1)
-    return ~flat & (model.body_treeid[model.geom_bodyid[pairs]] >= 0).any(axis=1)
+    moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
+    return np.logical_and(~flat, np.any(moving, axis=1))
 
 
 def geoms_of_pairs(model: mujoco.MjModel, explicit: _Ints) -> _Ints:
@@ -337,7 +339,7 @@ class _Reader:
             return np.array([field.of(v).name.partition("_")[2].lower() for v in values.tolist()])
         if field.of is not None:
             pairs = zip(self._kinds(field, values), values.tolist(), strict=True)
-            words = [
+            words: list[str] = [
                 (self.names[kind][i] if kind else str(i)) if i >= 0 else "" for kind, i in pairs
             ]
             return np.array(words, np.str_)
@@ -352,7 +354,7 @@ class _Reader:
 
     def _kinds(self, field: Field, values: Any) -> list[str]:
         """Return the kind of element that each index of an array is of."""
-        return [field.of] * len(values) if field.of in NAMED else self._made[field.of]
+        return [field.of] * len(values) if field.of in NAMED else list(self._made[field.of])
 
     def _shape(self, geom: int) -> str:
         """Return a digest of the mesh or height field that shapes a geom; empty without one."""
@@ -429,7 +431,7 @@ def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
     for kind in ("tendons", "equalities", "flexes", "sensors", "keyframes", "custom"):
         title = (MOVED | SENSED)[kind].title.partition(" ")[0]
         _fill(names[kind], lambda _, title=title: title)
-    targets = made_arrays(model)["actuator_target_kinds"]
+    targets = kinds_of(model)["actuator_target_kinds"]
     ends = list(zip(targets, model.actuator_trnid[:, 0].tolist(), strict=True))
     _fill(names["actuators"], lambda i: names[ends[i][0]][ends[i][1]])
     return names

@@ -18,7 +18,7 @@ from msgspec.structs import force_setattr
 from shapechanger.errors import MorphologyError
 
 if TYPE_CHECKING:
-    from shapechanger.morphology.spec.keyframes import Keyframes
+    from shapechanger.morphology.spec.carried import Keyframes
 
 Vector = tuple[float, float, float]
 _N = TypeVar("_N", float, np.ndarray)

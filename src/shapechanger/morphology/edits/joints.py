@@ -98,7 +98,7 @@ class Lock(Edit, frozen=True):
                 joint.name: positions[joint.name] - reference_of(joint) for joint in joints
             }
             for joint in joints:
-                displace(joint, displacements[joint.name])
+                displace(spec, joint, displacements[joint.name])
                 remove_joint(spec, joint, displacements)
             return
         for joint in joints:

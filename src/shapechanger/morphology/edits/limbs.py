@@ -57,7 +57,7 @@ from shapechanger.morphology.spec.references import (
 from shapechanger.morphology.spec.strength import add_motor
 
 if TYPE_CHECKING:
-    from shapechanger.morphology.spec.keyframes import Keyframes
+    from shapechanger.morphology.spec.carried import Keyframes
 
 # MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
 # share of its full size, which is a millionth of its mass.
@@ -94,7 +94,7 @@ class Cut(Edit, frozen=True):
                 continue  # It was part of a limb that has been cut off.
             require_limb(body, "cut")
             require_geometry(spec, body)
-            plane = Plane(body, self.keep)
+            plane = Plane(spec, body, self.keep)
             if self.keep < 1.0:
                 release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, name)})
                 self._cut_geoms(spec, body, plane)
@@ -118,10 +118,10 @@ class Cut(Edit, frozen=True):
                     spec.delete(geom)
                 else:
                     part = max(1.0 - self.amount, _SMALLEST_PART)
-                    resize_geom(geom, place_of(geom), part)
+                    resize_geom(spec, geom, place_of(geom), part)
             elif piece.share < 1.0:
                 share = part_of_the_way(1.0, piece.share, self.amount)
-                shorten(geom, piece.near, share, piece.axis)
+                shorten(spec, geom, piece.near, share, piece.axis)
 
     def _cut_point(self, spec: mujoco.MjSpec, plane: Plane, point: Point) -> None:
         """Pull a point at the far end to the new end, and remove any other one."""
@@ -136,7 +136,7 @@ class Cut(Edit, frozen=True):
         """Remove a limb beyond the cut; at an amount below 1, pull it in and make it smaller."""
         if self.amount < 1.0:
             share = part_of_the_way(1.0, self.keep, self.amount)
-            there = held_at(child)
+            there = held_at(spec, child)
             child.pos = child.pos + (stretched(there, anchor(body), share) - there)
         _take_away(spec, child, self.amount)
 
@@ -196,7 +196,7 @@ class Split(Edit, frozen=True):
         (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
         require_limb(body, "split")
         require_geometry(spec, body)
-        plane = Plane(body, self.at)
+        plane = Plane(spec, body, self.at)
         pieces = {geom.name: plane.piece_of(geom) for geom in body.geoms}
         cut = [name for name, piece in pieces.items() if 0.0 < piece.share < 1.0]
         require_divisible(spec, body, cut)
@@ -229,18 +229,18 @@ class Split(Edit, frozen=True):
         place: np.ndarray,
     ) -> None:
         """Divide a geom between both parts."""
-        whole = volume(geom)
+        whole = volume(spec, geom)
         copy = copy_geom(spec, geom, part, self._far_half(geom.name))
         # About its near end, which then goes to where the geom is cut.
         move_by(copy, -piece.near)
-        shorten(copy, np.zeros(3), 1.0 - piece.share, piece.axis)
+        shorten(spec, copy, np.zeros(3), 1.0 - piece.share, piece.axis)
         end = piece.near + 2.0 * (place_of(geom) - piece.near)
         offset = piece.near + piece.share * (end - piece.near) - place
         if float(np.linalg.norm(offset)) > _ON_THE_AXIS_M:
             move_by(copy, offset)
-        shorten(geom, piece.near, piece.share, piece.axis)
+        shorten(spec, geom, piece.near, piece.share, piece.axis)
         # The rounded ends at the split overlap. Their mass grows with the amount of the split.
-        volumes = [volume(half) for half in (geom, copy)]
+        volumes = [volume(spec, half) for half in (geom, copy)]
         rounded_end = 0.5 * (sum(volumes) - whole)
         for half, own in zip((geom, copy), volumes, strict=True):
             without = 1.0 - rounded_end / own
@@ -284,13 +284,13 @@ class AddSegment(Edit, frozen=True):
         """Add the segment."""
         (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
         require_geometry(spec, body)
-        place = far_end(body)
+        place = far_end(spec, body)
         model_geom = _long_geom(body)
         part = _new_segment(spec, body, self.name, place)
         geom = copy_geom(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         if not math.isnan(geom.mass):
-            geom.density, geom.mass = geom.mass / volume(model_geom), math.nan
+            geom.density, geom.mass = geom.mass / volume(spec, model_geom), math.nan
         # MuJoCo takes either both ends or a pose.
         geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
         geom.fromto = [0.0, 0.0, 0.0, *self.end]

@@ -29,7 +29,7 @@ from shapechanger.morphology.spec.geometry import (
 from shapechanger.morphology.spec.references import release_drawings
 
 if TYPE_CHECKING:
-    from shapechanger.morphology.spec.keyframes import Keyframes
+    from shapechanger.morphology.spec.carried import Keyframes
 
 # A robot of a million kilograms is a typing mistake.
 _LARGEST_MASS_KG = 1e6
@@ -109,20 +109,22 @@ class PlaceGeom(Edit, frozen=True):
             if geom.parent.parent is not None:
                 require_geometry(spec, geom.parent)
                 release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, geom.parent.name)})
-            before = volume(geom)
+            before = volume(spec, geom)
             if self.start is not None and self.end is not None:
-                self._place_ends(geom, np.array(self.start, float), np.array(self.end, float))
+                self._place_ends(spec, geom, np.array(self.start, float), np.array(self.end, float))
             if self.middle is not None:
                 place = place_of(geom)
                 to = np.array(self.middle, float)
                 move_by(geom, part_of_the_way(place, to, self.amount) - place)
             if self.radius is not None:
                 self._set_radius(geom, self.radius)
-            keep_density(geom, before)
+            keep_density(spec, geom, before)
 
-    def _place_ends(self, geom: mujoco.MjsGeom, start: np.ndarray, end: np.ndarray) -> None:
+    def _place_ends(
+        self, spec: mujoco.MjSpec, geom: mujoco.MjsGeom, start: np.ndarray, end: np.ndarray
+    ) -> None:
         """Set both ends of the axis."""
-        old = axis_ends(geom)
+        old = axis_ends(spec, geom)
         if old is None:
             raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
         # Which end of an axis comes first means nothing: each goes to the nearer one.
@@ -132,6 +134,7 @@ class PlaceGeom(Edit, frozen=True):
         geom.size = [geom.size[0], 0.0, 0.0]
         # MuJoCo takes either both ends or a pose.
         geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
+        geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         geom.fromto = np.concatenate(ends)
 
     def _set_radius(self, geom: mujoco.MjsGeom, radius: float) -> None:

@@ -35,7 +35,7 @@ from shapechanger.morphology.spec.references import release_drawings
 from shapechanger.morphology.spec.strength import is_motor, scale_clamps, scale_strength
 
 if TYPE_CHECKING:
-    from shapechanger.morphology.spec.keyframes import Keyframes
+    from shapechanger.morphology.spec.carried import Keyframes
 
 _D: Final = mujoco.mjtDisableBit
 _J: Final = mujoco.mjtJoint
@@ -346,7 +346,7 @@ class StartHeight(Edit, frozen=True):
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
         """Raise or lower the trunks in every keyframe too, because robots start in one."""
         for joint in (joint for body in self._trunks(spec) for joint in body.joints):
-            axis = rotation(orientation(joint.parent)) @ joint.axis
+            axis = rotation(orientation(spec, joint.parent)) @ joint.axis
             vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
             if joint.type == _J.mjJNT_FREE:
                 keyframes.change(joint.name, self._raised)

@@ -48,6 +48,7 @@ class Plane:
     """A plane across a segment.
 
     Args:
+        spec: Specification that contains the segment.
         body: The segment.
         part: Position of the plane as a share of the segment's length from its anchor.
 
@@ -59,10 +60,10 @@ class Plane:
         MorphologyError: If the segment has no length.
     """
 
-    def __init__(self, body: mujoco.MjsBody, part: float) -> None:
-        self._body, self._part = body, part
+    def __init__(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float) -> None:
+        self._spec, self._body, self._part = spec, body, part
         self._held = anchor(body)
-        self.along = far_end(body) - self._held
+        self.along = far_end(spec, body) - self._held
         self.place = self._held + part * self.along
 
     def is_beyond(self, point: Array) -> bool:
@@ -76,7 +77,7 @@ class Plane:
 
     def children_beyond(self) -> list[mujoco.MjsBody]:
         """Return the bodies that are attached farther out than the plane."""
-        return [c for c in self._body.bodies if self.is_beyond(held_at(c))]
+        return [c for c in self._body.bodies if self.is_beyond(held_at(self._spec, c))]
 
     def points_beyond(self) -> list[Point]:
         """Return the sites, cameras and lights of the segment farther out than the plane."""
@@ -117,12 +118,12 @@ class Plane:
     def _ends(self, geom: mujoco.MjsGeom) -> tuple[tuple[Array, Array] | None, int]:
         """Return both ends of a geom's length, and the index of the half-size that it is."""
         if geom.type in (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER):
-            return axis_ends(geom), 1
+            return axis_ends(self._spec, geom), 1
         if geom.type != _G.mjGEOM_BOX:
             return None, 0
         if has_ends(geom):
             return (np.array(geom.fromto[:3]), np.array(geom.fromto[3:])), 2
-        axes = rotation(orientation(geom))
+        axes = rotation(orientation(self._spec, geom))
         along = np.abs(self.along @ axes) / float(np.linalg.norm(self.along))
         axis = int(np.argmax(along))
         half = axes[:, axis] * geom.size[axis]
@@ -130,7 +131,7 @@ class Plane:
 
     def _require_one_side(self, box: mujoco.MjsGeom) -> None:
         """Refuse a box whose corners lie on both sides."""
-        axes = rotation(orientation(box)) * box.size
+        axes = rotation(orientation(self._spec, box)) * box.size
         signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8)
         sides = {self.is_beyond(box.pos + corner) for corner in (axes @ signs).T}
         if len(sides) == 2:
@@ -140,16 +141,19 @@ class Plane:
             )
 
 
-def shorten(geom: mujoco.MjsGeom, held: Array, share: float, axis: int) -> None:
+def shorten(
+    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, share: float, axis: int
+) -> None:
     """Shorten a geom to a share of its length, at the same thickness and density.
 
     Args:
+        spec: Specification that contains it.
         geom: The geom.
         held: End of its axis that stays, in the body's frame, shape (3,), m.
         share: New length over the old one.
         axis: Index of the half-size that is its length.
     """
-    before = volume(geom)
+    before = volume(spec, geom)
     if has_ends(geom):
         geom.fromto = (held + share * (geom.fromto.reshape(2, 3) - held)).ravel()
     else:
@@ -157,4 +161,4 @@ def shorten(geom: mujoco.MjsGeom, held: Array, share: float, axis: int) -> None:
         size[axis] *= share
         geom.size = size
         geom.pos = held + share * (geom.pos - held)
-    keep_density(geom, before)
+    keep_density(spec, geom, before)

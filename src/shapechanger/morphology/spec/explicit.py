@@ -43,23 +43,6 @@ def make_explicit(spec: mujoco.MjSpec) -> None:
     _write_out_fits(spec)
 
 
-def write_out_orientations(spec: mujoco.MjSpec) -> None:
-    """Write every orientation as a quaternion."""
-    bodies = limbs_and_trunks(spec)
-    turned = (*bodies, *spec.geoms, *spec.sites, *spec.cameras, *spec.frames)
-    for element, field, other in (
-        *((body, "iquat", body.ialt) for body in bodies),
-        *((element, "quat", element.alt) for element in turned),
-    ):
-        if other.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
-            compiler = element.compiler
-            resolved = spec.resolve_orientation(
-                degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=other
-            )
-            setattr(element, field, resolved)
-            other.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-
-
 def _write_out_bounds(spec: mujoco.MjSpec) -> None:
     """Give the bodies that the compiler makes heavier their final inertia, and drop the bounds."""
     compiler = spec.compiler
@@ -82,6 +65,7 @@ def _write_out_bounds(spec: mujoco.MjSpec) -> None:
         body.explicitinertial = True
         body.mass, body.ipos, body.iquat = final.mass[0], final.ipos, final.iquat
         body.inertia, body.fullinertia = final.inertia, np.full(6, np.nan)
+        body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
 def _write_out_fits(spec: mujoco.MjSpec) -> None:
@@ -96,15 +80,15 @@ def _write_out_fits(spec: mujoco.MjSpec) -> None:
         final = kind(element.name)
         element.meshname = ""
         element.size, element.pos, element.quat = final.size, final.pos, final.quat
+        element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
 def resolve_frames(spec: mujoco.MjSpec) -> None:
-    """Express every pose relative to its body, by a quaternion, and reset the frames.
+    """Express every pose relative to its body, and reset the frames.
 
     Raises:
         MorphologyError: If a frame scales its elements.
     """
-    write_out_orientations(spec)
     frames = [frame for frame in spec.frames if not _is_trivial(frame)]
     if not frames:
         return
@@ -114,22 +98,23 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
                 f"The frame {frame.name!r} scales its elements: write the sizes out instead."
             )
     for body in limbs_and_trunks(spec):
-        _resolve(body)
+        _resolve(spec, body)
     for element in (*spec.geoms, *spec.sites, *spec.cameras):
-        _resolve(element)
+        _resolve(spec, element)
     for joint in spec.joints:
-        pose = _pose_of_frames(joint.frame)
+        pose = _pose_of_frames(spec, joint.frame)
         if pose:
             joint.pos = _seen(joint.pos, pose)
             joint.axis = rotation(pose.turn) @ joint.axis
     for light in spec.lights:
-        pose = _pose_of_frames(light.frame)
+        pose = _pose_of_frames(spec, light.frame)
         if pose:
             light.pos = _seen(light.pos, pose)
             light.dir = rotation(pose.turn) @ light.dir
     for frame in frames:
         frame.pos = np.zeros(3)
         frame.quat = _UPRIGHT
+        frame.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
 def _is_trivial(frame: mujoco.MjsFrame) -> bool:
@@ -137,16 +122,18 @@ def _is_trivial(frame: mujoco.MjsFrame) -> bool:
     return (
         not np.any(frame.pos)
         and tuple(frame.quat) == _UPRIGHT
+        and frame.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
         and bool(np.all(frame.scale == 1.0))
         and not frame.massscale
     )
 
 
 def _resolve(
+    spec: mujoco.MjSpec,
     element: mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera,
 ) -> None:
     """Express an element's pose relative to its body."""
-    pose = _pose_of_frames(element.frame)
+    pose = _pose_of_frames(spec, element.frame)
     if pose is None:
         return
     if isinstance(element, mujoco.MjsGeom | mujoco.MjsSite) and has_ends(element):
@@ -156,8 +143,9 @@ def _resolve(
         _write_pose(element)  # The turn of a box about its axis follows from the frame.
     element.pos = _seen(element.pos, pose)
     turned = np.empty(4)
-    mujoco.mju_mulQuat(turned, pose.turn, orientation(element))
+    mujoco.mju_mulQuat(turned, pose.turn, orientation(spec, element))
     element.quat = turned
+    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
 def _write_pose(element: mujoco.MjsGeom | mujoco.MjsSite) -> None:
@@ -184,11 +172,11 @@ def _seen(point: Array, pose: _Pose) -> Array:
     return pose.shift + rotation(pose.turn) @ point
 
 
-def _pose_of_frames(frame: mujoco.MjsFrame | None) -> _Pose | None:
+def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> _Pose | None:
     """Return the pose of nested frames relative to the body; None without a frame."""
     pose = None
     while frame is not None:
-        around = _Pose(orientation(frame), np.array(frame.pos))
+        around = _Pose(orientation(spec, frame), np.array(frame.pos))
         if pose is None:
             pose = around
         else:

@@ -39,9 +39,31 @@ def rotation(quaternion: Array) -> Array:
     return matrix.reshape(3, 3)
 
 
-def orientation(element: _Oriented) -> Array:
-    """Return an element's unit quaternion (w, x, y, z), which `make_explicit` has written out."""
-    return np.array(element.quat) / np.linalg.norm(element.quat)
+def orientation(
+    spec: mujoco.MjSpec,
+    element: _Oriented,
+    alternative: mujoco.MjsOrientation | None = None,
+    quaternion: Array | None = None,
+) -> Array:
+    """Return an element's quaternion (w, x, y, z), however its orientation was written.
+
+    Args:
+        spec: Specification that contains it, which says how angles are written.
+        element: A body, geom, site, camera or frame.
+        alternative: Another orientation of the element, such as that of its inertia.
+        quaternion: The quaternion of that.
+    """
+    alternative = element.alt if alternative is None else alternative
+    if alternative.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        given = np.array(element.quat if quaternion is None else quaternion, dtype=np.float64)
+        return given / np.linalg.norm(given)
+    return np.array(
+        spec.resolve_orientation(
+            degree=bool(element.compiler.degree),
+            sequence=element.compiler.eulerseq,
+            orientation=alternative,
+        )
+    )
 
 
 def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
@@ -49,17 +71,18 @@ def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
     return not math.isnan(element.fromto[0])
 
 
-def axis_ends(geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
+def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
     """Return both ends of a capsule's or cylinder's axis in its body's frame, m.
 
     Args:
+        spec: Specification that contains it.
         geom: The geom; the result is None for other shapes.
     """
     if geom.type not in _LONG:
         return None
     if has_ends(geom):
         return np.array(geom.fromto[:3]), np.array(geom.fromto[3:])
-    half = rotation(orientation(geom))[:, 2] * geom.size[1]
+    half = rotation(orientation(spec, geom))[:, 2] * geom.size[1]
     return geom.pos - half, geom.pos + half
 
 
@@ -83,10 +106,11 @@ def move_by(element: Point, shift: Array) -> None:
         element.pos = element.pos + shift
 
 
-def volume(geom: mujoco.MjsGeom) -> float:
+def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
     """Return the volume of a primitive geom, m³.
 
     Args:
+        spec: Specification that contains it.
         geom: The geom.
     """
     a, b, c = (float(x) for x in geom.size)
@@ -100,7 +124,7 @@ def volume(geom: mujoco.MjsGeom) -> float:
         case _G.mjGEOM_BOX:
             return 8.0 * a * b * c
         case _:
-            ends = axis_ends(geom)
+            ends = axis_ends(spec, geom)
             length = float(np.linalg.norm(ends[1] - ends[0])) if ends else 0.0
             caps = 4.0 / 3.0 * math.pi * a**3 if geom.type == _G.mjGEOM_CAPSULE else 0.0
             return math.pi * a**2 * length + caps
@@ -133,10 +157,13 @@ def _move_outwards(
         element.pos = stretched(element.pos, held, factor, axis)
 
 
-def stretch_geom(geom: mujoco.MjsGeom, held: Array, factor: float, axis: str | None = None) -> None:
+def stretch_geom(
+    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float, axis: str | None = None
+) -> None:
     """Make a geom `factor` times as long, at the same thickness, and move it outwards likewise.
 
     Args:
+        spec: The model that `geom` is in.
         geom: The geom.
         held: The point of its body that stays, shape (3,), m.
         factor: New length over old length.
@@ -145,45 +172,47 @@ def stretch_geom(geom: mujoco.MjsGeom, held: Array, factor: float, axis: str | N
     Raises:
         MorphologyError: If the geom lies oblique to the axis.
     """
-    before = volume(geom)
+    before = volume(spec, geom)
     if not has_ends(geom):
-        _lengthen(geom, factor, axis)
+        _lengthen(spec, geom, factor, axis)
     _move_outwards(geom, held, factor, axis)
-    keep_density(geom, before)
+    keep_density(spec, geom, before)
 
 
-def resize_geom(geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
+def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
     """Scale a geom in every direction.
 
     Args:
+        spec: Specification that contains it.
         geom: The geom.
         held: The point of its body that stays, shape (3,), m.
         factor: New size over the old one.
     """
-    before = volume(geom)
+    before = volume(spec, geom)
     geom.size = geom.size * factor
     _move_outwards(geom, held, factor)
-    keep_density(geom, before)
+    keep_density(spec, geom, before)
 
 
-def thicken_geom(geom: mujoco.MjsGeom, factor: float) -> None:
+def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
     """Scale the thickness of a geom: its radius, or its two smaller half-sizes.
 
     Args:
+        spec: Specification that contains it.
         geom: The geom.
         factor: New thickness over the old one.
     """
-    before = volume(geom)
+    before = volume(spec, geom)
     size = np.array(geom.size)
     if geom.type in (*_LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
         size[0] *= factor
     else:
         size[np.arange(3) != np.argmax(size)] *= factor
     geom.size = size
-    keep_density(geom, before)
+    keep_density(spec, geom, before)
 
 
-def _lengthen(geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
+def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
     """Scale the long half-size of a geom that is given by position and size."""
     if geom.type == _G.mjGEOM_SPHERE:
         return  # A sphere has no length.
@@ -191,7 +220,7 @@ def _lengthen(geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
     place, direction = (1, 2) if geom.type in _LONG else (int(np.argmax(size)),) * 2
     if axis is not None:
         # How much each axis of the geom lies along that of the body.
-        along = np.abs(rotation(orientation(geom))[_AXES[axis]])
+        along = np.abs(rotation(orientation(spec, geom))[_AXES[axis]])
         if geom.type not in _LONG:
             place = direction = int(np.argmax(along))
         if along[direction] < 1.0 - ALONG:
@@ -205,15 +234,16 @@ def _lengthen(geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
     geom.size = size
 
 
-def keep_density(geom: mujoco.MjsGeom, volume_before: float) -> None:
+def keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: float) -> None:
     """Scale a mass that is written out with the geom's volume, to keep the density.
 
     Args:
+        spec: Specification that contains it.
         geom: The geom, changed.
         volume_before: Its volume before the change, m³.
     """
     if not math.isnan(geom.mass) and volume_before > 0.0:
-        geom.mass *= volume(geom) / volume_before
+        geom.mass *= volume(spec, geom) / volume_before
 
 
 def scale_geom_mass(geom: mujoco.MjsGeom, factor: float) -> None:
@@ -237,26 +267,28 @@ def anchor(body: mujoco.MjsBody) -> Array:
     return next((np.array(j.pos) for j in body.joints if j.type in _TURNING), np.zeros(3))
 
 
-def held_at(body: mujoco.MjsBody) -> Array:
+def held_at(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
     """Return the anchor of a segment in its parent's frame, m.
 
     Args:
+        spec: Specification that contains it.
         body: Body of the segment.
     """
-    return body.pos + rotation(orientation(body)) @ anchor(body)
+    return body.pos + rotation(orientation(spec, body)) @ anchor(body)
 
 
-def far_end(body: mujoco.MjsBody) -> Array:
+def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
     """Return the point of a segment's axis farthest from its anchor, in the body's frame, m.
 
     Args:
+        spec: Specification that contains it.
         body: Body of the segment.
 
     Raises:
         MorphologyError: If the body has no capsule or cylinder.
     """
     held = anchor(body)
-    ends = [end for geom in body.geoms for end in axis_ends(geom) or ()]
+    ends = [end for geom in body.geoms for end in axis_ends(spec, geom) or ()]
     if not ends:
         raise MorphologyError(f"{body.name!r} has no capsule or cylinder, so it has no far end.")
     return max(ends, key=lambda end: float(np.linalg.norm(end - held)))
@@ -314,12 +346,12 @@ def stretch_segment(
     release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
     held = anchor(body)
     for geom in body.geoms:
-        stretch_geom(geom, held, factor, axis)
-    _carry_outwards(body, held, factor, axis)
+        stretch_geom(spec, geom, held, factor, axis)
+    _carry_outwards(spec, body, held, factor, axis)
 
 
 def _carry_outwards(
-    body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
 ) -> None:
     """Move what is attached to a stretched segment: joints, sites, cameras, lights and bodies."""
     for joint in body.joints:
@@ -330,7 +362,7 @@ def _carry_outwards(
         if is_mounted(seen):
             seen.pos = stretched(seen.pos, held, factor, axis)
     for child in body.bodies:
-        held_there = held_at(child)
+        held_there = held_at(spec, child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
 
 
@@ -355,8 +387,8 @@ def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> Non
         require_geometry(spec, body)
         held = anchor(body)
         for geom in body.geoms:
-            resize_geom(geom, held, factor)
-        _carry_outwards(body, held, factor)
+            resize_geom(spec, geom, held, factor)
+        _carry_outwards(spec, body, held, factor)
         for joint in body.joints:
             joint.armature *= factor
             joint.damping = joint.damping * factor

@@ -13,7 +13,7 @@ import numpy as np
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import require_free_name, subtree
 from shapechanger.morphology.spec.explicit import resolve_frames
-from shapechanger.morphology.spec.geometry import Point, has_ends, rotation
+from shapechanger.morphology.spec.geometry import Point, has_ends, orientation, rotation
 from shapechanger.morphology.spec.references import (
     COUPLINGS,
     Element,
@@ -26,8 +26,10 @@ from shapechanger.morphology.spec.references import (
 _O: Final = mujoco.mjtObj
 # In a name while another element still has it; no name of a model has it.
 _OLD: Final = "~old"
-# Names are unique, and all orientations are written out as quaternions.
-_APART: Final = frozenset({"name", "alt", "ialt", "classname", "childclass", "info"})
+# Set apart: names are unique, and orientations are written in units that belong to each element.
+_APART: Final = frozenset(
+    {"name", "alt", "ialt", "quat", "iquat", "classname", "childclass", "info"}
+)
 _IN_DEGREES: Final = ("range", "ref", "springref")
 _POINTS: Final = ("joint", "geom", "site", "camera", "light")
 
@@ -56,7 +58,7 @@ def copy_limb(
     inside = elements_of(limb)
     release_drawings(spec, inside, skins=False)
     copied = _Copies(spec, limb, suffix, turn, inside)
-    copy = _copy_body(limb, limb.parent.add_frame(quat=turn), lambda name: name + suffix)
+    copy = _copy_body(spec, limb, limb.parent.add_frame(quat=turn), lambda name: name + suffix)
     resolve_frames(spec)
     copied.copy_holders()
     return copy
@@ -79,7 +81,7 @@ def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody)
         for kind in _POINTS:
             for element in getattr(body, f"{kind}s"):
                 element.name += _OLD
-    moved = _copy_body(limb, parent, lambda name: name.removesuffix(_OLD))
+    moved = _copy_body(spec, limb, parent, lambda name: name.removesuffix(_OLD))
     spec.delete(limb)
     return moved
 
@@ -99,7 +101,7 @@ def copy_geom(
         MorphologyError: If the name is taken.
     """
     require_free_name(spec, "geom", name)
-    return _copy_point(geom, body, name)
+    return _copy_point(spec, geom, body, name)
 
 
 def move_point(spec: mujoco.MjSpec, point: Point, body: mujoco.MjsBody) -> Any:
@@ -115,38 +117,39 @@ def move_point(spec: mujoco.MjSpec, point: Point, body: mujoco.MjsBody) -> Any:
     """
     name = point.name
     point.name = name + _OLD  # References are by name.
-    moved = _copy_point(point, body, name)
+    moved = _copy_point(spec, point, body, name)
     spec.delete(point)
     return moved
 
 
 def _copy_body(
+    spec: mujoco.MjSpec,
     body: mujoco.MjsBody,
     place: mujoco.MjsBody | mujoco.MjsFrame,
     renamed: Callable[[str], str],
 ) -> mujoco.MjsBody:
     """Copy a body with all that hangs on it."""
     copy = place.add_body()
-    _copy_fields(body, copy)
+    _copy_fields(spec, body, copy)
     copy.name = renamed(body.name)
     for kind in _POINTS:
         for element in getattr(body, f"{kind}s"):
-            _copy_point(element, copy, element.name and renamed(element.name))
+            _copy_point(spec, element, copy, element.name and renamed(element.name))
     for child in body.bodies:
-        _copy_body(child, copy, renamed)
+        _copy_body(spec, child, copy, renamed)
     return copy
 
 
-def _copy_point(point: Any, body: mujoco.MjsBody, name: str) -> Any:
+def _copy_point(spec: mujoco.MjSpec, point: Any, body: mujoco.MjsBody, name: str) -> Any:
     """Copy an element that is on a body."""
     kind = type(point).__name__.removeprefix("Mjs").lower()
     copy = getattr(body, f"add_{kind}")()
-    _copy_fields(point, copy)
+    _copy_fields(spec, point, copy)
     copy.name = name
     return copy
 
 
-def _copy_fields(old: Any, new: Any) -> None:
+def _copy_fields(spec: mujoco.MjSpec, old: Any, new: Any) -> None:
     """Copy all but the name of an element to a new one of its kind.
 
     Raises:
@@ -156,6 +159,10 @@ def _copy_fields(old: Any, new: Any) -> None:
         raise MorphologyError(f"{old.name!r} is driven by a plugin, so it cannot be copied.")
     for field in _fields_of(old.__class__):
         setattr(new, field, getattr(old, field))
+    if hasattr(old, "quat"):
+        new.quat = orientation(spec, old)
+    if isinstance(old, mujoco.MjsBody):
+        new.iquat = orientation(spec, old, old.ialt, old.iquat)
     # Limits of attached models can have other units than those of elements that are added.
     turns = isinstance(old, mujoco.MjsJoint) and old.type != mujoco.mjtJoint.mjJNT_SLIDE
     if turns and old.compiler.degree != new.compiler.degree:
@@ -203,24 +210,23 @@ class _Copies:
     def copy_holders(self) -> None:
         """Copy tendons, then equalities, contacts, actuators and sensors, and aim the cameras."""
         spec, inside = self._spec, self._inside
-        for tendon in list(spec.tendons):
-            if self._names_inside(tendon):
-                self._copy_tendon(tendon)
-                inside.add((_O.mjOBJ_TENDON, tendon.name))
-        for equality in list(spec.equalities):
+        for tendon in [each for each in spec.tendons if self._names_inside(each)]:
+            self._copy_tendon(tendon)
+            inside.add((_O.mjOBJ_TENDON, tendon.name))
+        for equality in spec.equalities:
             self._require_own_follower(equality)
-            self._copy_if_inside(equality, "equality")
-        for exclude in list(spec.excludes):
-            self._copy_if_inside(exclude, "exclude")
-        for pair in list(spec.pairs):
-            self._copy_if_inside(pair, "pair")
-        for actuator in list(spec.actuators):
+        for elements, kind, fields in (
+            (spec.equalities, "equality", ()),
+            (spec.excludes, "exclude", ()),
+            (spec.pairs, "pair", ()),
             # One whose other end alone is on the limb moves another limb.
-            if self._names_inside(actuator, "target", "slidersite"):
-                self._copy_if_inside(actuator, "actuator")
-                inside.add((_O.mjOBJ_ACTUATOR, actuator.name))
-        for sensor in list(spec.sensors):
-            self._copy_if_inside(sensor, "sensor")
+            (spec.actuators, "actuator", ("target", "slidersite")),
+            (spec.sensors, "sensor", ()),
+        ):
+            for holder in [each for each in elements if self._names_inside(each, *fields)]:
+                self._copy_holder(holder, kind)
+                if kind == "actuator":
+                    inside.add((_O.mjOBJ_ACTUATOR, holder.name))
         holders = {"camera": _O.mjOBJ_CAMERA, "light": _O.mjOBJ_LIGHT}
         for mention in self._references:
             name = mention.holder.name
@@ -247,10 +253,8 @@ class _Copies:
                 "too: copy a limb that holds both."
             )
 
-    def _copy_if_inside(self, holder: Any, kind: str) -> None:
+    def _copy_holder(self, holder: Any, kind: str) -> None:
         """Copy an element that names one of the limb."""
-        if not self._names_inside(holder):
-            return
         copy = copy_holder(self._spec, holder, kind, self._suffix)
         for mention in (each for each in self._references if each.holder == holder):
             if kind in ("equality", "actuator"):
@@ -290,7 +294,7 @@ class _Copies:
         if point is None or point.parent != self._parent or self._parent.parent is None:
             return name
         require_free_name(self._spec, "site" if kind == _O.mjOBJ_SITE else "geom", new)
-        copy = _copy_point(point, self._parent, new)
+        copy = _copy_point(self._spec, point, self._parent, new)
         matrix = rotation(self._turn)
         if has_ends(copy):
             copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
@@ -319,7 +323,7 @@ def copy_holder(spec: mujoco.MjSpec, holder: Any, kind: str, suffix: str) -> Any
     if holder.name:
         require_free_name(spec, kind, holder.name + suffix)
     copy = getattr(spec, f"add_{kind}")()
-    _copy_fields(holder, copy)
+    _copy_fields(spec, holder, copy)
     copy.name = holder.name and holder.name + suffix
     return copy
 

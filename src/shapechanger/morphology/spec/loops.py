@@ -121,10 +121,10 @@ def close_loops(
             turn = data.qpos[at : at + 4].copy()
             if np.abs(turn - _UPRIGHT).max() > _STILL:
                 balls[name] = turn
-                displace(spec.joint(name), turn)
+                displace(spec, spec.joint(name), turn)
         elif model.jnt_type[i] != _J.mjJNT_FREE and abs(by) > _STILL:
             joint = spec.joint(name)
-            displace(joint, by)
+            displace(spec, joint, by)
             set_reference(joint, reference_of(joint) + by)
             changes[_O.mjOBJ_JOINT, name] = by
     if changes or balls:
@@ -153,7 +153,7 @@ def unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
             own[:3] = second.pos
             if own[6:10].any() or not (together and np.allclose(a.xmat, b.xmat, 0.0, _TOGETHER)):
                 own[3:6] = first.pos
-                own[6:10] = _relative(orientation(second), orientation(first))
+                own[6:10] = _relative(orientation(spec, second), orientation(spec, first))
         elif together:
             own[:3] = first.pos
         else:  # One that is switched off, and open: only sites can state both places.

@@ -79,10 +79,11 @@ def set_reference(joint: mujoco.MjsJoint, position: float) -> None:
     joint.ref = _degrees(position) if _in_degrees(joint) else position
 
 
-def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
+def displace(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, by: float | Array) -> None:
     """Change the pose of a joint's body as if the joint had moved.
 
     Args:
+        spec: Specification that contains it.
         joint: A hinge, slide or ball.
         by: Angle, rad, or distance, m; of a ball, the turn as a quaternion (w, x, y, z).
     """
@@ -103,8 +104,9 @@ def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
     for earlier in body.joints[: [j.name for j in body.joints].index(joint.name)]:
         earlier.axis = turn.T @ earlier.axis
         earlier.pos = turn.T @ (earlier.pos - shift)
-    parent = orientation(body)
+    parent = orientation(spec, body)
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, parent, quaternion)
     body.pos = body.pos + rotation(parent) @ shift
     body.quat = turned
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT

@@ -3,7 +3,7 @@
 An edit carries along, or refuses in a sentence, whatever names an element that it touches.
 `references` is the table of all that can name an element of a body. Every edit that moves, removes,
 locks or copies elements goes through the functions of this module; points that loops hold are sites
-meanwhile, and keyframes are kept by name (`loops`, `keyframes`).
+meanwhile, and keyframes are kept by name (`loops`, `carried`).
 """
 
 from __future__ import annotations
@@ -107,8 +107,12 @@ def _bound(equality: mujoco.MjsEquality) -> mujoco.mjtObj:
     )
 
 
-# The elements of a specification, what a message calls one, and the fields in which it names
-# others: the kind of the named ones, or a function that returns it or one kind for each name.
+def _driven(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
+    return _TARGETS.get(actuator.trntype, _O.mjOBJ_UNKNOWN)
+
+
+# The elements of a specification, the name of their kind in messages, and the fields in which they
+# name others: the kind of the named ones, the field that holds it, or a function that returns it.
 _HOLDERS: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
     ("equalities", "equality", {"name1": _bound, "name2": _bound}),
     ("excludes", "exclusion", {"bodyname1": _O.mjOBJ_BODY, "bodyname2": _O.mjOBJ_BODY}),
@@ -116,29 +120,21 @@ _HOLDERS: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
     (
         "actuators",
         "actuator",
-        {
-            "target": lambda actuator: _TARGETS.get(actuator.trntype, _O.mjOBJ_UNKNOWN),
-            "refsite": _O.mjOBJ_SITE,
-            "slidersite": _O.mjOBJ_SITE,
-        },
+        {"target": _driven, "refsite": _O.mjOBJ_SITE, "slidersite": _O.mjOBJ_SITE},
     ),
-    (
-        "sensors",
-        "sensor",
-        {"objname": lambda sensor: sensor.objtype, "refname": lambda sensor: sensor.reftype},
-    ),
+    ("sensors", "sensor", {"objname": "objtype", "refname": "reftype"}),
     ("cameras", "camera", {"targetbody": _O.mjOBJ_BODY}),
     ("lights", "light", {"targetbody": _O.mjOBJ_BODY}),
     ("skins", "skin", {"bodyname": _O.mjOBJ_BODY}),
     ("flexes", "flex", {"vertbody": _O.mjOBJ_BODY, "nodebody": _O.mjOBJ_BODY}),
-    ("tuples", "tuple", {"objname": lambda group: [_O(kind) for kind in group.objtype]}),
+    ("tuples", "tuple", {"objname": "objtype"}),
 )
 
 
 def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
-    Keyframes refer to joints and actuators by their order; see `keyframes`.
+    Keyframes refer to joints and actuators by their order; see `carried`.
 
     Args:
         spec: The specification.
@@ -152,11 +148,15 @@ def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     for elements, kind, fields in _HOLDERS:
         for holder in getattr(spec, elements):
             for field, of in fields.items():
-                target, value = of(holder) if callable(of) else of, getattr(holder, field)
+                value: str | list[str] = getattr(holder, field)
                 names = [value] if isinstance(value, str) else list(value)
-                targets = target if isinstance(target, list) else [target] * len(names)
+                target: Any = of(holder) if callable(of) else of
+                if isinstance(of, str):
+                    target = getattr(holder, of)
+                # A tuple has one kind for each name.
+                targets = [target] * len(names) if isinstance(target, _O) else list(target)
                 for named, name in zip(targets, names, strict=True):
-                    found.append(Mention(holder, kind, field, (_plain(named), name)))
+                    found.append(Mention(holder, kind, field, (_plain(_O(named)), name)))
     return [each for each in found if each.element[1] and (not kinds or each.kind in kinds)]
 
 
