@@ -24,7 +24,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.twin.check.bench import Bench
 from shapechanger.robot.twin.check.faults import FAULTS, Fault
-from shapechanger.robot.twin.check.trial import Trial
+from shapechanger.robot.twin.check.trial import run_trial
 from tests.robots import CAR
 
 TRIALS: Final = 100
@@ -91,24 +91,24 @@ def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) 
     if path.exists():
         found = msgspec.json.Decoder(_Tried).decode_lines(path.read_bytes())
     with ExitStack() as opened, path.open("ab") as file:
-        trial: Trial | None = None
+        bench: Bench | None = None
         while sum(one.drove for one in found) < trials and len(found) < 2 * trials:
-            if trial is None:
-                bench = Bench(load_profile(profile), one_shot=one_shot)
-                trial = opened.enter_context(Trial(bench, pilot=PILOT))
+            if bench is None:
+                bench = Bench(load_profile(profile), one_shot=one_shot, pilot=PILOT)
+                opened.enter_context(bench)
             try:
-                tried = _as_tried(trial, fault)
+                tried = _as_tried(bench, fault)
             except RobotError:  # The driver lost the link or never drove: start another robot.
                 opened.close()
-                trial, tried = None, _Tried(None, 0.0, False, ())
+                bench, tried = None, _Tried(None, 0.0, False, ())
             found.append(tried)
             file.write(msgspec.json.encode(tried) + b"\n")
             file.flush()
     return found
 
 
-def _as_tried(trial: Trial, fault: Fault) -> _Tried:
-    result = trial.run(fault)
+def _as_tried(bench: Bench, fault: Fault) -> _Tried:
+    result = run_trial(bench, fault)
     return _Tried(
         _finite(result.stopped_ms),
         result.limit_ms,

@@ -14,7 +14,7 @@ import pytest
 
 from shapechanger.robot.twin.check.bench import Bench
 from shapechanger.robot.twin.check.faults import FAULTS
-from shapechanger.robot.twin.check.trial import Trial
+from shapechanger.robot.twin.check.trial import run_trial
 from shapechanger.robot.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
@@ -86,21 +86,21 @@ def witness() -> Iterator[Witness]:
 
 
 @pytest.fixture(scope="module")
-def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     """A robot for all faults, replaced when a fault ends it."""
-    with Trial(write_profile(tmp_path_factory.mktemp("faults")), pilot=PILOT) as made:
+    with Bench(write_profile(tmp_path_factory.mktemp("faults")), pilot=PILOT) as made:
         yield made
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_the_robot_stops(trial: Trial, witness: Witness, name: str) -> None:
+def test_the_robot_stops(bench: Bench, witness: Witness, name: str) -> None:
     """The stop is within the promised time, and the robot never drives without a fresh command."""
     fault = FAULTS[name]
     drove = 0
     # Repeat trials in which the robot had stopped before the fault.
     for _ in range(2 * TRIALS):
         witness.longest_ms()
-        result = trial.run(fault)
+        result = run_trial(bench, fault)
         margin_ms = MARGIN_MS + witness.longest_ms()
         drove += result.drove
         assert result.stopped_ms <= result.limit_ms + margin_ms, result
@@ -130,9 +130,9 @@ def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
     """The documented weakness: without processes and hardware protection, power stays on."""
     # Keep the robot after the trial, to inspect it.
     fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
-    with Trial(Bench(write_profile(tmp_path), one_shot=False)) as trial:
-        result = trial.run(fault)
-        levels = frozen(read_ledger(trial.ledger_path), (22, 27))
+    with Bench(write_profile(tmp_path), one_shot=False) as bench:
+        result = run_trial(bench, fault)
+        levels = frozen(read_ledger(bench.board().ledger_path), (22, 27))
     assert result.drove
     assert levels[22] in {0.0, 1.0}
     assert levels[27] == 0.0

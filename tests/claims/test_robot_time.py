@@ -12,7 +12,7 @@ PACKAGE: Final = Path(shapechanger.__file__).parent
 # The validity of a certificate and the day of a recording or a report are calendar dates.
 MAY: Final = {
     PACKAGE / "robot" / part
-    for part in ("check/check.py", "daemon/credentials.py", "daemon/recorder.py")
+    for part in ("check/report.py", "daemon/credentials.py", "daemon/recorder.py")
 }
 WALL: Final = {
     "time.time",

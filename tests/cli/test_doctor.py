@@ -12,7 +12,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.cli.doctor import examine_machine
-from shapechanger.robot.check.check import Finding
+from shapechanger.robot.check.report import Finding
 
 REQUIREMENTS = (
     "core-package>=2",

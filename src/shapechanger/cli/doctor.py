@@ -10,13 +10,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.cli.console import say
 from shapechanger.errors import MissingExtra
-from shapechanger.robot.check.check import Check, Finding, Results, run_checks, write_report
+from shapechanger.robot.check.report import Finding, Results, run_checks, write_report
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -74,14 +73,14 @@ def examine_machine(
         return True
 
     checks = [
-        Check("machine", _machine),
+        ("machine", _machine()),
         *(
-            Check(f"extra {extra}" if extra else "core", partial(_extra, parsed, extra, version_of))
+            (f"extra {extra}" if extra else "core", _extra(parsed, extra, version_of))
             for extra in ("", *extras)
         ),
         # An extra says that a package is not installed.
-        *(Check(name, run) for name, package, run in _PACKAGES if is_here(package)),
-        Check("pins", partial(_gpio, dev)),
+        *((name, check()) for name, package, check in _PACKAGES if is_here(package)),
+        ("pins", _gpio(dev)),
     ]
     return run_checks(checks)
 

@@ -1,8 +1,8 @@
-"""Pins of a robot, and the test of two that are joined by a wire."""
+"""Pins of a robot, the test of two that are joined by a wire, and LEDs instead of motors."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -10,9 +10,16 @@ from gpiozero.pins.mock import MockConnectedPin, MockFactory
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.pins import check_jumper, plan_of_pins, probed_pin
-from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.check.pins import (
+    check_jumper,
+    lamp_checks,
+    lamps_of,
+    plan_of_pins,
+    probed_pin,
+)
+from shapechanger.robot.check.report import Finding, run_checks
 from shapechanger.robot.raspberry_pi import RealHardware
+from tests.robot.check.held_pins import HeldPins, shipped
 
 _PLAN = GuardPlan(
     "car",
@@ -24,7 +31,7 @@ _PLAN = GuardPlan(
 )
 
 
-class _Pins(RealHardware):
+class _Joined(RealHardware):
     """gpiozero's mock pins; 20 and 21 are joined, 20 and 16 are not."""
 
     def __init__(self) -> None:
@@ -37,22 +44,10 @@ class _Pins(RealHardware):
         return self.factory
 
 
-@pytest.fixture
-def pins() -> Iterator[_Pins]:
-    made = _Pins()
-    yield made
-    made.factory.close()
-
-
-def test_joined_pins_pass(pins: _Pins) -> None:
-    """The input follows the output."""
-    assert "20 followed pin 21" in check_jumper(21, 20, _PLAN, pins)
-
-
-def test_pins_without_a_wire_fail(pins: _Pins) -> None:
-    """The error asks for the wire."""
+def test_only_joined_pins_pass() -> None:
+    assert "20 followed pin 21" in check_jumper(21, 20, _PLAN, _Joined())
     with pytest.raises(RobotError, match="is the wire between them"):
-        check_jumper(21, 16, _PLAN, pins)
+        check_jumper(21, 16, _PLAN, _Joined())
 
 
 @pytest.mark.parametrize(
@@ -60,7 +55,7 @@ def test_pins_without_a_wire_fail(pins: _Pins) -> None:
     [((22, 20), "drive"), ((20, 6), "bumper"), ((19, 20), "enable line"), ((20, 26), "button")],
 )
 def test_pins_of_the_robot_are_never_toggled(pair: tuple[int, int], user: str) -> None:
-    """Pins in use are refused, so that the test cannot start a motor."""
+    """The test cannot start a motor."""
     with pytest.raises(RobotError, match=user):
         check_jumper(*pair, _PLAN)
 
@@ -84,5 +79,65 @@ def test_the_plan_has_each_pin_with_its_position() -> None:
 def test_probes_that_cannot_measure(kind: str, probe: int, words: str) -> None:
     """A pin of the robot, and a servo's pulses, which go on at rest."""
     with pytest.raises(RobotError, match=words):
-        probed_pin(load_profile(find_profile(kind)).guard_plan(), probe)
-    assert probed_pin(load_profile(find_profile("tank")).guard_plan(), 20) == 17
+        probed_pin(shipped(kind), probe)
+    assert probed_pin(shipped("tank"), 20) == 17
+
+
+@pytest.fixture
+def pins() -> Iterator[HeldPins]:
+    made = HeldPins()
+    yield made
+    made.factory.close()
+
+
+def _lit(kind: str, pins: HeldPins, ask: Callable[[str], bool | None]) -> dict[str, Finding]:
+    checks = lamp_checks(shipped(kind), lambda: pins, ask, lambda _: None, shown_s=0.0)
+    return {one.check: one for one in run_checks(checks)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "places"),
+    [
+        ("car", ["GPIO22", "GPIO27", "GPIO4", "GPIO17", "GPIO19"]),
+        ("tank", [f"GPIO{pin}" for pin in (17, 27, 22, 23, 24, 25)]),
+        ("boat", ["GPIO18", "GPIO12"]),
+        ("truck", [f"channel {number} of the pca9685" for number in range(4)]),
+    ],
+)
+def test_each_output_has_its_leds(kind: str, places: list[str]) -> None:
+    """A motor has one for each direction, and one for its enable input."""
+    assert [lamp.place for lamp in lamps_of(shipped(kind))] == places
+
+
+def test_each_led_is_lit_alone(pins: HeldPins) -> None:
+    """The person is asked while it is lit; all are out at the end."""
+    numbers = [22, 27, 4, 17, 19]
+    seen: list[list[int]] = []
+
+    def ask(question: str) -> bool:
+        lit = [n for n in numbers if pins.factory.pin(n).state]
+        seen.append(lit)
+        assert f"GPIO{lit[0]} lit" in question
+        return lit != [4]
+
+    found = _lit("car", pins, ask)
+    assert seen == [[n] for n in numbers]
+    assert not any(pins.factory.pin(n).state for n in numbers)
+    assert {name for name, one in found.items() if one.level == "bad"} == {"LED GPIO4"}
+    assert found["LED GPIO4"].sentence == "steer forward: NOT lit."
+
+
+def test_unanswered_leds_are_not_measured(pins: HeldPins) -> None:
+    assert {one.level for one in _lit("car", pins, lambda _: None).values()} == {"unknown"}
+
+
+def test_a_missing_servo_board_does_not_end_the_checks(
+    pins: HeldPins, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_bus(_: int) -> None:
+        raise OSError(121, "Remote I/O error")
+
+    monkeypatch.setattr(pins, "i2c", no_bus)
+    found = _lit("truck", pins, lambda _: None)
+    assert [one.level for one in found.values()] == ["bad"] * 4
+    assert "does not answer" in found["LED channel 0 of the pca9685"].sentence

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import LinkError, OutputError, RobotError
-from shapechanger.robot.check.check import Finding, anonymous, facts, write_report
+from shapechanger.robot.check.report import Finding, anonymous, facts, write_report
 from tests.robot.check.held_pins import shipped
 
 

@@ -12,8 +12,7 @@ import pytest
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.wiring import StandingRobot
+from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.install import (
     RootCommand,
@@ -72,16 +71,16 @@ def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
 
 def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
     """What the checks find bad in the computer's settings is what `install` puts in place."""
-    plan = _plan("car")
-    profile = pi.root / "home" / "car.toml"
+    car = replace(load_profile(find_profile("car")), camera=None)
+    profile = replace(car, path=pi.root / "home" / "car.toml")
 
     def levels() -> dict[str, str]:
-        found = examine(StandingRobot(plan, None, 0, pi.root, unit_of=profile))
+        found = examine(StandingRobot(profile, root=pi.root))
         return {one.check: one.level for one in found}
 
     before = levels()
     assert (before["strict_gpiod"], before["systemd"]) == ("bad", "bad")
-    _install(pi, plan)
+    _install(pi, car.guard_plan())
     after = levels()
     assert (after["strict_gpiod"], after["systemd"]) == ("good", "good")
 

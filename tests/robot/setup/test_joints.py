@@ -8,18 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.wiring import StandingRobot
+from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.drivers.as5600 import Magnet
-from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.zeros import find_joint_zeros
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.check.held_pins import shipped
 from tests.robot.twin.in_process import LocalBoard
 
-_PLAN = load_profile(find_profile("finger")).guard_plan()
+_PROFILE = replace(shipped("finger"), camera=None)
+_PLAN = _PROFILE.guard_plan()
 _ZEROS = [1234, 4095, 0, 2]
 
 
@@ -58,13 +58,16 @@ def test_a_missing_magnet_is_an_error() -> None:
     board.pins.encoder("DIP_flexion").set_magnet("gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
         find_joint_zeros(_PLAN, board.hardware, lambda: None)
-    car = load_profile(find_profile("car")).guard_plan()
+    car = shipped("car").guard_plan()
     assert find_joint_zeros(car, board.hardware, lambda: None) == {}
 
 
-def _found(root: Path, plan: GuardPlan, board: LocalBoard, port: int = 0) -> dict[str, list[str]]:
+def _found(
+    root: Path, board: LocalBoard, port: int = 0, profile: Profile = _PROFILE
+) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
-    for one in examine(StandingRobot(plan, None, port, root, hardware=lambda: board.hardware)):
+    robot = StandingRobot(profile, port, root, hardware=lambda: board.hardware)
+    for one in examine(robot):
         found.setdefault(one.check, []).append(f"{one.level}: {one.sentence}")
     return found
 
@@ -92,7 +95,7 @@ def test_each_magnet_is_checked(root: Path, how: Magnet, expected: str) -> None:
     """A missing, weak or strong magnet is reported for its joint only."""
     board = _board()
     board.pins.encoder("PIP_flexion").set_magnet(how)
-    found = _found(root, _PLAN, board)["encoders"]
+    found = _found(root, board)["encoders"]
     assert found[2] == expected
     assert [one.partition(":")[0] for one in found[:2]] == ["good"] * 2
 
@@ -101,7 +104,7 @@ def test_the_check_names_a_chip_that_does_not_answer(root: Path) -> None:
     """A dead multiplexer is reported for each joint behind it."""
     board = _board()
     board.pins.dead_chips.add((1, 0x70))
-    found = _found(root, _PLAN, board)["encoders"]
+    found = _found(root, board)["encoders"]
     assert len(found) == 4
     assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in found)
 
@@ -111,7 +114,7 @@ def test_checks_leave_the_encoders_of_a_served_robot_alone(root: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("", 0))
         taken.listen()
-        found = _found(root, _PLAN, _board(), port=taken.getsockname()[1])
+        found = _found(root, _board(), port=taken.getsockname()[1])
     assert "encoders" not in found
     assert found["wiring"] == [
         "unknown: The robot may be served now, so its pins and buses were left alone."
@@ -130,6 +133,6 @@ def test_checks_leave_the_encoders_of_a_served_robot_alone(root: Path) -> None:
 def test_the_bus_speed_is_checked(root: Path, config: str, expected: str) -> None:
     """The check applies only to robots with encoders."""
     (root / "boot/config.txt").write_text(config)
-    assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(expected)
-    car = load_profile(find_profile("car")).guard_plan()
-    assert "I2C speed" not in _found(root, car, _board())
+    assert _found(root, _board())["I2C speed"][0].startswith(expected)
+    car = replace(shipped("car"), camera=None)
+    assert "I2C speed" not in _found(root, _board(), profile=car)

@@ -1,12 +1,12 @@
 """The systemd unit of a new robot."""
 
+from dataclasses import replace
 from pathlib import Path
 
-from shapechanger.robot.check.check import Finding
-from shapechanger.robot.check.computer import examine
-from shapechanger.robot.check.wiring import StandingRobot
+from shapechanger.robot.check.report import Finding
+from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.setup.systemd import unit_text, unit_word, write_unit
-from tests.robot.check.test_computer import CAR
+from tests.robot.check.held_pins import shipped
 
 
 def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
@@ -18,21 +18,22 @@ def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
     assert "@" not in text
 
 
+def _finding(root: Path, profile: Path) -> Finding:
+    robot = StandingRobot(replace(shipped("car"), path=profile, camera=None), root=root)
+    return next(finding for finding in examine(robot) if finding.check == "systemd")
+
+
 def test_the_check_accepts_the_unit_of_init(tmp_path: Path) -> None:
     """The written unit passes its check, unless it is for another profile."""
     folder = tmp_path / "etc/systemd/system"
     folder.mkdir(parents=True)
     path, is_new = write_unit("car", folder / "car.toml")
 
-    def finding(profile: Path) -> Finding:
-        findings = examine(StandingRobot(CAR, None, 0, tmp_path, unit_of=profile))
-        return next(finding for finding in findings if finding.check == "systemd")
-
     assert is_new
     assert path.parent == folder
     assert path.name == "shapechanger-car.service"
-    assert finding(folder / "car.toml").level == "good"
-    other = finding(folder / "other.toml")
+    assert _finding(tmp_path, folder / "car.toml").level == "good"
+    other = _finding(tmp_path, folder / "other.toml")
     assert other.level == "bad"
     assert "is for another profile" in other.sentence
 
@@ -63,5 +64,4 @@ def test_the_check_reads_quoted_paths(tmp_path: Path) -> None:
     profile = tmp_path / "my robots/car.toml"
     path, _ = write_unit("car", profile)
     (folder / path.name).write_bytes(path.read_bytes())
-    findings = examine(StandingRobot(CAR, None, 0, tmp_path, unit_of=profile))
-    assert next(one for one in findings if one.check == "systemd").level == "good"
+    assert _finding(tmp_path, profile).level == "good"

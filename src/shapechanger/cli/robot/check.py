@@ -7,19 +7,19 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.cli.robot.setup import require_port
-from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.check import MARKS, facts, write_report
 from shapechanger.robot.check.pins import check_jumper, lamps_of, plan_of_pins, require_pins
-from shapechanger.robot.check.wiring import StandingRobot
+from shapechanger.robot.check.report import MARKS, facts, write_report
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:  # Starts a tenth of a second sooner.
     from shapechanger.robot.twin.check.trial import CheckLevel
@@ -85,8 +85,9 @@ class CheckRobot:
             f"{platform.platform()}"
         )
         from shapechanger.robot.twin.check.bench import Bench
-        from shapechanger.robot.twin.check.trial import Trial, check_robot, require_level
+        from shapechanger.robot.twin.check.trial import check_robot, require_level
 
+        asks = sys.stdin.isatty() and not (self.yes or on_twin)
         bench = Bench(
             profile,
             twin=on_twin,
@@ -94,46 +95,40 @@ class CheckRobot:
             probe=self.probe,
             # The driver that faults befall is a program.
             arguments=("--arm-by-program",) if self.leds and not on_twin else (),
+            pilot=_PILOT,
+            ask=ask_person if asks else ask_nobody,
         )
-        asks = sys.stdin.isatty() and not (self.yes or on_twin)
-        ask = ask_person if asks else ask_nobody
-        trial = Trial(bench, pilot=_PILOT, trials=self.trials, ask=ask)
-        require_level(level, trial)
-        if not on_twin:
-            self._require_consent(bench.plan, asks=asks)
+        require_level(level, bench)
+        if not on_twin and not self.wiring:
+            self._require_consent(profile, asks=asks)
         standing = StandingRobot(
-            bench.plan,
-            profile.camera,
+            profile,
             port=0 if self.leds or on_twin else self.port,
-            unit_of=profile.path.absolute(),
+            hardware=bench.pins,
             motors_off=self.motors_off or self.leds or on_twin,
             installed=not self.leds,
-            profile=None if self.leds else profile,
+            on_twin=on_twin,
             credentials=self.credentials,
         )
-        pins = plan_of_pins(bench.plan)
+        pins = plan_of_pins(profile)
         if self.wiring:
             say("\n".join(["", *pins]))
         head = [*facts(profile, twin=on_twin), *pins]
         report = self.report
         if self.leds:
-            lamps = lamps_of(bench.plan)
-            head += [f"LED          {lamp.place}: {lamp.name}" for lamp in lamps]
+            head += [f"LED          {lamp.place}: {lamp.name}" for lamp in lamps_of(profile)]
             report = report or Path("leds-report.txt")
-        if not write_report(check_robot(level, trial, standing, self.cap), say, report, head):
+        parts = check_robot(level, bench, standing, cap=self.cap, trials=self.trials)
+        if not write_report(parts, say, report, head):
             sys.exit(1)
 
     def _level(self) -> CheckLevel:
         """Return the level; refuse options without an effect, and numbers that mean nothing."""
-        options: dict[CheckLevel, bool] = {
-            "wiring": self.wiring,
-            "leds": self.leds,
-            "faults": self.faults,
-        }
-        asked: list[CheckLevel] = [level for level, chosen in options.items() if chosen]
+        options = {"wiring": self.wiring, "leds": self.leds, "faults": self.faults}
+        asked = [level for level, chosen in options.items() if chosen]
         if len(asked) > 1:
             raise RobotError(f"Choose one of {' and '.join(f'--{level}' for level in asked)}.")
-        level: CheckLevel = asked[0] if asked else "plain"
+        level: Any = asked[0] if asked else "plain"
         pins = "goes with none of --twin, --wiring, --leds and --faults"
         drives_pins = level == "plain" and not self.twin
         has_supply = level in {"plain", "wiring"} and not self.twin
@@ -156,24 +151,20 @@ class CheckRobot:
             raise RobotError(f"At least one trial is needed, got {self.trials}.")
         return level
 
-    def _require_consent(self, plan: GuardPlan, *, asks: bool) -> None:
+    def _require_consent(self, profile: Profile, *, asks: bool) -> None:
         """Refuse to drive pins before a person has said that nothing can run away."""
-        if self.wiring:
-            return
-        if not self.leds:
-            if not self.wheels_up:
-                ask_for_wheels_up()
-            if self.jumper is not None:
-                say(f"{MARKS['good']}  jumper: {check_jumper(*self.jumper, plan)}")
-            require_pins(plan)
-            return
-        require_pins(plan)
-        if not (asks or self.yes):
+        if not self.leds and not self.wheels_up:
+            ask_for_wheels_up()
+        if self.jumper is not None:
+            say(f"{MARKS['good']}  jumper: {check_jumper(*self.jumper, profile)}")
+        require_pins(profile)
+        if self.leds and not (asks or self.yes):
             raise RobotError(
                 "All outputs will be driven: put LEDs in place of the motors, and say so with "
                 "--yes."
             )
-        if asks and not ask_person("All outputs will be driven. Is every motor taken off?"):
+        question = "All outputs will be driven. Is every motor taken off?"
+        if self.leds and asks and not ask_person(question):
             raise RobotError("Nothing was lit.")
 
 

@@ -1,17 +1,18 @@
-"""Pins that a robot uses, a test of two that it does not use, and LEDs in place of its motors."""
+"""Pins of a robot: their uses, their levels, two joined by a wire, and LEDs instead of motors."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.check import Finding, judged
+from shapechanger.robot.check.report import Checks, Results, judged
 from shapechanger.robot.drivers.chip import open_output
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
 from shapechanger.robot.guard.outputs import enable_device
 from shapechanger.robot.hardware import Hardware
@@ -22,7 +23,16 @@ _TOGGLES: Final = 50
 _SETTLES_S: Final = 0.002
 
 
-def pins_of(plan: GuardPlan) -> dict[int, str]:
+def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
+    """Refuse a machine without GPIO pins."""
+    if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
+        raise RobotError(
+            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
+            "`shapechanger robot serve --twin` runs it on simulated ones."
+        )
+
+
+def _pins_of(plan: GuardPlan) -> dict[int, str]:
     """Return the robot's pins and their uses."""
     used = driven_pins(plan)
     if plan.stop_pin is not None:
@@ -39,31 +49,25 @@ def plan_of_pins(plan: GuardPlan) -> list[str]:
     positions = {pin: position for position, pin in BCM_OF_BOARD.items()}
     return [
         f"pin          GPIO{pin} ({positions[pin]}): {use}"
-        for pin, use in sorted(pins_of(plan).items())
+        for pin, use in sorted(_pins_of(plan).items())
     ]
 
 
-def require_free_pin(pin: int, plan: GuardPlan) -> None:
-    """Refuse a pin that the header lacks, or that the robot uses.
-
-    Args:
-        pin: BCM number.
-        plan: The robot.
-    """
+def _require_free_pin(pin: int, plan: GuardPlan) -> None:
     if not 0 <= pin <= HIGHEST_BCM:
         raise RobotError(f"The header has the pins GPIO0 to GPIO{HIGHEST_BCM}, got {pin}.")
-    if use := pins_of(plan).get(pin):
+    if use := _pins_of(plan).get(pin):
         raise RobotError(f"Pin {pin} is used by {use}: join a free pin.")
 
 
 def probed_pin(plan: GuardPlan, probe: int) -> int:
-    """Return the pin that a probe has to be joined to: the one of the motor that drives forward.
+    """Return the pin that a probe has to be joined to, at the motor that drives forward.
 
     Args:
         plan: The robot.
         probe: BCM pin of the probe.
     """
-    require_free_pin(probe, plan)
+    _require_free_pin(probe, plan)
     for output in plan.outputs:
         weight = output.mix.get("throttle", 0.0)
         if weight and output.driver == "hbridge":
@@ -82,7 +86,7 @@ def check_jumper(
         output: BCM pin to drive, unused by the robot.
         sensed: BCM pin to read, unused by the robot.
         plan: The robot.
-        hardware: Its pins; those of this machine by default.
+        hardware: Its pins; the pins of this machine by default.
 
     Returns:
         Description of the result.
@@ -90,7 +94,7 @@ def check_jumper(
     from gpiozero import DigitalInputDevice, DigitalOutputDevice
 
     for pin in (output, sensed):
-        require_free_pin(pin, plan)
+        _require_free_pin(pin, plan)
     if output == sensed:
         raise RobotError(f"A jumper joins two pins, got {output} twice.")
     with closing(hardware or RealHardware()) as pins:
@@ -109,13 +113,21 @@ def check_jumper(
     return f"pin {sensed} followed pin {output} {_TOGGLES} times."
 
 
-def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
-    """Refuse a machine without GPIO pins."""
-    if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
-        raise RobotError(
-            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
-            "`shapechanger robot serve --twin` runs it on simulated ones."
-        )
+def outside_level(pin: int, hardware: Hardware) -> int | None:
+    """Return the level that resistors outside give a pin; None if its own resistor decides."""
+    up, down = (pin_level(pin, hardware, pull_up=pull_up) for pull_up in (True, False))
+    return up if up == down else None
+
+
+def pin_level(pin: int, hardware: Hardware, *, pull_up: bool) -> int:
+    """Return the level of a pin with the Pi's own resistor; it floats again afterwards."""
+    from gpiozero import InputDevice  # Robots without pins do not need gpiozero.
+
+    with (
+        device_errors(f"GPIO{pin}"),
+        InputDevice(pin, pull_up=pull_up, pin_factory=hardware.pin_factory()) as device,
+    ):
+        return int(device.is_active != pull_up)
 
 
 SHOWN_S: Final = 0.5
@@ -126,7 +138,7 @@ Ask = Callable[[str], bool | None]
 
 
 class BenchLamp(NamedTuple):
-    """An LED in place of a motor or servo.
+    """An LED instead of a motor or servo.
 
     Attributes:
         name: Its output and direction, such as "drive forward".
@@ -139,8 +151,8 @@ class BenchLamp(NamedTuple):
     name: str
     place: str
     output: OutputPlan | None
-    value: float = 1.0
-    pin: int | None = None
+    value: float
+    pin: int | None
 
 
 def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
@@ -164,7 +176,7 @@ def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
                 add(f"{name}, dimly", settings["pin"], output)
             case "servo" | "esc":
                 place = f"channel {settings['channel']} of the {settings['over']}"
-                found.append(BenchLamp(f"{name}, dimly", place, output))
+                found.append(BenchLamp(f"{name}, dimly", place, output, 1.0, None))
             case driver:
                 raise RobotError(
                     f"Output {name} is a servo on a bus ({driver}), and an LED cannot stand for "
@@ -175,16 +187,15 @@ def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
 
 
 @contextmanager
-def lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
+def _lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
     """Light one LED, through the driver of its output, and put it out at the end."""
     if lamp.output is None:
-        device = enable_device(lamp.pin or 0, hardware)
-        try:
-            device.on()
-            yield
-        finally:
-            device.off()
-            device.close()
+        with closing(enable_device(lamp.pin or 0, hardware)) as device:
+            try:
+                device.on()
+                yield
+            finally:
+                device.off()
         return
     with closing(open_output(lamp.output, hardware)) as driver:
         driver.write(lamp.value, hardware.clock.now_ns())
@@ -192,14 +203,14 @@ def lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
         driver.write(0.0, hardware.clock.now_ns())
 
 
-def walk(
+def lamp_checks(
     plan: GuardPlan,
     connect_pins: Callable[[], Hardware],
     ask: Ask,
     sees: Callable[[BenchLamp], bool | None],
     shown_s: float = SHOWN_S,
-) -> Iterator[Finding]:
-    """Light each LED alone, and ask or measure whether it is lit.
+) -> Checks:
+    """Yield a check of each LED, which lights it alone, and asks or measures whether it is lit.
 
     Args:
         plan: The robot.
@@ -208,24 +219,25 @@ def walk(
         sees: Measures whether an LED is lit; None if it cannot.
         shown_s: Time for which an LED is lit when nobody answers, s.
     """
-    for lamp in lamps_of(plan):
-        name = f"LED {lamp.place}"
-        hardware = connect_pins()  # Afresh, because a closed output stays claimed.
+
+    def check(lamp: BenchLamp) -> Results:
         try:
-            with lit(lamp, hardware):
+            # Opened afresh, because a closed output stays claimed.
+            with closing(connect_pins()) as hardware, _lit(lamp, hardware):
                 answer = ask(f"Is the LED on {lamp.place} lit ({lamp.name})?")
                 if answer is None:
                     time.sleep(shown_s)
                 measured = sees(lamp)
         except RobotError as error:
-            yield Finding(name, "bad", f"{lamp.name}: {error}")
-            continue
-        finally:
-            hardware.close()
-        words = {True: "lit", False: "NOT lit", None: "not asked"}[answer]
+            yield "bad", f"{lamp.name}: {error}"
+            return
+        seen = {True: "lit", False: "NOT lit", None: "not asked"}[answer]
         if measured is not None:
-            words += f", measured as {'lit' if measured else 'NOT lit'}"
+            seen += f", measured as {'lit' if measured else 'NOT lit'}"
         if answer is None and measured is None:
-            yield Finding(name, "unknown", f"{lamp.name}: {words}.")
+            yield "unknown", f"{lamp.name}: {seen}."
         else:
-            yield Finding(name, *judged(False not in (answer, measured), f"{lamp.name}: {words}."))
+            yield judged(False not in (answer, measured), f"{lamp.name}: {seen}.")
+
+    for lamp in lamps_of(plan):
+        yield f"LED {lamp.place}", check(lamp)

@@ -2,38 +2,64 @@
 
 from __future__ import annotations
 
-import selectors
+import asyncio
 import socket
 import struct
-import threading
-import time
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Final, Self
+from collections.abc import Coroutine
+from threading import Thread
+from typing import Any, Final, Self
 
-_CHUNK: Final = 16 * 1024
-_MAX_QUEUED: Final = 1024 * 1024  # Bytes that one direction queues before it stops reading.
-_POLL_S: Final = 0.01
+_POLL_S: Final = 0.001
 # Linger for 0 s: closing then sends a reset instead of an orderly end.
 _RESET: Final = struct.pack("ii", 1, 0)
 
 
-@dataclass
-class _Stream:
-    """One direction of a connection.
+class _End(asyncio.Protocol):
+    """One end of a connection; data that arrives here leaves from the other end.
 
-    Attributes:
-        source: Socket to read from.
-        sink: Socket to write to.
-        queue: Data to write, each with the earliest time for it, s.
-        size: Number of bytes in the queue.
+    Args:
+        network: The network.
+        other: The end at the driver; None for that end, which makes the robot's.
     """
 
-    source: socket.socket
-    sink: socket.socket
-    queue: deque[tuple[float, bytes]] = field(default_factory=deque[tuple[float, bytes]])
-    size: int = 0
+    transport: Any = None
+
+    def __init__(self, network: BadNetwork, other: _End | None = None) -> None:
+        self._network = network
+        self.faces_robot = other is not None
+        self.other = other or _End(network, self)
+        self._queue: deque[tuple[float, bytes]] = deque()  # With the earliest time for it, s.
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = transport
+        self._network.ends.append(self)
+
+    def data_received(self, data: bytes) -> None:
+        network = self._network
+        step = network.slice_bytes or len(data)
+        due_s = network.loop.time() + network.latency_s
+        is_polled = bool(self._queue)
+        self._queue.extend((due_s, data[at : at + step]) for at in range(0, len(data), step))
+        if not is_polled:
+            self._pass_on()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._network.ends.remove(self)
+        self._queue.clear()
+        if self.other.transport is not None:
+            self.other.transport.close()
+
+    def _pass_on(self) -> None:
+        network, sink = self._network, self.other.transport
+        while self._queue and sink is not None and not network.silent:
+            due_s, data = self._queue[0]
+            if due_s > network.loop.time():
+                break
+            sink.write(data)
+            self._queue.popleft()
+        if self._queue:
+            network.loop.call_later(_POLL_S, self._pass_on)
 
 
 class BadNetwork:
@@ -41,28 +67,27 @@ class BadNetwork:
 
     Args:
         port: Port of 127.0.0.1 to forward to.
-        clock: Time of the latency, s.
 
     Attributes:
         latency_s: Delay of each byte, s.
         slice_bytes: Most bytes to forward at once; 0 for any number.
         silent: Whether to block all data while connections stay open, as when a radio dies.
+        loop: Loop of its thread.
+        ends: Ends of the open connections.
+        port: Port on which it listens.
     """
 
-    def __init__(self, port: int, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, port: int) -> None:
         self.latency_s = 0.0
         self.slice_bytes = 0
         self.silent = False
-        self._port = port
-        self._clock = clock
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._listener, selectors.EVENT_READ)
-        self._streams: list[_Stream] = []
-        self._lock = threading.Lock()
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="bad network", daemon=True)
+        self.ends: list[_End] = []
+        self._robot_port = port
+        self.loop = asyncio.new_event_loop()
+        self._thread = Thread(target=self.loop.run_forever, name="bad network", daemon=True)
         self._thread.start()
+        self._server = self._run(self.loop.create_server(self._accepted, "127.0.0.1", 0))
+        self.port: int = self._server.sockets[0].getsockname()[1]
 
     def __enter__(self) -> Self:
         """Return the network."""
@@ -72,106 +97,44 @@ class BadNetwork:
         """Close the network."""
         self.close()
 
-    @property
-    def port(self) -> int:
-        """Port on which it listens."""
-        return self._listener.getsockname()[1]
-
     def reset(self) -> None:
         """Reset all connections, as a router does after a restart."""
-        with self._lock:
-            for stream in self._streams:
-                stream.source.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
-            self._drop_all()
+        self._run(self._drop_all(reset=True))
 
     def half_close(self) -> None:
         """End the direction towards the robot of all connections."""
-        with self._lock:
-            for stream in self._streams[::2]:
-                stream.sink.shutdown(socket.SHUT_WR)
+        self._run(self._half_close())
 
     def close(self) -> None:
         """End all connections and the thread."""
-        self._ended.set()
+        self._run(self._drop_all(reset=False))
+        self.loop.call_soon_threadsafe(self._server.close)
+        self.loop.call_soon_threadsafe(self.loop.stop)
         self._thread.join()
-        with self._lock:
-            self._drop_all()
-        self._listener.close()
-        self._selector.close()
+        self.loop.close()
 
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            for key, _ in self._selector.select(_POLL_S if self._idle() else 0.001):
-                with self._lock:
-                    if key.fileobj is self._listener:
-                        self._accept()
-                    elif isinstance(key.data, _Stream):
-                        self._read(key.data)
-            with self._lock:
-                for stream in tuple(self._streams):
-                    self._write(stream)
+    def _run(self, act: Coroutine[Any, Any, Any]) -> Any:
+        return asyncio.run_coroutine_threadsafe(act, self.loop).result()
 
-    def _idle(self) -> bool:
-        return self.silent or not any(stream.queue for stream in self._streams)
+    def _accepted(self) -> _End:
+        near = _End(self)
+        self._joining = self.loop.create_task(self._join(near))
+        return near
 
-    def _accept(self) -> None:
-        client, _ = self._listener.accept()
+    async def _join(self, near: _End) -> None:
         try:
-            robot = socket.create_connection(("127.0.0.1", self._port), 5.0)
+            await self.loop.create_connection(lambda: near.other, "127.0.0.1", self._robot_port)
         except OSError:
-            client.close()  # As if the robot refused the connection.
-            return
-        for one in (client, robot):
-            one.setblocking(False)
-            one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        for stream in (_Stream(client, robot), _Stream(robot, client)):
-            self._streams.append(stream)
-            self._selector.register(stream.source, selectors.EVENT_READ, stream)
+            near.transport.close()  # As if the robot refused the connection.
 
-    def _read(self, stream: _Stream) -> None:
-        if stream.size >= _MAX_QUEUED or stream not in self._streams:
-            return
-        try:
-            data = stream.source.recv(_CHUNK)
-        except BlockingIOError:
-            return
-        except OSError:
-            data = b""
-        if not data:
-            self._drop(stream)
-            return
-        step = self.slice_bytes or len(data)
-        for start in range(0, len(data), step):
-            stream.queue.append((self._clock() + self.latency_s, data[start : start + step]))
-        stream.size += len(data)
+    async def _drop_all(self, *, reset: bool) -> None:
+        for end in self.ends:
+            if reset:
+                linger = (socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+                end.transport.get_extra_info("socket").setsockopt(*linger)
+            end.transport.abort()
 
-    def _write(self, stream: _Stream) -> None:
-        now_s = self._clock()
-        while stream.queue and not self.silent and stream.queue[0][0] <= now_s:
-            due, data = stream.queue[0]
-            try:
-                sent = stream.sink.send(data)
-            except BlockingIOError:
-                return
-            except OSError:
-                self._drop(stream)
-                return
-            stream.size -= sent
-            if sent < len(data):
-                stream.queue[0] = (due, data[sent:])
-                return
-            stream.queue.popleft()
-
-    def _drop(self, stream: _Stream) -> None:
-        """End both directions of a connection."""
-        pair = {stream.source, stream.sink}
-        for other in tuple(self._streams):
-            if other.source in pair:
-                self._streams.remove(other)
-                self._selector.unregister(other.source)
-        for one in pair:
-            one.close()
-
-    def _drop_all(self) -> None:
-        while self._streams:
-            self._drop(self._streams[0])
+    async def _half_close(self) -> None:
+        for end in self.ends:
+            if end.faces_robot:
+                end.transport.get_extra_info("socket").shutdown(socket.SHUT_WR)

@@ -17,7 +17,7 @@ def test_a_probe_measures_the_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     now_ns = 0
     monkeypatch.setattr("time.monotonic_ns", lambda: now_ns)
     pins = HeldPins()
-    plan = shipped("car").guard_plan()
+    plan = shipped("car")
     watcher = ProbeWatcher(20, probed_pin(plan, 20), pins)
     wire = pins.factory.pin(20)
     now_ns = 1_000_000_000

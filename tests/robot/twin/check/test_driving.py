@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.check.check import Finding
+from shapechanger.robot.check.report import Finding
 from shapechanger.robot.twin.check.driving import check_driving
 from shapechanger.robot.twin.robot import run_robot
 from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile

@@ -1,34 +1,143 @@
-"""Trials on pins, where a person or a probe sees what a twin's ledger would have."""
+"""Trials of faults, their findings, and the levels of a check."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Iterator
 from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
+from shapechanger.cli import main
+from shapechanger.errors import RobotError
+from shapechanger.robot.check.report import Finding
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.twin.check import trial as module
 from shapechanger.robot.twin.check.bench import Bench, Watcher
-from shapechanger.robot.twin.check.faults import Fault
-from shapechanger.robot.twin.check.trial import Trial
+from shapechanger.robot.twin.check.faults import FAULTS, Fault
+from shapechanger.robot.twin.check.trial import (
+    TrialResult,
+    check_robot,
+    fault_results,
+    lacks,
+    require_level,
+    run_trial,
+)
 from tests.robot.check.held_pins import shipped
 
 
-class _Stopped(Watcher):
-    """A probe that saw the output stop at once."""
+def _result(stopped_ms: float, *, drove: bool = True, answer: bool | None = None) -> TrialResult:
+    return TrialResult(stopped_ms, 270.0, drove, answer=answer)
 
-    def moves(self) -> bool:
-        return False
 
-    def rest_ms(self, at_ns: int) -> float:
-        return 7.0
+_VOID = _result(0.0, drove=False)
+
+
+def _findings(
+    monkeypatch: pytest.MonkeyPatch, *results: TrialResult | RobotError, trials: int = 1
+) -> list[tuple[str, str]]:
+    """Return the findings of a fault whose trials have given results."""
+    given = list(results)
+
+    def run(*_: object) -> TrialResult:
+        result = given.pop(0)
+        if isinstance(result, RobotError):
+            raise result
+        return result
+
+    monkeypatch.setattr(module, "run_trial", run)
+    return list(fault_results(Bench(shipped("car")), FAULTS["driver killed"], trials))
+
+
+@pytest.mark.parametrize(
+    ("results", "level", "sentence"),
+    [
+        ([_result(251.0)], "good", "At rest 251 ms later; 270 ms are promised."),
+        ([_result(271.0)], "bad", "At rest 271 ms later; 270 ms are promised."),
+        ([_result(math.inf)], "bad", "At rest never; 270 ms are promised."),
+        ([_VOID, _result(251.0)], "good", "At rest 251 ms later; 270 ms are promised."),
+        ([_VOID, _VOID, _VOID], "bad", "It did not drive before the fault."),
+        ([RobotError("The driver did not drive.")], "bad", "The driver did not drive."),
+        ([_result(math.nan, answer=True)], "good", "The LEDs were lit, and then out."),
+        ([_result(math.nan, answer=False)], "bad", "NOT lit, or NOT out afterwards."),
+        (
+            [_result(math.nan)],
+            "unknown",
+            "Not measured: a wire to a free pin does, with --probe; 270 ms are promised.",
+        ),
+    ],
+)
+def test_a_fault_is_a_check(
+    monkeypatch: pytest.MonkeyPatch,
+    results: list[TrialResult | RobotError],
+    level: str,
+    sentence: str,
+) -> None:
+    """It is good only if the stop was in time, and was measured or seen."""
+    assert _findings(monkeypatch, *results) == [(level, sentence)]
+
+
+def test_trials_of_one_fault_are_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One late stop among them is bad."""
+    results = map(_result, (200.0, 300.0, 210.0))
+    ((level, sentence),) = _findings(monkeypatch, *results, trials=3)
+    assert level == "bad"
+    assert sentence.startswith("At rest 210 ms later, and at most 300 ms in 3 trials; 270")
+
+
+def test_faults_need_parts_of_a_robot() -> None:
+    bench = Bench(shipped("car"))
+    assert not lacks(bench, "")
+    assert lacks(bench, "bumper") == "This robot has no bumper."
+    assert lacks(Bench(shipped("finger")), "throttle") == "This robot has no throttle."
+    # Only a board makes the other faults.
+    assert {fault.needs for fault in FAULTS.values() if fault.on_pins} == {"", "one-shot"}
+
+
+@pytest.mark.parametrize(
+    ("level", "words"),
+    [("leds", "an LED cannot stand for it"), ("faults", "there is nothing to stop")],
+)
+def test_levels_that_a_robot_cannot_have(level: Literal["leds", "faults"], words: str) -> None:
+    """They are refused before anything starts."""
+    with pytest.raises(RobotError, match=words):
+        require_level(level, Bench(shipped("finger")))
+
+
+def test_a_part_is_named_before_its_questions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its heading comes before anything is asked or opened, and each part ends at rest."""
+    bench: Any = Bench(shipped("car"))
+    events: list[str] = []
+
+    def lit() -> Iterator[tuple[str, str]]:
+        events.append("lit")
+        yield "good", "lit."
+
+    def closed() -> list[str]:
+        events.append("closed")
+        return ["GPIO22 burns."]
+
+    monkeypatch.setattr(module, "lamp_checks", lambda *_: [("LED GPIO22", lit())])
+    monkeypatch.setattr(module, "examine", lambda _: iter(()))
+    bench.watcher, bench.close = Watcher, closed
+    parts = check_robot("leds", bench, StandingRobot(bench.profile), cap=0.2)
+    assert next(parts)[0] == "wiring"
+    part, findings = next(parts)
+    assert (part, events) == ("LEDs", [])
+    assert list(findings) == [
+        Finding("LED GPIO22", "good", "lit."),
+        Finding("safe pins", "bad", "GPIO22 burns."),
+    ]
+    assert events == ["lit", "closed"]
 
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A bench on pins whose robot, driver and network are none; `events` has what it does."""
+    """A bench on pins without a robot, driver and network; `events` has its calls."""
     events: list[str] = []
     robot: Any = SimpleNamespace(port=1, known_at=lambda _: None)
     driver = SimpleNamespace(sent=[], await_commands=lambda _: None)
@@ -38,55 +147,81 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(module, "BadNetwork", lambda port: nullcontext(SimpleNamespace(port=port)))
     monkeypatch.setattr(module, "Driver", lambda *_, **__: nullcontext(driver))
     made: Any = Bench(shipped("car"), twin=False)
-    monkeypatch.setattr(made, "robot", lambda: robot)
-    monkeypatch.setattr(made, "watcher", Watcher)
-    monkeypatch.setattr(made, "close", lambda: events.append("closed") or [])
+    made.robot = lambda: robot
+    made.watcher = Watcher
+    made.close = lambda: events.append("closed") or []
     made.events = events
     return made
 
 
-def _fault(events: list[str]) -> Fault:
+def _fault(bench: Any) -> Fault:
     def make(_: object) -> int:
-        events.append("fault")
+        bench.events.append("fault")
         return 0
 
     return Fault("guard and supervisor killed", make, 1.0, then="is gone", needs="one-shot")
 
 
 def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
-    """Whatever makes them safe would also put out an LED that stayed lit."""
-    events: list[str] = bench.events
+    """Making them safe would also put out an LED that stayed lit."""
 
     def ask(question: str) -> bool:
-        events.append(question)
+        bench.events.append(question)
         return False
 
-    trial = Trial(bench, ask=ask)
-    assert list(trial.results(_fault(events))) == [("bad", "NOT lit, or NOT out afterwards.")]
-    assert events == [
+    bench.ask = ask
+    found = list(fault_results(bench, _fault(bench), 1))
+    assert found == [("bad", "NOT lit, or NOT out afterwards.")]
+    assert bench.events == [
         "fault",
         "Did a motor's LED light up, and are all of them out now (guard and supervisor killed)?",
         "closed",
     ]
 
 
-def test_a_probe_is_asked_first(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where it never saw the motor driven, the trial is void."""
-    monkeypatch.setattr(bench, "watcher", _Stopped)
+def test_a_probe_is_asked_first(bench: Any) -> None:
+    """If it never saw the motor driven, the trial is void."""
     asked: list[str] = []
-    result = Trial(bench, ask=asked.append).run(_fault(bench.events))
+    watcher: Any = Watcher()
+    watcher.moves, watcher.rest_ms = (lambda: False), (lambda _: 7.0)
+    bench.watcher, bench.ask = (lambda: watcher), asked.append
+    result = run_trial(bench, _fault(bench))
     assert (result.stopped_ms, result.drove, result.kept, asked) == (7.0, False, False, [])
 
 
-def test_nobody_sees_the_stop(bench: Any) -> None:
-    result = Trial(bench).run(_fault(bench.events))
+def test_without_a_measurement_no_promise_is_kept(bench: Any) -> None:
+    result = run_trial(bench, _fault(bench))
     assert math.isnan(result.stopped_ms)
     assert not result.kept
 
 
-def test_pins_that_stay_driven_are_bad(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pins_that_stay_driven_are_bad(bench: Any) -> None:
     """The finding names them, and the next fault is tried all the same."""
     failures = [["GPIO22 is stuck."], []]
-    monkeypatch.setattr(bench, "close", lambda: failures.pop(0))
-    found = Trial(bench).results(_fault(bench.events))
-    assert list(found) == [("bad", "Not everything is at rest: GPIO22 is stuck.")]
+    bench.close = lambda: failures.pop(0)
+    found = list(fault_results(bench, _fault(bench), 1))
+    assert found == [("bad", "Not everything is at rest: GPIO22 is stuck.")]
+
+
+@pytest.mark.realtime
+@pytest.mark.system
+def test_the_bench_of_a_twin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """LEDs, checks and faults run as on a Pi, judged by the ledger, and end in one report."""
+    monkeypatch.chdir(tmp_path)
+    # A busy machine may be late, which this test does not check.
+    with contextlib.suppress(SystemExit):
+        main(["robot", "check", "car", "--twin", "--leds"])
+    (report,) = tmp_path.iterdir()
+    text = report.read_text()
+    assert report.name == "leds-report.txt"
+    for part in ("wiring", "LEDs", "driving", "faults"):
+        assert f"\n\n{part}\n" in text
+    for place in ("GPIO22", "GPIO27", "GPIO4", "GPIO17", "GPIO19"):
+        assert f"good  LED {place}: " in text
+    for name, fault in FAULTS.items():
+        assert (f"  {name}: At rest " in text) == fault.on_pins
+    assert "At rest never" not in text
+    assert text.strip().endswith("not measured.")
+    assert "wrote leds-report.txt" in capsys.readouterr().out

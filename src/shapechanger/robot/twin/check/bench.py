@@ -1,16 +1,16 @@
-"""Where a robot is checked: its twin or the pins of this machine, and who sees what they do."""
+"""Where a robot is checked: its twin or the pins of this machine, and how its outputs are seen."""
 
 from __future__ import annotations
 
 import math
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Final, Self
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.pins import BenchLamp, probed_pin
+from shapechanger.robot.check.pins import Ask, BenchLamp, probed_pin
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.outputs import make_safe
@@ -18,9 +18,7 @@ from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.twin.hardware import connect
-from shapechanger.robot.twin.judge import time_to_rest
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
-from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import BoardAt, start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 
@@ -29,16 +27,13 @@ _PWM_S: Final = 0.04
 
 
 class Watcher:
-    """Measures what the outputs do, independently of the robot's programs; this one nothing."""
+    """Measures the outputs, independently of the robot's programs; this one measures nothing."""
 
     def sees(self, lamp: BenchLamp) -> bool | None:
         """Return whether an LED is lit; None if that is not measured."""
-        del lamp
-        return None
 
     def moves(self) -> bool | None:
         """Return whether an output that propels is driven now; None if that is not measured."""
-        return None
 
     def rest_ms(self, at_ns: int) -> float:
         """Return the time from a moment to the last propulsion after it, ms.
@@ -52,13 +47,13 @@ class Watcher:
         """Stop watching."""
 
 
-class LedgerWatcher(Watcher):
-    """Reads the levels and the ledger of a twin."""
+class BoardWatcher(Watcher):
+    """Reads the levels of a twin, whose ledger has the times."""
 
     def __init__(self, board: BoardAt, wiring: TwinWiring) -> None:
-        self._board = board
         self._wiring = wiring
         self._operator = Operator(board.socket_path)
+        self.close = self._operator.close
 
     def sees(self, lamp: BenchLamp) -> bool | None:
         """See `Watcher`."""
@@ -75,14 +70,6 @@ class LedgerWatcher(Watcher):
         """See `Watcher`."""
         outputs = self._wiring.read(self._operator.levels(), time.monotonic_ns())
         return not all(outputs[name].at_rest for name in self._wiring.propelling)
-
-    def rest_ms(self, at_ns: int) -> float:
-        """See `Watcher`."""
-        return 1e3 * time_to_rest(read_ledger(self._board.ledger_path), self._wiring, at_ns)
-
-    def close(self) -> None:
-        """See `Watcher`."""
-        self._operator.close()
 
 
 class ProbeWatcher(Watcher):
@@ -133,9 +120,16 @@ class Bench:
     Args:
         profile: The robot.
         twin: Whether on its twin.
-        one_shot: Whether a twin has the one-shot of the enable line, where the profile has one.
+        one_shot: Whether a twin has the one-shot of the enable line, if the profile has one.
         probe: Free BCM pin with a wire to the pin of the motor that drives forward; None without.
         arguments: Further arguments of `serve`.
+        pilot: Module of the program that drives as a policy on board; see `Driver`.
+        ask: Asks a person.
+
+    Attributes:
+        plan: The robot, for its guard.
+        wiring: Wiring of a twin.
+        restarts: How often the robot has restarted since it was served.
     """
 
     def __init__(
@@ -146,12 +140,17 @@ class Bench:
         one_shot: bool = True,
         probe: int | None = None,
         arguments: tuple[str, ...] = (),
+        pilot: str = "",
+        ask: Ask = lambda _: None,
     ) -> None:
+        if twin and probe is not None:
+            raise RobotError("A twin needs no --probe: its ledger has every change of a pin.")
         self.profile = profile
         self.plan = profile.guard_plan()
         self.twin = twin
-        if twin and probe is not None:
-            raise RobotError("A twin needs no --probe: its ledger has every change of a pin.")
+        self.pilot = pilot
+        self.ask = ask
+        self.restarts = 0
         self._one_shot_ms = float(self.plan.enable_hold_ms) if one_shot else None
         self.wiring = TwinWiring(self.plan, self._one_shot_ms)
         self._probe = None if probe is None else (probe, probed_pin(self.plan, probe))
@@ -159,6 +158,14 @@ class Bench:
         self._board: BoardAt | None = None
         self._robot: RunningRobot | None = None
         self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        """Return the bench."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
 
     def board(self) -> BoardAt:
         """Return the board of the twin; it outlives the robot's processes, as hardware does."""
@@ -180,9 +187,9 @@ class Bench:
         return connect(self.board().socket_path) if self.twin else RealHardware()
 
     def watcher(self) -> Watcher:
-        """Open what measures the outputs."""
+        """Open a watcher of the outputs."""
         if self.twin:
-            return LedgerWatcher(self.board(), self.wiring)
+            return BoardWatcher(self.board(), self.wiring)
         return Watcher() if self._probe is None else ProbeWatcher(*self._probe, RealHardware())
 
     def robot(self) -> RunningRobot:
@@ -196,18 +203,16 @@ class Bench:
         return self._robot
 
     def close(self) -> list[str]:
-        """End everything, and put the pins of this machine at rest, whatever a fault has left.
+        """End everything, and put the pins of this machine at rest after any fault.
 
         Returns:
             Outputs that could not be put at rest.
         """
         was_served = self._robot is not None
         self._robot = self._board = None
+        self.restarts = 0
         self._stack.close()
         if self.twin or not was_served:
             return []
-        hardware = RealHardware()
-        try:
+        with closing(RealHardware()) as hardware:
             return make_safe(self.plan, hardware)
-        finally:
-            hardware.close()

@@ -1,8 +1,8 @@
 """Program that drives at full throttle in a separate process.
 
 It is started by path, reads the robot's address from standard input, and prints the time of each
-sent command on a line: monotonic, ns. A pilot in its place, which drives as a policy on board does,
-fails at a signal, as `FAILURES` has it.
+sent command on a line: monotonic, ns. A pilot, which drives as a policy on board does, replaces it
+for faults of policies, and fails at a signal of `FAILURES`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FAILURES: Final = {
     "is late": signal.SIGUSR2,
     "gives NaN": signal.SIGALRM,
 }
-"""Signal at which a policy fails, by how it fails."""
+"""Signal at which a policy fails, keyed by how it fails."""
 
 
 class Driver:
@@ -47,18 +47,18 @@ class Driver:
     def __init__(self, robot: KnownRobot, within: Sequence[str] = (), *, pilot: str = "") -> None:
         self._folder = TemporaryDirectory(prefix="shapechanger-driver-")
         # Files and not pipes, which a driver that is never read would fill.
-        self._sent, self._words = (Path(self._folder.name, name) for name in ("sent", "words"))
-        with self._sent.open("wb") as sent, self._words.open("wb") as words:
+        self._sent, self._log = (Path(self._folder.name, name) for name in ("sent", "log"))
+        with self._sent.open("wb") as sent, self._log.open("wb") as log:
             self.process = subprocess.Popen(
                 # By path, so that little is imported.
                 [*within, sys.executable, "-P", *(["-m", pilot] if pilot else [__file__])],
                 stdin=subprocess.PIPE,
                 stdout=sent,
-                stderr=words,
+                stderr=log,
             )
-        if self.process.stdin is not None:
-            self.process.stdin.write(msgspec.json.encode(asdict(robot)))
-            self.process.stdin.close()
+        assert self.process.stdin is not None
+        with self.process.stdin as address:
+            address.write(msgspec.json.encode(asdict(robot)))
 
     def __enter__(self) -> Self:
         """Return the driver."""
@@ -72,7 +72,7 @@ class Driver:
 
     @property
     def sent(self) -> list[int]:
-        """Return the time of each sent command, ns."""
+        """Time of each sent command, ns."""
         return [int(line) for line in self._sent.read_bytes().split(b"\n")[:-1]]
 
     def await_commands(self, count: int) -> None:
@@ -80,8 +80,8 @@ class Driver:
         until_s = time.monotonic() + _STARTED_S
         while len(self.sent) < count:
             if self.process.poll() is not None or time.monotonic() > until_s:
-                words = self._words.read_text(errors="replace").strip()
-                raise RobotError(f"The driver did not drive: {words}")
+                log = self._log.read_text(errors="replace").strip()
+                raise RobotError(f"The driver did not drive: {log}")
             time.sleep(0.002)
 
 

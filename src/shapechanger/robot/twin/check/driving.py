@@ -7,11 +7,10 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Final
 
 from shapechanger.layout import Layout
-from shapechanger.robot.check.check import Check, Finding, Results, judged, run_checks
+from shapechanger.robot.check.report import Checks, Finding, Results, judged, run_checks
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.robot import RunningRobot
@@ -25,14 +24,8 @@ _HEARD_S: Final = 1.0
 _STANDS_MPS: Final = 0.02
 
 
-class DrivenRobot:
-    """A robot with its wheels off the ground, driven by a person.
-
-    Args:
-        robot: The running robot.
-        profile: Its profile.
-        cap: Largest throttle, 0 to 1.
-    """
+class _DrivenRobot:
+    """A robot with its wheels off the ground, driven by a person."""
 
     def __init__(self, robot: RunningRobot, profile: Profile, cap: float) -> None:
         self.robot = robot
@@ -47,7 +40,7 @@ class DrivenRobot:
     def connect(self) -> None:
         """Take control over a new connection."""
         self.client = self.robot.client(role="person", frames=False, name="check")
-        self._state = Layout.from_json(self.client.welcome.state_layout)
+        self._state = Layout.from_json(self.client.welcome.state_layout).names
         self.client.take()
 
     @property
@@ -87,20 +80,20 @@ class DrivenRobot:
         """Return the measured speed, m/s; None without a sensor."""
         if seen.sources.get("speed", "absent") in {"absent", "estimated"}:
             return None
-        return dict(zip(self._state.names, seen.state, strict=True)).get("speed")
+        return dict(zip(self._state, seen.state, strict=True)).get("speed")
 
 
-def _stands(_: DrivenRobot) -> Results:
+def _stands() -> Results:
     yield "unknown", "Nothing of this robot propels."
 
 
-def _boots_disarmed(robot: DrivenRobot) -> Results:
+def _boots_disarmed(robot: _DrivenRobot) -> Results:
     seen = robot.push()
     good = not seen.armed and robot.at_rest(seen)
     yield judged(good, f"Commands before arming: {seen.stop_reason}")
 
 
-def _drives(robot: DrivenRobot) -> Results:
+def _drives(robot: _DrivenRobot) -> Results:
     robot.client.arm()
     seen = robot.push(_DRIVES_S)
     speed = robot.speed(seen)
@@ -112,7 +105,7 @@ def _drives(robot: DrivenRobot) -> Results:
         yield judged(speed > 0.0, f"The encoder says {speed:+.2f} m/s for forward.")
 
 
-def _silence(robot: DrivenRobot) -> Results:
+def _silence(robot: _DrivenRobot) -> Results:
     """Stop commanding and measure how long the outputs continue, on the robot's clock."""
     told_ns = robot.push(0.5).command_ns
     seen = robot.watch(robot.at_rest, _COASTS_S)
@@ -121,11 +114,11 @@ def _silence(robot: DrivenRobot) -> Results:
         return
     stopped_ms = (seen.state_ns - told_ns) / 1e6
     limit_ms = robot.profile.limits.deadline_ms + _SLACK_MS + 1e3 / robot.profile.control_hz
-    words = f"At rest at most {stopped_ms:.0f} ms after the last command."
-    yield judged(stopped_ms <= limit_ms, words)
+    sentence = f"At rest at most {stopped_ms:.0f} ms after the last command."
+    yield judged(stopped_ms <= limit_ms, sentence)
 
 
-def _coasts(robot: DrivenRobot) -> Results:
+def _coasts(robot: _DrivenRobot) -> Results:
     """Measure how long the wheels coast."""
     if robot.speed(robot.look()) is None:
         yield "unknown", "No encoder measures the wheels."
@@ -136,16 +129,19 @@ def _coasts(robot: DrivenRobot) -> Results:
     yield judged(seen is not None, f"The wheels stood {took_s:.2f} s later.")
 
 
-def _emergency(robot: DrivenRobot) -> Results:
+def _emergency(robot: _DrivenRobot) -> Results:
     robot.push()
     robot.client.emergency_stop("A check.")
-    seen = robot.watch(lambda o: o.emergency, _HEARD_S)
-    after = robot.push() if seen else None
-    good = after is not None and after.emergency and robot.at_rest(after)
-    yield judged(good, f"Commands after it: {after.stop_reason}" if after else "It was not heard.")
+    if robot.watch(lambda o: o.emergency, _HEARD_S) is None:
+        yield "bad", "It was not heard."
+        return
+    after = robot.push()
+    yield judged(
+        after.emergency and robot.at_rest(after), f"Commands after it: {after.stop_reason}"
+    )
 
 
-def _disarms(robot: DrivenRobot) -> Results:
+def _disarms(robot: _DrivenRobot) -> Results:
     robot.client.arm()
     robot.push()
     robot.client.disarm()
@@ -153,7 +149,7 @@ def _disarms(robot: DrivenRobot) -> Results:
     yield judged(seen is not None, seen.stop_reason if seen else "It did not.")
 
 
-def _crash(robot: DrivenRobot) -> Results:
+def _crash(robot: _DrivenRobot) -> Results:
     robot.client.arm()
     robot.push()
     robot.client.close()
@@ -162,25 +158,25 @@ def _crash(robot: DrivenRobot) -> Results:
     robot.robot.await_restart()
     robot.connect()
     seen = robot.look()
-    words = "The daemon was killed; the robot started afresh and stands still, not armed."
-    yield judged(not seen.armed and robot.at_rest(seen), words)
+    good = not seen.armed and robot.at_rest(seen)
+    yield judged(
+        good, "The daemon was killed; the robot started afresh and stands still, not armed."
+    )
 
 
-_OF_MOTION: Final = {
-    "drives": _drives,
-    "stops by silence": _silence,
-    "wheels stand": _coasts,
-    "emergency stop": _emergency,
-    "disarms": _disarms,
-    "disarmed after a crash": _crash,
-}
-
-
-def _driving_checks(robot: DrivenRobot) -> Iterator[Check]:
+def _checks(robot: _DrivenRobot) -> Checks:
     """Yield the checks, each of which begins with the state that the one before left."""
-    yield Check("boots disarmed", partial(_boots_disarmed, robot))
-    for name, run in _OF_MOTION.items():
-        yield Check(name, partial(run if robot.is_motive else _stands, robot))
+    motion = {
+        "drives": _drives,
+        "stops by silence": _silence,
+        "wheels stand": _coasts,
+        "emergency stop": _emergency,
+        "disarms": _disarms,
+        "disarmed after a crash": _crash,
+    }
+    yield "boots disarmed", _boots_disarmed(robot)
+    for name, check in motion.items():
+        yield name, check(robot) if robot.is_motive else _stands()
 
 
 def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Finding]:
@@ -191,8 +187,8 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
         profile: Its profile.
         cap: Largest throttle, 0 to 1.
     """
-    driven = DrivenRobot(robot, profile, cap)
+    driven = _DrivenRobot(robot, profile, cap)
     try:
-        yield from run_checks(_driving_checks(driven))
+        yield from run_checks(_checks(driven))
     finally:
         driven.client.close()

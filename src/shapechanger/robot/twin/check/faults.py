@@ -1,14 +1,14 @@
-"""Faults that a trial injects into a robot on its twin, each with the promised time to rest."""
+"""Faults of which a robot must stop: how each happens, and by when the robot is at rest."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, Literal
 
@@ -18,7 +18,6 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.link.messages import Role
-from shapechanger.robot.twin.camera import CameraFault
 from shapechanger.robot.twin.check.driver import FAILURES, Driver
 from shapechanger.robot.twin.network import BadNetwork
 from shapechanger.robot.twin.robot import Operator, RunningRobot
@@ -26,6 +25,20 @@ from shapechanger.robot.twin.robot import Operator, RunningRobot
 _LATE_S: Final = 1.0
 # Longest duration of an instantaneous fault; a longer one means that the machine was paused.
 _AT_ONCE_MS: Final = 5.0
+# Unlike a broken robot, a busy machine recovers.
+_UNTIMELY_ATTEMPTS: Final = 10
+
+
+class NotTried(RobotError):
+    """A fault could not be tried, which may succeed with a new robot.
+
+    Attributes:
+        attempts: After how many failed attempts to give up.
+    """
+
+    def __init__(self, message: str, attempts: int) -> None:
+        super().__init__(message)
+        self.attempts = attempts
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,25 +49,26 @@ class Scene:
         robot: The robot.
         driver: The driving process.
         network: The network between them.
-        operator: The operator beside the twin; None on pins.
-        strangers: Open connections without authentication.
+        opened: What to close after the trial.
+        twin: The operator of the robot's twin; None on pins.
     """
 
     robot: RunningRobot
     driver: Driver
     network: BadNetwork
-    operator: Operator | None
-    strangers: list[socket.socket] = field(default_factory=list[socket.socket])
+    opened: ExitStack
+    twin: Operator | None
 
-    def on_board(self) -> Operator:
-        """Return the operator."""
-        if self.operator is None:
+    @property
+    def board(self) -> Operator:
+        """The operator of the twin."""
+        if self.twin is None:
             raise RobotError("Only the board of a twin has this fault.")
-        return self.operator
+        return self.twin
 
 
-# Performs an action and returns its time: monotonic, ns.
-Make = Callable[[Scene], int]
+Make = Callable[[Scene], int | None]
+"""Lets a fault happen, and returns its time: monotonic, ns; None for the time of the call."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +77,12 @@ class Fault:
 
     Attributes:
         name: Description.
-        make: Injects it.
+        make: Lets it happen.
         within_ms: Promised time to rest after `after`, ms.
         after: How the robot can notice it: at once, by its deadline, or by the age of a frame.
-        undo: Reverts it.
         then: The robot afterwards: it continues, its processes restart, or it is gone.
         needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot". The
-            board makes the faults of the first three, and its ledger dates them.
+            board makes the faults of the first three, its ledger dates them, and it is repaired.
         harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
         silences: Whether later commands of the driver do not count.
         guards_late: Whether the guard itself fails, which adds its own promised time.
@@ -79,9 +92,8 @@ class Fault:
 
     name: str
     make: Make
-    within_ms: float
+    within_ms: float = 20.0
     after: Literal["", "deadline", "camera"] = ""
-    undo: Callable[[Scene], object] = lambda _: None
     then: Literal["goes on", "starts afresh", "is gone"] = "goes on"
     needs: Literal["", "camera", "bumper", "button", "one-shot"] = ""
     harms: bool = True
@@ -95,45 +107,36 @@ class Fault:
         waits = {"": 0, "deadline": limits.deadline_ms, "camera": limits.camera_stale_ms}
         return self.within_ms + waits[self.after]
 
-
-class Untimely(RobotError):
-    """The time of the fault is unknown, because the machine was paused."""
-
-
-def _now(act: Callable[[Scene], object]) -> Make:
-    """Wrap an action that starts now and may take a while."""
-
-    def make(scene: Scene) -> int:
-        at_ns = time.monotonic_ns()
-        act(scene)
-        return at_ns
-
-    return make
+    def repair(self, board: Operator) -> None:
+        """Repair the board after a fault that it has made."""
+        match self.needs:
+            case "camera":
+                board.break_camera("")
+            case "bumper":
+                board.press_bumper(down=False)
+            case "button":
+                board.press_stop(down=False)
+            case _:
+                pass
 
 
-def _at_once(act: Callable[[Scene], object]) -> Make:
-    """Wrap an instantaneous action; its time is unknown if it took long."""
-
-    def make(scene: Scene) -> int:
-        at_ns = _now(act)(scene)
-        took_ms = (time.monotonic_ns() - at_ns) / 1e6
-        if took_ms > _AT_ONCE_MS:
-            raise Untimely(f"It took {took_ms:.0f} ms to let the fault happen.")
-        return at_ns
-
-    return make
-
-
-def _signal(program: Literal["guard", "daemon"], number: signal.Signals) -> Make:
-    def make(scene: Scene) -> int:
-        pid = scene.robot.pid_of(program)
-        return _at_once(lambda _: os.kill(pid, number))(scene)
-
-    return make
+def _at_once(act: Callable[[], object]) -> int:
+    """Let an instantaneous fault happen and return its time, which is unknown if it took long."""
+    at_ns = time.monotonic_ns()
+    act()
+    took_ms = (time.monotonic_ns() - at_ns) / 1e6
+    if took_ms > _AT_ONCE_MS:
+        message = f"It took {took_ms:.0f} ms to let the fault happen."
+        raise NotTried(message, _UNTIMELY_ATTEMPTS)
+    return at_ns
 
 
 def _to_driver(number: signal.Signals) -> Make:
-    return _at_once(lambda scene: scene.driver.process.send_signal(number))
+    return lambda scene: _at_once(lambda: scene.driver.process.send_signal(number))
+
+
+def _to_program(program: Literal["guard", "daemon"], number: signal.Signals) -> Make:
+    return lambda scene: _at_once(partial(os.kill, scene.robot.pid_of(program), number))
 
 
 def _kill_both(scene: Scene) -> int:
@@ -146,35 +149,34 @@ def _kill_both(scene: Scene) -> int:
     return at_ns
 
 
-def _restore_network(scene: Scene) -> None:
-    scene.network.reset()
-    scene.network.silent = False
-    scene.network.latency_s = 0.0
+def _set_network(name: str, value: float) -> Make:
+    return lambda scene: _at_once(lambda: setattr(scene.network, name, value))
 
 
 def _knock_with_a_wrong_key(scene: Scene) -> None:
     known = replace(scene.robot.known, key=new_key())
     for _ in range(3):
-        with contextlib.suppress(RobotRefused):
+        with suppress(RobotRefused):
             RobotClient.connect(known).close()
 
 
 def _say_too_much(scene: Scene) -> None:
-    with contextlib.suppress(LinkError), scene.robot.client(frames=False) as client:
+    with suppress(LinkError), scene.robot.client(frames=False) as client:
         client.command([1.0] * 125_000, answers=0)
         client.ping()
 
 
 def _command_without_the_lease(client: RobotClient) -> None:
-    wanted = Layout.from_json(client.welcome.action_layout).size
+    size = Layout.from_json(client.welcome.action_layout).size
     for _ in range(10):
-        client.command([1.0] * wanted, answers=client.ask().message.seq)
+        client.command([1.0] * size, answers=client.ask().message.seq)
 
 
 def _connect_silently(scene: Scene) -> None:
     """Open connections without authenticating, as many as the robot accepts."""
     for _ in range(40):
-        scene.strangers.append(socket.create_connection(("127.0.0.1", scene.robot.port)))
+        stranger = socket.create_connection(("127.0.0.1", scene.robot.port))
+        scene.opened.enter_context(stranger)
 
 
 def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
@@ -190,117 +192,53 @@ def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
     return make
 
 
-def _break_camera(how: CameraFault) -> Make:
-    return _now(lambda scene: scene.on_board().break_camera(how))
-
-
-def _mend_camera(scene: Scene) -> None:
-    scene.on_board().break_camera("")
-
-
 def _list_faults() -> list[Fault]:
-    """Return all faults."""
-    cameras: dict[CameraFault, str] = {
-        "freeze": "camera frozen",
-        "garbage": "camera garbage",
-        "short": "camera sends half pictures",
-        "off": "camera off",
-    }
-    by_deadline = partial(Fault, within_ms=20.0, after="deadline")
+    by_deadline = partial(Fault, after="deadline")
+    by_policy = partial(by_deadline, by_policy=True)
     harmless = partial(by_deadline, harms=False)
-    at_once = partial(Fault, within_ms=20.0)
+    silences = partial(Fault, silences=True)
+    camera = partial(Fault, within_ms=70.0, after="camera", needs="camera")
     restarts = partial(Fault, then="starts afresh", on_pins=True)
+    guard = partial(restarts, within_ms=100.0, guards_late=True)
+    gone = partial(Fault, then="is gone", on_pins=True)
     return [
         by_deadline("driver killed", _to_driver(signal.SIGKILL), on_pins=True),
         by_deadline("driver stopped", _to_driver(signal.SIGSTOP), on_pins=True),
-        *(
-            by_deadline(f"policy {how}", _to_driver(number), by_policy=True)
-            for how, number in {"is killed": signal.SIGKILL, **FAILURES}.items()
-        ),
-        by_deadline(
-            "network silent",
-            _at_once(lambda s: setattr(s.network, "silent", True)),
-            undo=_restore_network,
-        ),
-        by_deadline("network reset", _at_once(lambda s: s.network.reset())),
-        by_deadline("network half closed", _at_once(lambda s: s.network.half_close())),
-        # What answers an observation of a second ago is refused, so the last command that acts is
+        by_policy("policy is killed", _to_driver(signal.SIGKILL)),
+        *(by_policy(f"policy {how}", _to_driver(number)) for how, number in FAILURES.items()),
+        by_deadline("network silent", _set_network("silent", True)),
+        by_deadline("network reset", lambda s: _at_once(s.network.reset)),
+        by_deadline("network half closed", lambda s: _at_once(s.network.half_close)),
+        # Answers to an observation of a second ago are refused, so the last command that acts is
         # one that had arrived already.
-        by_deadline(
-            "network late by 1 s",
-            _at_once(lambda s: setattr(s.network, "latency_s", _LATE_S)),
-            undo=_restore_network,
-        ),
-        at_once(
+        by_deadline("network late by 1 s", _set_network("latency_s", _LATE_S)),
+        silences(
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
-            silences=True,
             on_pins=True,
         ),
-        at_once("a person takes over", _by_another("person", lambda c: c.take()), silences=True),
-        at_once(
-            "a person disarms",
-            _by_another("person", lambda c: c.disarm()),
-            silences=True,
-            on_pins=True,
-        ),
-        harmless(
-            "network in slices of 1 byte",
-            _at_once(lambda s: setattr(s.network, "slice_bytes", 1)),
-            undo=lambda s: setattr(s.network, "slice_bytes", 0),
-        ),
-        harmless("a stranger with a wrong key", _now(_knock_with_a_wrong_key)),
-        harmless("a message of 1 MB", _now(_say_too_much)),
+        silences("a person takes over", _by_another("person", lambda c: c.take())),
+        silences("a person disarms", _by_another("person", lambda c: c.disarm()), on_pins=True),
+        harmless("network in slices of 1 byte", _set_network("slice_bytes", 1)),
+        harmless("a stranger with a wrong key", _knock_with_a_wrong_key),
+        harmless("a message of 1 MB", _say_too_much),
         harmless("a second program commands", _by_another("program", _command_without_the_lease)),
-        harmless(
-            "strangers who say nothing",
-            _now(_connect_silently),
-            undo=lambda s: [stranger.close() for stranger in s.strangers],
-        ),
-        *(
-            Fault(name, _break_camera(how), 70.0, "camera", _mend_camera, needs="camera")
-            for how, name in cameras.items()
-        ),
-        Fault(
-            "bumper pressed",
-            _now(lambda s: s.on_board().press_bumper()),
-            40.0,
-            undo=lambda s: s.on_board().press_bumper(down=False),
-            needs="bumper",
-        ),
-        Fault(
-            "emergency button",
-            _now(lambda s: s.on_board().press_stop()),
-            40.0,
-            undo=lambda s: s.on_board().press_stop(down=False),
-            needs="button",
-            silences=True,
-        ),
-        restarts("daemon killed", _signal("daemon", signal.SIGKILL), 20.0),
-        restarts("daemon stopped", _signal("daemon", signal.SIGSTOP), 20.0, "deadline"),
-        restarts("guard killed", _signal("guard", signal.SIGKILL), 100.0, guards_late=True),
-        restarts(
-            "guard stopped", _signal("guard", signal.SIGSTOP), 100.0, "deadline", guards_late=True
-        ),
-        Fault(
-            "supervisor killed",
-            _at_once(lambda s: s.robot.supervisor.kill()),
-            100.0,
-            then="is gone",
-            on_pins=True,
-        ),
+        harmless("strangers who say nothing", _connect_silently),
+        camera("camera frozen", lambda s: s.board.break_camera("freeze")),
+        camera("camera garbage", lambda s: s.board.break_camera("garbage")),
+        camera("camera sends half pictures", lambda s: s.board.break_camera("short")),
+        camera("camera off", lambda s: s.board.break_camera("off")),
+        Fault("bumper pressed", lambda s: s.board.press_bumper(), 40.0, needs="bumper"),
+        silences("emergency button", lambda s: s.board.press_stop(), 40.0, needs="button"),
+        restarts("daemon killed", _to_program("daemon", signal.SIGKILL)),
+        restarts("daemon stopped", _to_program("daemon", signal.SIGSTOP), after="deadline"),
+        guard("guard killed", _to_program("guard", signal.SIGKILL)),
+        guard("guard stopped", _to_program("guard", signal.SIGSTOP), after="deadline"),
+        gone("supervisor killed", lambda s: _at_once(s.robot.supervisor.kill), 100.0),
         # Only hardware remains: the one-shot of the enable line, 100 ms, and its tolerance.
-        Fault(
-            "guard and supervisor killed",
-            _kill_both,
-            120.0,
-            then="is gone",
-            needs="one-shot",
-            guards_late=True,
-            on_pins=True,
-        ),
+        gone("guard and supervisor killed", _kill_both, 120.0, needs="one-shot", guards_late=True),
     ]
 
 
-FAULTS: Final[dict[str, Fault]] = {fault.name: fault for fault in _list_faults()}
-"""All faults, by name."""
+FAULTS: Final = {fault.name: fault for fault in _list_faults()}
+"""All faults, keyed by name."""

@@ -1,0 +1,191 @@
+"""Checks, their findings, and the report of them on screen and in a file."""
+
+from __future__ import annotations
+
+import datetime
+import getpass
+import platform
+import re
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from itertools import count
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from time import monotonic
+from typing import Final, Literal, NamedTuple
+
+from shapechanger.errors import OutputError, ShapechangerError
+from shapechanger.robot.profile.profile import Profile
+
+Level = Literal["good", "bad", "unknown"]
+
+Results = Iterator[tuple[Level, str]]
+"""A check: a generator of its results, each a level and a sentence."""
+
+Checks = Iterable[tuple[str, Results]]
+"""Checks with their names; each begins when the one before has ended."""
+
+MARKS: Final[dict[Level, str]] = {"good": "good", "bad": "BAD", "unknown": "?"}
+"""Words for the levels in reports."""
+
+
+class Finding(NamedTuple):
+    """Result of a check."""
+
+    check: str
+    level: Level
+    sentence: str
+
+
+def judged(good: bool, sentence: str, otherwise: str = "") -> tuple[Level, str]:
+    """Return a good result, or a bad one with another sentence if there is one."""
+    return ("good", sentence) if good else ("bad", otherwise or sentence)
+
+
+def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding]:
+    """Yield the findings of checks.
+
+    Args:
+        checks: The checks.
+        limit_s: Time for each, s, after which the next begins, as after an error of any kind; None
+            for checks that depend on those before.
+    """
+    for name, results in checks:
+        if limit_s is not None:
+            late = f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires "
+            late += "and supply, restart the computer, and check again."
+            results = finish_in_time(results, limit_s, late)
+        for level, sentence in results:
+            yield Finding(name, level, sentence)
+
+
+def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
+    """Yield the results of a check until it ends, fails or is late.
+
+    The check runs in a separate thread, which is left behind if its driver hangs.
+
+    Args:
+        results: The check.
+        limit_s: Time for all of it, s.
+        late: Sentence if it is late.
+    """
+    found: SimpleQueue[tuple[Level, str] | None] = SimpleQueue()
+
+    def run() -> None:
+        try:
+            for result in results:
+                found.put(result)
+        except ShapechangerError as error:
+            found.put(("bad", str(error)))
+        except Exception as error:  # Any error of a driver is a finding.
+            found.put(("bad", f"The check fails: {type(error).__name__}: {error}."))
+        found.put(None)
+
+    Thread(target=run, name="check", daemon=True).start()
+    until_s = monotonic() + limit_s
+    try:
+        while result := found.get(timeout=max(0.0, until_s - monotonic())):
+            yield result
+    except Empty:
+        yield "bad", late
+
+
+_PACKAGES: Final = ("shapechanger", "gpiozero", "lgpio", "smbus2", "picamera2")
+
+
+def facts(profile: Profile, *, twin: bool, root: Path = Path("/")) -> list[str]:
+    """Return the lines of a report that describe the machine and the robot."""
+
+    def text(name: str) -> str:
+        path = root / name
+        return path.read_text(errors="replace").strip("\0\n ") if path.exists() else ""
+
+    system = re.search(r'^PRETTY_NAME="?([^"\n]*)', text("etc/os-release"), re.MULTILINE)
+    lines = [
+        f"date         {datetime.datetime.now(datetime.UTC):%Y-%m-%d}",
+        f"on           {'a twin' if twin else 'hardware'}",
+        f"board        {text('proc/device-tree/model') or 'no Raspberry Pi'}",
+        f"system       {system[1] if system else platform.system()}, Linux {platform.release()}, "
+        f"{platform.machine()}",
+        f"python       {platform.python_version()}",
+    ]
+    for package in _PACKAGES:
+        with suppress(PackageNotFoundError):
+            lines.append(f"{package:12} {version(package)}")
+    return [*lines, f"body         {profile.body}, {profile.control_hz:g} Hz"]
+
+
+def anonymous(text: str) -> str:
+    """Return a text without the names of this computer, its user and the user's folders."""
+    for path, name in ((Path.cwd(), "."), (Path.home(), "~")):
+        if path != Path("/"):
+            text = text.replace(str(path), name)
+    for word, name in ((socket.gethostname(), "HOST"), (getpass.getuser(), "USER")):
+        text = re.sub(rf"\b{re.escape(word)}\b", name, text)
+    return text
+
+
+def write_report(
+    parts: Iterable[tuple[str, Iterator[Finding]]],
+    say: Callable[[str], object],
+    path: Path | None = None,
+    head: Iterable[str] = (),
+) -> bool:
+    """Run the parts of a check, and report each finding as it comes.
+
+    Args:
+        parts: Name and findings of each part.
+        say: Shows a person a line.
+        path: File for the lines, without names of the computer and its user; an existing one stays,
+            and a number is added. None for no file.
+        head: First lines of the file.
+
+    Returns:
+        Whether no finding was bad.
+    """
+    if path is not None:
+        path = next(one for one in _numbered(path) if not one.exists())
+        _append(path, "\n".join(["Check of a robot", "", *head]))
+    counts = dict.fromkeys(MARKS, 0)
+
+    def tell(line: str) -> None:
+        if path is not None:
+            _append(path, anonymous(line))
+        say(line)
+
+    try:
+        for part, findings in parts:
+            tell(f"\n{part}")
+            for check, level, sentence in findings:
+                tell(f"{MARKS[level]:4}  {check}: {sentence}")
+                counts[level] += 1
+    except BaseException as error:
+        # Also after Ctrl-C, a report is worth sending.
+        if path is not None:
+            why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
+            with suppress(OutputError):
+                _append(path, anonymous(f"\nIt ended early: {why or type(error).__name__}"))
+            say(f"\n{path} has what was checked so far.")
+        raise
+    tell(f"\n{counts['good']} good, {counts['bad']} bad, {counts['unknown']} not measured.")
+    if path is not None:
+        say(f"wrote {path}: it holds no key, no network and no name of this computer")
+    return not counts["bad"]
+
+
+def _numbered(path: Path) -> Iterator[Path]:
+    yield path
+    for number in count(2):
+        yield path.with_stem(f"{path.stem}-{number}")
+
+
+def _append(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(f"{text}\n")
+    except OSError as error:
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error

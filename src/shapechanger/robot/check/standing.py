@@ -1,0 +1,515 @@
+"""Checks of a robot that move nothing: its settings, its computer and its wiring.
+
+A check is a generator of results. They need the pins and buses for themselves, so they leave those
+of a served robot alone.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+from shapechanger.contract.plan import GuardPlan, SensorPlan, driven_pins
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
+from shapechanger.robot.check.pins import outside_level, pin_level
+from shapechanger.robot.check.report import (
+    Checks,
+    Finding,
+    Results,
+    finish_in_time,
+    judged,
+    run_checks,
+)
+from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
+from shapechanger.robot.drivers.chip import open_sensor
+from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
+from shapechanger.robot.guard.outputs import OutputBank
+from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.raspberry_pi import RealHardware
+from shapechanger.robot.setup.computer import (
+    FAST_HZ,
+    boot_config,
+    boot_lines,
+    boot_rates,
+    device_groups,
+    sets_parameter,
+)
+from shapechanger.robot.setup.systemd import unit_name, unit_word
+
+# Time for each check, s; a bus whose servos are all silent needs the longest, some seconds.
+CHECK_S: Final = 10.0
+_CAMERA_S: Final = 5.0
+
+
+@dataclass(frozen=True)
+class StandingRobot:
+    """A robot that is not driven.
+
+    Attributes:
+        profile: The robot.
+        port: Port of its server.
+        root: Root of the file system.
+        look: Opens the camera.
+        hardware: Opens its pins and buses.
+        motors_off: Whether the motors have no supply, so that their resistors can be tested.
+        installed: Whether it is installed on its computer, and not on a bench with LEDs.
+        on_twin: Whether it is a twin, whose computer has all pins and buses and no settings.
+        credentials: Folder of its key and certificate; None for the folder of `init`.
+    """
+
+    profile: Profile
+    port: int = 0
+    root: Path = Path("/")
+    look: Callable[[CameraPlan], Camera] = open_camera
+    hardware: Callable[[], Hardware] = RealHardware
+    motors_off: bool = False
+    installed: bool = True
+    on_twin: bool = False
+    credentials: Path | None = None
+
+    @cached_property
+    def pins(self) -> Hardware:
+        """Its pins and buses, opened once."""
+        return self.hardware()
+
+    @cached_property
+    def port_error(self) -> str:
+        """Why its port cannot be used; "" if it can."""
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("", self.port))
+            except OSError as error:
+                return f"{error.strerror}"
+        return ""
+
+    @property
+    def has_pins(self) -> bool:
+        """Whether its computer has pins."""
+        return self.on_twin or any((self.root / "dev").glob("gpiochip*"))
+
+    def has_bus(self, bus: int) -> bool:
+        """Return whether this user may open an I2C bus."""
+        return self.on_twin or os.access(self.root / f"dev/i2c-{bus}", os.R_OK | os.W_OK)
+
+    def can_read(self, sensor: SensorPlan) -> bool:
+        """Return whether the pins or the bus of a sensor exist."""
+        if "bus" in sensor.settings:
+            return self.has_bus(sensor.settings["bus"])
+        return self.has_pins or sensor.driver == "cpu_temperature"
+
+
+def examine(robot: StandingRobot) -> Iterator[Finding]:
+    """Check everything that a robot's safety and function depend on, without moving it.
+
+    A check that fails or hangs is a finding, and the others go on.
+    """
+    return run_checks(_checks(robot), CHECK_S)
+
+
+def _checks(robot: StandingRobot) -> Checks:
+    if not robot.on_twin:
+        yield from _computer_checks(robot)
+    # The guard of a served robot has its pins and buses.
+    if not robot.port_error and importlib.util.find_spec("gpiozero") is not None:
+        yield from _wiring_checks(robot)
+    yield "wiring", _close(robot)
+    if robot.installed and not robot.on_twin:
+        yield "port", _port(robot)
+
+
+def _computer_checks(robot: StandingRobot) -> Checks:
+    profile = robot.profile
+    if robot.installed:
+        yield "profile", _profile(profile)
+        yield "credentials", _credentials(robot)
+        yield "calibration", _calibration(profile)
+        yield "systemd", _unit(robot)
+    yield "computer", _computer(robot)
+    yield "strict_gpiod", _strict_gpiod(robot)
+    yield "enable line", _enable_line(profile)
+    yield "output enable", _output_enable(profile)
+    yield "latency timer", _latency_timers(robot)
+    yield "devices", _devices(robot)
+    yield "packages", _packages(robot)
+    if (camera := profile.camera) is not None:
+        yield "camera", _camera(robot, camera)
+        yield "camera's geometry", _geometry(camera)
+    if any(sensor.driver == "as5600" for sensor in profile.sensors):
+        yield "I2C speed", _bus_speed(robot)
+
+
+def _wiring_checks(robot: StandingRobot) -> Checks:
+    if driven_pins(robot.profile) or _servo_enables(robot.profile):
+        yield "resistors", _resistors(robot)
+    if robot.has_pins and robot.profile.stop_pin is not None:
+        yield "emergency button", _button(robot, robot.profile.stop_pin)
+    for bus, address in sorted({(one["bus"], one["address"]) for one in _boards(robot.profile)}):
+        if robot.has_bus(bus):
+            yield "servo board", _servo_board(robot, bus, address)
+    readable = [plan for plan in robot.profile.sensors if robot.can_read(plan)]
+    for plan in readable:
+        if plan.driver not in {"as5600", DRIVER}:  # They have separate checks.
+            read = _speed_pins if plan.measures == "speed" else _sensor
+            yield "sensor", read(robot, plan)
+    yield "servo bus", _servo_bus(robot)
+    for plan in readable:
+        if plan.driver == "as5600":
+            for joint in plan.settings["joints"]:
+                yield "encoders", _encoder(robot, plan, joint)
+
+
+def _profile(profile: Profile) -> Results:
+    yield "good", f"{profile.path} is valid."
+
+
+def _credentials(robot: StandingRobot) -> Results:
+    folder = load_credentials(robot.credentials or credentials_folder(robot.profile.name))
+    yield "good", f"Key and certificate: {folder.key_file.parent}."
+
+
+def _calibration(profile: Profile) -> Results:
+    if profile.calibrated is None:
+        yield "unknown", f"Never calibrated: shapechanger robot calibrate {profile.path}"
+
+
+def _computer(robot: StandingRobot) -> Results:
+    path = robot.root / "proc/device-tree/model"
+    if path.exists():
+        yield "good", path.read_text().strip("\0\n ") + "."
+    else:
+        reason = "This is not a Raspberry Pi: `serve --twin` runs the robot on simulated pins here."
+        yield "unknown", reason
+
+
+def _strict_gpiod(robot: StandingRobot) -> Results:
+    path = boot_config(robot.root)
+    if path is None:
+        yield "unknown", "This machine has no Raspberry Pi config.txt."
+    else:
+        yield judged(
+            sets_parameter(boot_lines(path), "strict_gpiod"),
+            f"{path} sets it: the pins of a process that dies go low.",
+            "A pin keeps its level when the process that set it dies: add "
+            f"`dtparam=strict_gpiod` to {path} and restart the computer.",
+        )
+
+
+_IN_UNIT: Final = {
+    "Restart=always": r"^Restart=always\s*$",
+    "ExecStopPost=… robot safe-pins": r"^ExecStopPost=.*robot safe-pins",
+}
+"""Settings that a unit must have, with their patterns."""
+
+
+def _unit(robot: StandingRobot) -> Results:
+    profile = robot.profile.path.absolute()
+    path = robot.root / "etc/systemd/system" / unit_name(robot.profile.name)
+    if not path.exists():
+        yield (
+            "bad",
+            f"{path} does not exist, so after a crash nothing restarts the robot or makes its pins "
+            f"safe: `shapechanger robot install {profile}` puts it there.",
+        )
+        return
+    text = path.read_text()
+    if lacks := _missing(_IN_UNIT, text):
+        yield "bad", f"{path} lacks {' and '.join(lacks)}."
+        return
+    name = re.escape(unit_word(str(profile)))
+    commands = ("serve", "safe-pins")
+    named = {word: rf"^Exec\w+=.*robot {word} {name}(\s|$)" for word in commands}
+    other = " and ".join(f"`robot {word}`" for word in _missing(named, text))
+    yield judged(
+        not other,
+        f"{path} restarts the robot and makes its pins safe.",
+        f"{path} is for another profile: {other} should name {profile}.",
+    )
+
+
+def _missing(patterns: dict[str, str], text: str) -> list[str]:
+    """Return the names of the patterns that no line matches."""
+    return [
+        name for name, pattern in patterns.items() if not re.search(pattern, text, re.MULTILINE)
+    ]
+
+
+def _enable_line(guard: GuardPlan) -> Results:
+    if all(map(stops_itself, guard.outputs)):
+        yield "good", "Each servo has its own watchdog, and releases when its bus is silent."
+    else:
+        yield judged(
+            guard.enable_pin is not None,
+            f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors "
+            "lose power, as servos without a watchdog must. Measure that once, because it cannot "
+            "be checked here.",
+            "The profile has no [enable] pin: if guard and supervisor are killed together, only "
+            "strict_gpiod and pull-downs are left. Fit the one-shot of the hardware guide.",
+        )
+
+
+def _output_enable(guard: GuardPlan) -> Results:
+    if any(board["output_enable"] == -1 for board in _boards(guard)):
+        yield (
+            "bad",
+            "A PCA9685 without output_enable keeps its last pulse for ever: wire OE to a pin with "
+            "a pull-up and name it as output_enable.",
+        )
+
+
+def _latency_timers(robot: StandingRobot) -> Results:
+    """Check that the adapters pass on the servos' answers at once."""
+    for device in {o.settings["device"] for o in robot.profile.outputs if o.driver == DRIVER}:
+        path = robot.root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
+        if not path.exists():
+            yield "unknown", f"{device} reports no latency timer; if it has one, it must be 1 ms."
+            continue
+        ms = path.read_text().strip()
+        yield judged(
+            ms == "1",
+            f"The latency timer of {device} is 1 ms.",
+            f"The adapter at {device} delays the servos' answers by {ms} ms: "
+            f"`echo 1 | sudo tee {path}`.",
+        )
+
+
+_WITHOUT_DEVICE: Final = {
+    "gpio": "only a computer with GPIO pins, such as a Raspberry Pi, drives this robot",
+    "i2c": "switch the bus on with `sudo raspi-config` (Interface Options), and restart",
+    "dialout": "plug in the adapter of the servo bus",
+}
+"""Remedies for device files that do not exist, by their group."""
+
+
+def _devices(robot: StandingRobot) -> Results:
+    """Check that this user can open the device files."""
+    for name, group in device_groups(robot.profile).items():
+        path = robot.root / name.lstrip("/")
+        if not path.exists():
+            yield "bad", f"{path} does not exist: {_WITHOUT_DEVICE[group]}."
+            continue
+        remedy = f"`sudo adduser $USER {group}` and log in again"
+        can_open = os.access(path, os.R_OK | os.W_OK)
+        otherwise = f"This user may not open {path}: {remedy}."
+        yield judged(can_open, f"{path} can be opened.", otherwise)
+
+
+def _packages(robot: StandingRobot) -> Results:
+    guard, camera = robot.profile, robot.profile.camera
+    remedies = {"gpiozero": "pip install 'shapechanger[robot]'"}
+    remedies["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
+    if any("bus" in plan.settings for plan in (*guard.outputs, *guard.sensors)):
+        remedies["smbus2"] = "pip install 'shapechanger[robot]'"
+    if any(output.driver == DRIVER for output in guard.outputs):
+        remedies["dynamixel_sdk"] = "pip install 'shapechanger[robot,finger]'"
+    if camera is not None and camera.driver == "picamera2":
+        remedies["picamera2"] = (
+            "sudo apt install python3-picamera2, and make the virtual environment with "
+            "--system-site-packages"
+        )
+    for name, remedy in remedies.items():
+        is_there = importlib.util.find_spec(name) is not None
+        yield judged(is_there, f"{name} is installed.", f"{name} is not installed: {remedy}.")
+
+
+def _camera(robot: StandingRobot, plan: CameraPlan) -> Results:
+    with closing(robot.look(plan)) as camera:  # Also ends a `read` that still waits.
+        late = f"{plan.driver} sent no frame within {_CAMERA_S:g} s."
+        yield from finish_in_time(_frame(plan, camera), _CAMERA_S, late)
+
+
+def _frame(plan: CameraPlan, camera: Camera) -> Results:
+    yield "good", f"{plan.driver} sent a frame of {len(camera.read().jpeg)} bytes."
+
+
+def _geometry(plan: CameraPlan) -> Results:
+    """Check that policies that drive by waypoints can use the camera."""
+    if plan.pitch_deg is None or plan.fovy_deg is None:
+        reason = "pitch_deg and fovy_deg are not stated, which policies with waypoints need: "
+        yield "unknown", reason + "`shapechanger robot camera` measures them."
+    else:
+        view = f"It looks {plan.pitch_deg:g} degrees down and sees {plan.fovy_deg:g} degrees from "
+        yield "good", view + "top to bottom; `shapechanger robot camera` draws it."
+
+
+def _bus_speed(robot: StandingRobot) -> Results:
+    """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
+    config = boot_config(robot.root)
+    if config is None:
+        reason = f"The bus should have {FAST_HZ} bits per second, which cannot be read here."
+        yield "unknown", reason
+        return
+    rate = (boot_rates(config) or [0])[-1]
+    yield judged(
+        rate >= FAST_HZ,
+        f"{config} sets {rate} bits per second.",
+        f"Four encoders take 3 of every 10 ms at the default of 100000 bits per second: add "
+        f"`dtparam=i2c_arm_baudrate={FAST_HZ}` to {config} and restart the computer.",
+    )
+
+
+def _port(robot: StandingRobot) -> Results:
+    otherwise = f"Port {robot.port} cannot be used ({robot.port_error}). Is the robot served?"
+    yield judged(not robot.port_error, f"Port {robot.port} is free.", otherwise)
+
+
+def _close(robot: StandingRobot) -> Results:
+    """Close the pins and buses, which may hang."""
+    if robot.port_error:
+        reason = "The robot may be served now, so its pins and buses were left alone."
+        yield "unknown", reason
+    if "pins" in vars(robot):
+        robot.pins.close()
+
+
+_MODE1: Final = 0x00  # First register of a PCA9685; reading it changes nothing.
+_NO_BATTERY_V: Final = 1.0
+_DISTANCE_READS: Final = 5
+_PING_NS: Final = 70_000_000  # Longer than the 60 ms from ping to ping of an HC-SR04.
+
+
+def _boards(guard: GuardPlan) -> list[dict[str, Any]]:
+    """Return the settings of the outputs on a PCA9685."""
+    return [one.settings for one in guard.outputs if one.settings.get("over") == "pca9685"]
+
+
+def _servo_enables(guard: GuardPlan) -> list[int]:
+    """Return the pins at OE of servo boards."""
+    return sorted({one["output_enable"] for one in _boards(guard)} - {-1})
+
+
+def _resistors(robot: StandingRobot) -> Results:
+    """Check the resistors that keep outputs off while no program holds their pins.
+
+    Each pin becomes an input with the Pi's own resistor of about 50 kOhm, first up and then down,
+    which 10 kOhm outside overrule. A motor could start where they are missing, so its supply must
+    be off.
+    """
+    if not (robot.has_pins and robot.motors_off):
+        lacks = "take the motors' supply off, and add --motors-off"
+        yield "unknown", f"Not tested: {lacks if robot.has_pins else 'this computer has no pins'}."
+        return
+    for pin, use in driven_pins(robot.profile).items():
+        level = outside_level(pin, robot.pins)
+        if level == 1:
+            reason = "something holds it high, and it must be low while no program drives it"
+            yield "bad", f"GPIO{pin}, {use}: {reason}."
+            continue
+        yield judged(
+            level == 0,
+            f"GPIO{pin}, {use}, is pulled down.",
+            f"GPIO{pin}, {use}, has no pull-down: fit 10 kOhm to ground, because it may run "
+            "while no program holds the pin.",
+        )
+    for pin in _servo_enables(robot.profile):
+        level = outside_level(pin, robot.pins)
+        lacks = "has no pull-up" if level is None else "is held low"
+        yield judged(
+            level == 1,
+            f"GPIO{pin}, OE of the servo board, is pulled up.",
+            f"GPIO{pin}, OE of the servo board, {lacks}: fit 10 kOhm to 3.3 V, or the board "
+            "sends pulses while no program holds it.",
+        )
+
+
+def _button(robot: StandingRobot, pin: int) -> Results:
+    """Check that the emergency button is released."""
+    yield judged(
+        bool(pin_level(pin, robot.pins, pull_up=True)),
+        f"GPIO{pin} is high: released, or not fitted. Hold it down and check again to tell.",
+        f"GPIO{pin} is low: it is pressed, or its wire touches ground.",
+    )
+
+
+def _speed_pins(robot: StandingRobot, plan: SensorPlan) -> Results:
+    """Read the levels of a wheel's encoder, which only a turning wheel changes."""
+    levels = [
+        f"GPIO{pin} is {'high' if pin_level(pin, robot.pins, pull_up=True) else 'low'}"
+        for pin in (plan.settings["a"], plan.settings["b"])
+        if pin >= 0
+    ]
+    remedy = "turn the wheel a little by hand and check again: each must change now and then"
+    yield "unknown", f"{plan.name}: {', '.join(levels)}; {remedy}."
+
+
+def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
+    """Read a sensor once, by its own driver, and judge its reading."""
+    clock = robot.pins.clock
+    with closing(open_sensor(plan, robot.pins)) as sensor:
+        reading = sensor.read(clock.now_ns(), 0.0)
+        for _ in range(_DISTANCE_READS if plan.measures == "distance" else 0):
+            if reading:
+                break
+            clock.wait([], clock.now_ns() + _PING_NS, _PING_NS / 1e9)
+            reading = sensor.read(clock.now_ns(), 0.0)
+    match plan.measures:
+        case "battery":
+            volts, least_v = reading["battery"], robot.profile.limits.low_battery_v
+            measured = f"{plan.name} measures {volts:.2f} V"
+            otherwise = f"{measured}, below low_battery_v, {least_v:g} V: charge the battery."
+            if volts < _NO_BATTERY_V:
+                otherwise = f"{measured}: connect its V- to the load."
+            yield judged(volts >= max(least_v, _NO_BATTERY_V), f"{measured}.", otherwise)
+        case "bump":
+            otherwise = f"{plan.name} is pressed, or it is miswired."
+            yield judged(not reading["bump"], f"{plan.name} is not pressed.", otherwise)
+        case _:
+            values = ", ".join(f"{name} {value:.2f}" for name, value in reading.items())
+            yield "good" if values else "unknown", f"{plan.name}: {values or 'no value yet'}."
+
+
+def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
+    """Check that a PCA9685 answers; its pulses stay as they are."""
+    name = f"The PCA9685 at {address:#04x} on I2C bus {bus}"
+    try:
+        with device_errors(name), closing(robot.pins.i2c(bus)) as opened:
+            opened.read_byte_data(address, _MODE1)
+    except RobotError as error:
+        yield "bad", f"{error} Look at SDA, SCL, 3.3 V and ground, and at `i2cdetect -y {bus}`."
+    else:
+        yield "good", f"{name} answers."
+
+
+def _servo_bus(robot: StandingRobot) -> Results:
+    """Check that every servo of the bus answers and is the right one, without torque."""
+    servos = tuple(output for output in robot.profile.outputs if output.driver == DRIVER)
+    if not servos:
+        return
+    if not all(map(stops_itself, servos)):
+        yield "unknown", "Not asked: these servos have power only while the enable line has it."
+        return
+    bank = OutputBank(replace(robot.profile, outputs=servos), robot.pins)
+    try:
+        bank.release()
+    finally:
+        bank.close(robot.pins.clock.now_ns())
+    yield "good", f"All {len(servos)} servos answer."
+
+
+def _encoder(robot: StandingRobot, plan: SensorPlan, joint: str) -> Results:
+    """Check the magnet of the encoder at a joint."""
+    from shapechanger.robot.drivers.as5600 import connect_encoders
+
+    with closing(connect_encoders(plan, robot.pins)) as sensor:
+        encoder = next(one for one in sensor.encoders if one.joint == joint)
+        measured = sensor.measure(encoder)
+    if not measured.detects_magnet:
+        yield "bad", f"The encoder of {joint} detects no magnet: fit one above the chip."
+        return
+    where = "far from" if measured.too_weak else "near to"
+    yield judged(
+        not (measured.too_weak or measured.too_strong),
+        f"The encoder of {joint} detects its magnet.",
+        f"The magnet of {joint} is too {where} its encoder.",
+    )

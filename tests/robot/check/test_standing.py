@@ -1,0 +1,451 @@
+"""Checks of a standing robot: its computer, and its wiring on simulated boards and pins."""
+
+import re
+import socket
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Self
+
+import pytest
+from gpiozero.pins.mock import MockFactory, MockPin
+
+from shapechanger.contract.plan import OutputPlan
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.check.report import Finding
+from shapechanger.robot.check.standing import StandingRobot, examine
+from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
+from shapechanger.robot.drivers.switch import SimulatedSwitch
+from shapechanger.robot.hardware import RealClock
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.raspberry_pi import RealHardware
+from shapechanger.robot.setup.systemd import unit_name
+from shapechanger.robot.twin.room import DrivingWorld
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.check.held_pins import shipped
+from tests.robot.profile.texts import finger_text, read
+from tests.robot.twin.in_process import LocalBoard
+from tests.robots import write_profile
+
+Found = dict[str, list[tuple[str, str]]]
+
+_BOARD = {"over": "pca9685", "bus": 1, "address": 0x40, "output_enable": -1}
+_SERVO = OutputPlan("turn", "servo", "steering", settings=_BOARD)
+
+
+@pytest.fixture
+def car(tmp_path: Path) -> Profile:
+    """A car with all protective sensors, and without a camera."""
+    return replace(write_profile(tmp_path), camera=None)
+
+
+def _write(root: Path, name: str, text: str = "") -> None:
+    path = root / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def _found(robot: StandingRobot) -> Found:
+    found: Found = {}
+    for check, level, sentence in examine(robot):
+        found.setdefault(check, []).append((level, sentence))
+    return found
+
+
+def _on(root: Path, profile: Profile, **more: Any) -> dict[str, Finding]:
+    """Return the last finding of each check on a computer with some files."""
+    robot = StandingRobot(profile, root=root, **more)
+    return {finding.check: finding for finding in examine(robot)}
+
+
+@pytest.mark.parametrize(
+    ("line", "level"),
+    [
+        ("dtparam=strict_gpiod", "good"),
+        ("dtparam=i2c_arm=on,strict_gpiod=on  # Pins of the dead go low.", "good"),
+        ("#dtparam=strict_gpiod", "bad"),
+        ("dtparam=strict_gpiod=off", "bad"),
+        ("dtparam=i2c_arm=on", "bad"),
+    ],
+)
+def test_strict_gpiod_is_read_from_the_boot_configuration(
+    tmp_path: Path, car: Profile, line: str, level: str
+) -> None:
+    _write(tmp_path, "boot/firmware/config.txt", f"# Bookworm\n{line}\n")
+    assert _on(tmp_path, car)["strict_gpiod"].level == level
+
+
+def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path, car: Profile) -> None:
+    found = _on(tmp_path, car)
+    assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
+    assert "--twin" in found["computer"].sentence
+    # No setting of a computer adds pins to it.
+    assert (
+        "only a computer with GPIO pins"
+        in _on(tmp_path, replace(car, sensors=()))["devices"].sentence
+    )
+
+
+@pytest.mark.parametrize(
+    ("lines", "level", "sentence"),
+    [
+        (
+            ["Restart=always", "ExecStart=/x robot serve {}", "ExecStopPost=robot safe-pins {}"],
+            "good",
+            "makes its pins safe",
+        ),
+        (["Restart=on-failure", "ExecStopPost=robot safe-pins {}"], "bad", "lacks Restart=always"),
+        (["Restart=always"], "bad", "ExecStopPost"),
+        (["Restart=always", "ExecStopPost=robot safe-pins b.toml"], "bad", "another profile"),
+    ],
+)
+def test_the_systemd_unit_must_restart_and_make_safe(
+    tmp_path: Path, car: Profile, lines: list[str], level: str, sentence: str
+) -> None:
+    text = "\n".join(["[Service]", *lines, ""]).format(*[car.path] * 2)
+    _write(tmp_path, f"etc/systemd/system/{unit_name(car.name)}", text)
+    finding = _on(tmp_path, car)["systemd"]
+    assert finding.level == level
+    assert sentence in finding.sentence
+
+
+def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> None:
+    """A servo board without OE and motors without a one-shot are reported."""
+    found = _on(tmp_path, replace(car, outputs=(_SERVO,), enable_pin=None))
+    assert {found["enable line"].level, found["output enable"].level} == {"bad"}
+    assert _on(tmp_path, car)["enable line"].level == "good"
+
+
+def test_only_the_devices_of_the_robot_are_checked(tmp_path: Path, car: Profile) -> None:
+    _write(tmp_path, "dev/gpiochip0")
+    bare = replace(car, sensors=())
+    found = _found(StandingRobot(bare, root=tmp_path))["devices"]
+    assert [level for level, _ in found] == ["good"]
+    with_board = replace(bare, outputs=(*car.outputs, _SERVO))
+    found = _found(StandingRobot(with_board, root=tmp_path))["devices"]
+    assert [level for level, _ in found] == ["good", "bad"]
+    assert "i2c-1" in found[1][1]
+    assert "raspi-config" in found[1][1]
+
+
+def test_a_port_in_use_is_reported(tmp_path: Path, car: Profile) -> None:
+    with socket.create_server(("", 0)) as taken:
+        found = _on(tmp_path, car, port=taken.getsockname()[1])
+    assert found["port"].level == "bad"
+
+
+def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
+    """A latency timer of 16 ms would make answers late."""
+    rig = replace(shipped("finger"), camera=None)
+    found = _on(tmp_path, rig)
+    assert found["latency timer"].level == "unknown"
+    assert "plug in the adapter" in found["devices"].sentence
+    _write(tmp_path, "dev/ttyUSB0")
+    for ms, level in (("16\n", "bad"), ("1\n", "good")):
+        _write(tmp_path, "sys/bus/usb-serial/devices/ttyUSB0/latency_timer", ms)
+        found = _on(tmp_path, rig)
+        assert found["latency timer"].level == level
+    assert found["devices"].level == found["enable line"].level == "good"
+
+
+def test_servos_without_a_watchdog_need_a_power_switch(tmp_path: Path) -> None:
+    """They require the one-shot, and the pins that feed it."""
+    rig = replace(read(finger_text("Feetech")), camera=None)
+    _write(tmp_path, "dev/ttyUSB0")
+    found = _found(StandingRobot(rig, root=tmp_path))
+    ((level, sentence),) = found["enable line"]
+    assert level == "good"
+    assert "as servos without a watchdog must" in sentence
+    assert any("gpiochip0 does not exist" in sentence for _, sentence in found["devices"])
+    bare = _on(tmp_path, replace(rig, enable_pin=None))["enable line"]
+    assert bare.level == "bad"
+    assert "Fit the one-shot" in bare.sentence
+
+
+class _Stuck:
+    """Hardware and camera of which one method never returns, or raises.
+
+    Args:
+        where: Name of the method.
+        error: The error that it raises; None to hang until `freed`.
+        freed: Ends the hanging.
+    """
+
+    def __init__(self, where: str, error: Exception | None, freed: threading.Event) -> None:
+        self._where = where
+        self._error = error
+        self._freed = freed
+        self.clock = RealClock()
+
+    def _maybe(self, method: str) -> None:
+        if method == self._where:
+            if self._error is not None:
+                raise self._error
+            self._freed.wait()
+        elif method in {"pin_factory", "i2c"}:
+            raise RobotError(f"Not here: {method}.")
+
+    def open(self, plan: CameraPlan) -> Self:
+        del plan
+        self._maybe("open")
+        return self
+
+    def read(self) -> Frame:
+        self._maybe("read")
+        return Frame(b"\xff\xd8", 1)
+
+    def pin_factory(self) -> Any:
+        self._maybe("pin_factory")
+
+    def i2c(self, bus: int) -> Any:
+        del bus
+        self._maybe("i2c")
+
+    servo_pins = servo_port = pin_factory
+
+    def close(self) -> None:
+        self._maybe("close")
+
+
+@pytest.fixture
+def freed() -> Iterator[threading.Event]:
+    """An event that ends all hanging after the test."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+@pytest.mark.parametrize("where", ["open", "read", "pin_factory", "i2c", "close"])
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (None, "No answer within|no frame within"),
+        (RobotError("It burns."), r"^It burns\.|: It burns\."),
+        (OSError(5, "Input/output error"), "Input/output"),
+        (ValueError("Odd."), "Odd"),
+    ],
+)
+def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    freed: threading.Event,
+    car: Profile,
+    where: str,
+    error: Exception | None,
+    words: str,
+) -> None:
+    """Each check has a deadline, its failure is a finding, and all others are made."""
+    limit_s = 0.05 if error is None else 5.0
+    for name in ("CHECK_S", "_CAMERA_S"):
+        monkeypatch.setattr(f"shapechanger.robot.check.standing.{name}", limit_s)
+    for name in ("dev/gpiochip0", "dev/i2c-1"):
+        _write(tmp_path, name)
+    profile = replace(car, camera=CameraPlan("pattern"), outputs=(*car.outputs, _SERVO))
+
+    def findings(stuck: Any) -> list[Finding]:
+        return list(
+            examine(
+                StandingRobot(
+                    profile,
+                    root=tmp_path,
+                    look=stuck.open,
+                    hardware=lambda: stuck,
+                    motors_off=True,
+                )
+            )
+        )
+
+    found = findings(_Stuck(where, error, freed))
+    assert any(re.search(words, one.sentence) for one in found if one.level == "bad")
+    sound = findings(_Stuck("", None, freed))
+    assert [one.level for one in sound if one.check == "camera"] == ["good"]
+    assert {one.check for one in found} >= {one.check for one in sound}
+    assert found[-1].check == "port"
+
+
+class _Board(LocalBoard):
+    """A board whose time the checks advance."""
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        del readable, at_most_s
+        self.advance(until_ns)
+        return True
+
+
+def _board(profile: Profile) -> _Board:
+    parts = {output.part for output in profile.outputs}
+    return _Board(TwinWiring(profile.guard_plan()), DrivingWorld(parts, (160, 120), seed=0))
+
+
+def _wired(profile: Profile, hardware: Any, *, motors_off: bool = True) -> Found:
+    return _found(
+        StandingRobot(profile, hardware=lambda: hardware, motors_off=motors_off, on_twin=True)
+    )
+
+
+def test_a_well_wired_car(car: Profile) -> None:
+    """Everything is good, but whether the wheel's sensor counts needs a person."""
+    board = _board(car)
+    found = _wired(car, board.hardware)
+    assert [level for level, _ in found["resistors"]] == ["good"] * 5
+    assert ("good", "GPIO19, enable line, is pulled down.") in found["resistors"]
+    assert found["emergency button"][0][0] == "good"
+    levels = {sentence.split()[0].rstrip(":"): level for level, sentence in found["sensor"]}
+    assert levels == {"wheel": "unknown", "bumper": "good", "front": "good", "pack": "good"}
+    assert "GPIO5 is" in found["sensor"][0][1]
+    # No output was ever driven.
+    assert not any(board.pins.levels.duties.get(pin) for pin in (4, 17, 22, 27, 19))
+
+
+def test_without_the_supply_off_no_output_is_touched(car: Profile) -> None:
+    """A motor without its resistor could start."""
+    board = _board(car)
+    level, sentence = _wired(car, board.hardware, motors_off=False)["resistors"][0]
+    assert (level, "--motors-off" in sentence) == ("unknown", True)
+    assert not board.levels.keys() & {4, 17, 22, 27, 19}
+
+
+def test_pressed_switches(car: Profile) -> None:
+    """A switch that is pressed now, or whose wire touches ground, is reported."""
+    board = _board(car)
+    board.pins.sensors.press_stop(down=True)
+    for bumper in board.pins.sensors.of_kind(SimulatedSwitch):
+        bumper.held = True
+    board.pass_ns(100_000_000)
+    found = _wired(car, board.hardware)
+    level, sentence = found["emergency button"][0]
+    assert (level, "it is pressed" in sentence) == ("bad", True)
+    assert ("bad", "bumper is pressed, or it is miswired.") in found["sensor"]
+
+
+@pytest.mark.parametrize(
+    ("limit_v", "is_connected", "level", "words"),
+    [
+        (6.6, True, "good", "V."),
+        (50.0, True, "bad", "below low_battery_v, 50 V: charge"),
+        (6.6, False, "bad", "pack measures 0.00 V: connect its V- to the load."),
+    ],
+)
+def test_the_battery_is_measured(
+    car: Profile, limit_v: float, is_connected: bool, level: str, words: str
+) -> None:
+    """Its voltage is compared with the limit at which the robot stops; 0 V is a wire."""
+    car = replace(car, limits=replace(car.limits, low_battery_v=limit_v))
+    hardware: Any = _board(car).hardware
+    real = hardware.i2c
+
+    def i2c(bus: int) -> Any:
+        opened = real(bus)
+        if not is_connected:
+            opened.read_i2c_block_data = lambda *_: [0, 0]
+        return opened
+
+    hardware.i2c = i2c
+    found = next(one for one in _wired(car, hardware)["sensor"] if "pack" in one[1])
+    assert found[0] == level
+    assert words in found[1]
+
+
+def test_dead_sensors_do_not_hide_others(car: Profile) -> None:
+    """Each is reported by its own driver's error."""
+    board = _board(car)
+    board.pins.dead_chips.add((1, 0x40))
+    for sensor in board.pins.sensors.of_kind(SimulatedHcsr04):
+        sensor.dead = True
+    found = _wired(car, board.hardware)["sensor"]
+    assert [level for level, _ in found] == ["unknown", "good", "bad", "bad"]
+    assert "receives no echo" in found[2][1]
+    assert "0x40" in found[3][1]
+
+
+@pytest.mark.parametrize("dead", [False, True])
+def test_servo_boards(dead: bool) -> None:
+    """A board is asked for a register that has no effect."""
+    cat = shipped("cat")
+    board = _board(cat)
+    if dead:
+        board.pins.dead_chips.add((1, 0x40))
+    found = _wired(cat, board.hardware)
+    ((level, sentence),) = found["servo board"]
+    assert (level, "i2cdetect -y 1" in sentence) == (("bad", True) if dead else ("good", False))
+    assert found["resistors"] == [("good", "GPIO25, OE of the servo board, is pulled up.")]
+
+
+def test_the_servos_of_a_rig_answer() -> None:
+    """They are asked without torque, and a missing one is named."""
+    rig = shipped("finger")
+    board = _board(rig)
+    ((level, sentence),) = _wired(rig, board.hardware)["servo bus"]
+    servos = [output for output in rig.outputs if output.driver == "bus_servo"]
+    assert (level, sentence) == ("good", f"All {len(servos)} servos answer.")
+    board.pins.require_rig().break_servo(servos[0].name, "mute")
+    ((level, sentence),) = _wired(rig, board.hardware)["servo bus"]
+    assert (level, servos[0].name in sentence) == ("bad", True)
+
+
+class _Low(MockPin):
+    """A pin that something outside holds low."""
+
+    def _get_state(self) -> bool:
+        return False
+
+
+class _High(MockPin):
+    """A pin that something outside holds high."""
+
+    def _get_state(self) -> bool:
+        return True
+
+
+class _Pins(RealHardware):
+    """gpiozero's mock pins, some of them held."""
+
+    def __init__(self, held: dict[int, type[MockPin]]) -> None:
+        super().__init__()
+        self.factory: Any = MockFactory()
+        for pin, kind in held.items():
+            self.factory.pin(pin, pin_class=kind)
+
+    def pin_factory(self) -> Any:
+        return self.factory
+
+
+@pytest.mark.parametrize(
+    ("kind", "held", "expected"),
+    [
+        ("car", {22: _Low}, "good: GPIO22, drive forward, is pulled down."),
+        ("car", {27: _High}, "bad: GPIO27, drive backward: something holds it high"),
+        ("car", {}, "bad: GPIO4, steer forward, has no pull-down: fit 10 kOhm to ground"),
+        ("cat", {}, "bad: GPIO25, OE of the servo board, has no pull-up: fit 10 kOhm to 3.3 V"),
+        ("cat", {25: _Low}, "bad: GPIO25, OE of the servo board, is held low: fit 10 kOhm to"),
+    ],
+)
+def test_missing_and_wrong_resistors(
+    kind: str, held: dict[int, type[MockPin]], expected: str
+) -> None:
+    """A pin that follows the Pi's own resistor has none; one that is held high is dangerous."""
+    found = _wired(shipped(kind), _Pins(held))["resistors"]
+    assert any(f"{level}: {sentence}".startswith(expected) for level, sentence in found)
+
+
+def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: Profile) -> None:
+    """It needs pins and buses, and a robot that is not served."""
+    for name in ("dev/gpiochip0", "dev/i2c-1"):
+        _write(tmp_path, name)
+
+    def checks(port: int = 0, root: Path = tmp_path) -> dict[str, Finding]:
+        hardware = _board(car).hardware
+        return _on(root, car, port=port, hardware=lambda: hardware, motors_off=True)
+
+    wiring = {"resistors", "emergency button", "sensor"}
+    assert wiring <= checks().keys()
+    # Whoever asked for the resistors is told why they are not tested.
+    without_pins = checks(root=tmp_path / "workstation")
+    assert without_pins["resistors"].sentence == "Not tested: this computer has no pins."
+    assert wiring & without_pins.keys() == {"resistors"}
+    with socket.create_server(("", 0)) as taken:
+        found = checks(taken.getsockname()[1])
+    assert "wiring" in found
+    assert not wiring & found.keys()
