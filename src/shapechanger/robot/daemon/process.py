@@ -21,7 +21,6 @@ from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from shapechanger.robot.daemon.connection import Timekeeper
 from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
-from shapechanger.robot.daemon.discovery import announce, withdraw
 from shapechanger.robot.daemon.guard_link import GuardLink, send_heartbeats, send_lifeline
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -33,6 +32,7 @@ from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.hardware import Clock, connect
 from shapechanger.robot.link.address import Address, is_loopback
 from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
+from shapechanger.robot.link.discovery import announce, withdraw
 
 _log = logging.getLogger(__name__)
 
@@ -100,7 +100,7 @@ class Daemon:
                     words = "%s is not announced: only this machine reaches %s."
                     _log.info(words, plan.card.robot, plan.host)
                 elif plan.discovery:
-                    announcement = await announce(plan, port, fingerprint)
+                    announcement = await announce(plan.card, plan.host, port, fingerprint)
             await self._ended.wait()
         finally:
             # First of all the guard stops the robot, when it sees this socket close.

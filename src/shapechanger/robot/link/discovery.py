@@ -1,0 +1,149 @@
+"""Announcement and discovery of robots on the local network, by mDNS."""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import socket
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+from shapechanger.errors import MissingExtra
+from shapechanger.robot.link.address import SERVICE, Address
+from shapechanger.robot.link.authentication import fingerprint_hex
+from shapechanger.robot.link.card import RobotCard
+from shapechanger.robot.link.messages import VERSION
+
+try:
+    from zeroconf import (
+        Error,
+        ServiceBrowser,
+        ServiceInfo,
+        ServiceStateChange,
+        Zeroconf,
+        get_all_addresses,  # pyright: ignore[reportPrivateImportUsage]  # Documented.
+    )
+    from zeroconf.asyncio import AsyncZeroconf
+except ImportError as error:
+    raise MissingExtra("zeroconf", "remote") from error
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRobot:
+    """Announcement of a robot, which proves nothing.
+
+    Attributes:
+        name: Name of the robot.
+        body: Kind of robot, such as "car".
+        address: Address of the robot.
+        fingerprint: SHA-256 of its certificate in hexadecimal; "" for none.
+        version: Version of the messages that it uses.
+    """
+
+    name: str
+    body: str
+    address: Address
+    fingerprint: str
+    version: str
+
+
+def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
+    """Find the robots on the local network, sorted by name.
+
+    A network may block multicast DNS; an address works all the same.
+
+    Args:
+        timeout_s: Time to listen, s.
+        zeroconf: A `zeroconf.Zeroconf` to use; None for a new one.
+    """
+    names: set[str] = set()
+
+    def changed(name: str, state_change: ServiceStateChange, **_: Any) -> None:
+        (names.discard if state_change is ServiceStateChange.Removed else names.add)(name)
+
+    own = zeroconf or Zeroconf()
+    try:
+        browser = ServiceBrowser(own, SERVICE, handlers=[changed])
+        threading.Event().wait(timeout_s)
+        browser.cancel()  # It waits for the browser's thread.
+        found = [_resolved(own, name, timeout_s) for name in names]
+    finally:
+        if zeroconf is None:
+            own.close()
+    robots = [robot for robot in found if robot is not None]
+    return sorted(robots, key=lambda robot: (robot.name, str(robot.address)))
+
+
+def _resolved(zeroconf: Zeroconf, name: str, timeout_s: float) -> FoundRobot | None:
+    info = zeroconf.get_service_info(SERVICE, name, int(timeout_s * 1e3))
+    addresses = info.parsed_scoped_addresses() if info else []
+    if info is None or info.port is None or not addresses:
+        return None
+    properties = {
+        key.decode("utf-8", "replace"): (value or b"").decode("utf-8", "replace")
+        for key, value in info.properties.items()
+    }
+    return FoundRobot(
+        name=properties.get("id") or name.removesuffix(f".{SERVICE}"),
+        body=properties.get("body", ""),
+        address=Address(addresses[0], info.port),
+        fingerprint=properties.get("fp", ""),
+        version=properties.get("v", ""),
+    )
+
+
+async def announce(
+    card: RobotCard, host: str, port: int, fingerprint: bytes
+) -> AsyncZeroconf | None:
+    """Announce a robot. If that fails, log a warning and return None; the robot serves anyway."""
+    zeroconf: AsyncZeroconf | None = None
+    try:
+        zeroconf = AsyncZeroconf()
+        await zeroconf.async_register_service(  # pyright: ignore[reportUnknownMemberType]
+            _service(card, host, port, fingerprint), allow_name_change=True
+        )
+    except (Error, OSError, RuntimeError, ValueError) as error:
+        _log.warning(
+            "%s cannot be announced on the network, so clients need its address: %s",
+            card.robot,
+            error or type(error).__name__,
+        )
+        if zeroconf is not None:
+            await withdraw(zeroconf)
+        return None
+    return zeroconf
+
+
+async def withdraw(zeroconf: AsyncZeroconf) -> None:
+    """Withdraw an announcement."""
+    try:
+        await zeroconf.async_unregister_all_services()
+        await zeroconf.async_close()
+    except (Error, OSError, RuntimeError) as error:
+        _log.warning("The announcement cannot be withdrawn: %s", error)
+
+
+def _service(card: RobotCard, host: str, port: int, fingerprint: bytes) -> ServiceInfo:
+    name = card.robot.replace(".", " ")  # A dot would start another label.
+    label = name.encode()[:63].decode(errors="ignore")  # RFC 6763: 63 bytes.
+    # The addresses at which other machines reach it.
+    addresses = [ipaddress.ip_address(host)]
+    if addresses[0].is_unspecified:
+        every = map(ipaddress.ip_address, get_all_addresses())
+        addresses = [address for address in every if not address.is_loopback]
+    return ServiceInfo(
+        SERVICE,
+        f"{label}.{SERVICE}",
+        port=port,
+        addresses=[address.packed for address in addresses],
+        properties={
+            "id": card.robot,
+            "body": card.body,
+            "v": str(VERSION),
+            "fp": fingerprint_hex(fingerprint),
+        },
+        server=f"{socket.gethostname().partition('.')[0]}.local.",
+    )
