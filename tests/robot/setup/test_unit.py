@@ -35,7 +35,7 @@ def test_the_check_accepts_the_unit_of_init(tmp_path: Path) -> None:
     assert _finding(tmp_path, folder / "car.toml").level == "good"
     other = _finding(tmp_path, folder / "other.toml")
     assert other.level == "bad"
-    assert "is for another profile" in other.sentence
+    assert "for another profile" in other.sentence
 
 
 def test_an_existing_unit_is_kept(tmp_path: Path) -> None:

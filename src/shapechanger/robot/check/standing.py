@@ -189,8 +189,7 @@ def _computer(robot: StandingRobot) -> Results:
     if path.exists():
         yield "good", path.read_text().strip("\0\n ") + "."
     else:
-        reason = "This is not a Raspberry Pi: `serve --twin` runs the robot on simulated pins here."
-        yield "unknown", reason
+        yield "unknown", "This is not a Raspberry Pi: `serve --twin` runs on simulated pins here."
 
 
 def _strict_gpiod(robot: StandingRobot) -> Results:
@@ -206,43 +205,30 @@ def _strict_gpiod(robot: StandingRobot) -> Results:
         )
 
 
-_IN_UNIT: Final = {
-    "Restart=always": r"^Restart=always\s*$",
-    "ExecStopPost=… robot safe-pins": r"^ExecStopPost=.*robot safe-pins",
-}
-"""Settings that a unit must have, with their patterns."""
-
-
 def _unit(robot: StandingRobot) -> Results:
     profile = robot.profile.path.absolute()
     path = robot.root / "etc/systemd/system" / unit_name(robot.profile.name)
+    remedy = f"`shapechanger robot install {profile}` puts it there"
     if not path.exists():
         yield (
             "bad",
             f"{path} does not exist, so after a crash nothing restarts the robot or makes its pins "
-            f"safe: `shapechanger robot install {profile}` puts it there.",
+            f"safe: {remedy}.",
         )
         return
-    text = path.read_text()
-    if lacks := _missing(_IN_UNIT, text):
-        yield "bad", f"{path} lacks {' and '.join(lacks)}."
-        return
-    name = re.escape(unit_word(str(profile)))
-    commands = ("serve", "safe-pins")
-    named = {word: rf"^Exec\w+=.*robot {word} {name}(\s|$)" for word in commands}
-    other = " and ".join(f"`robot {word}`" for word in _missing(named, text))
+    text, name = path.read_text(), re.escape(unit_word(str(profile)))
+    needed = {
+        "Restart=always": r"^Restart=always\s*$",
+        "ExecStopPost=… robot safe-pins": r"^ExecStopPost=.*robot safe-pins",
+        f"`robot serve {profile}`": rf"^Exec\w+=.*robot serve {name}(\s|$)",
+        f"`robot safe-pins {profile}`": rf"^Exec\w+=.*robot safe-pins {name}(\s|$)",
+    }
+    lacks = [what for what, line in needed.items() if not re.search(line, text, re.MULTILINE)]
     yield judged(
-        not other,
+        not lacks,
         f"{path} restarts the robot and makes its pins safe.",
-        f"{path} is for another profile: {other} should name {profile}.",
+        f"{path} lacks {' and '.join(lacks)}, so it is old or for another profile: {remedy}.",
     )
-
-
-def _missing(patterns: dict[str, str], text: str) -> list[str]:
-    """Return the names of the patterns that no line matches."""
-    return [
-        name for name, pattern in patterns.items() if not re.search(pattern, text, re.MULTILINE)
-    ]
 
 
 def _enable_line(guard: GuardPlan) -> Results:
@@ -347,8 +333,7 @@ def _bus_speed(robot: StandingRobot) -> Results:
     """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
     config = boot_config(robot.root)
     if config is None:
-        reason = f"The bus should have {FAST_HZ} bits per second, which cannot be read here."
-        yield "unknown", reason
+        yield "unknown", f"The bus should have {FAST_HZ} bits per second; it cannot be read here."
         return
     rate = (boot_rates(config) or [0])[-1]
     yield judged(
@@ -375,7 +360,7 @@ def _close(robot: StandingRobot) -> Results:
 
 _MODE1: Final = 0x00  # First register of a PCA9685; reading it changes nothing.
 _NO_BATTERY_V: Final = 1.0
-_DISTANCE_READS: Final = 5
+_DISTANCE_READS: Final = 6
 _PING_NS: Final = 70_000_000  # Longer than the 60 ms from ping to ping of an HC-SR04.
 
 
@@ -447,12 +432,11 @@ def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
     """Read a sensor once, by its own driver, and judge its reading."""
     clock = robot.pins.clock
     with closing(open_sensor(plan, robot.pins)) as sensor:
-        reading = sensor.read(clock.now_ns(), 0.0)
-        for _ in range(_DISTANCE_READS if plan.measures == "distance" else 0):
-            if reading:
+        reading: dict[str, float] = {}
+        for _ in range(_DISTANCE_READS if plan.measures == "distance" else 1):
+            if reading := sensor.read(clock.now_ns(), 0.0):
                 break
             clock.wait([], clock.now_ns() + _PING_NS, _PING_NS / 1e9)
-            reading = sensor.read(clock.now_ns(), 0.0)
     match plan.measures:
         case "battery":
             volts, least_v = reading["battery"], robot.profile.limits.low_battery_v
