@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import UnknownName
 from shapechanger.finger.anatomy import JOINT_REST, JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
-from shapechanger.robot.drivers.servos.rig import Rig, ServoFault
+from shapechanger.robot.drivers.servos.rig import Rig
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
 from tests.robot.twin.in_process import InProcessRobot
@@ -59,13 +59,6 @@ def bench() -> Iterator[_Bench]:
     made.robot.close()
 
 
-def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
-    """An armed rig enables no torque without a command."""
-    assert bench.seen.armed
-    assert not any(servo.has_torque for servo in bench.rig.bus.servos.values())
-    assert max(bench.rig.tensions().values()) < 1.5  # Friction of the gears holds the weight.
-
-
 def test_commands_map_to_tensions(bench: _Bench) -> None:
     """Command 0 is the pretension and 1 the largest tension, to one count of current."""
     bench.drive(_REST, 5)
@@ -96,35 +89,24 @@ def test_the_same_commands_give_the_same_motion() -> None:
     assert ends[0] == ends[1]
 
 
-@pytest.mark.parametrize(
-    ("how", "words"),
-    [
-        ("mute", "FDS .*does not answer"),
-        ("hot", "FDS .*(overheated|more than 65 C)"),
-        ("overload", "FDS .*overloaded"),
-        ("snapped", "FDS .*lost its tendon"),
-        ("power", "FDS .*(restarted|does not answer)"),
-    ],
-)
-def test_a_failed_servo_releases_all_tendons(bench: _Bench, how: ServoFault, words: str) -> None:
+def test_a_snapped_tendon_releases_all_tendons(bench: _Bench) -> None:
     """Tendons go to the pretension in 0.3 s, then to zero; later commands have no effect."""
     bench.drive(_FLEX, 25)
     assert bench.rig.tensions()["FDP"] > 5.0
-    bench.rig.break_servo("FDS", how)
+    bench.rig.break_servo("FDS", "snapped")
     steps = 0
     while not bench.seen.stop_reason:
-        bench.drive((1.0,) * 7 if how == "snapped" else _FLEX, 1)
+        bench.drive((1.0,) * 7, 1)
         steps += 1
         assert steps < 40
-    assert re.search(words, bench.seen.stop_reason), bench.seen.stop_reason
+    assert re.search("FDS .*lost its tendon", bench.seen.stop_reason), bench.seen.stop_reason
     bench.drive(_FLEX, 16)
     others = [s for s in bench.rig.bus.servos.values() if s is not bench.rig.servo("FDS")]
     goal = max(abs(servo.pulls_a) for servo in others) * _N_PER_A
     assert goal < 1.05
     bench.drive(_FLEX, 20)
     assert [servo.pulls_a for servo in others] == [0.0] * 6
-    tensions = bench.rig.tensions()
-    assert max(tensions.values()) < 2.0
+    assert max(bench.rig.tensions().values()) < 2.0
     assert bench.seen.stop_reason != ""
 
 
@@ -147,37 +129,6 @@ def test_a_missing_magnet_releases_all_tendons(bench: _Bench) -> None:
     bench.robot.arm()
     bench.drive(_FLEX, 20)
     assert bench.seen.stop_reason == ""
-
-
-def test_a_recovered_servo_needs_rearming(bench: _Bench) -> None:
-    """A servo that answers again does not rearm the robot; a person must."""
-    bench.drive(_FLEX, 10)
-    bench.rig.break_servo("FDS", "mute")
-    bench.drive(_FLEX, 40)
-    bench.rig.break_servo("FDS", "")
-    bench.drive(_FLEX, 10)
-    assert "does not answer" in bench.seen.stop_reason
-    bench.robot.arm()
-    bench.drive(_FLEX, 20)
-    assert bench.seen.stop_reason == ""
-    assert bench.rig.tensions()["FDP"] > 5.0
-
-
-def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
-    bench.drive(_FLEX, 10)
-    bench.rig.break_servo("LUM", "mute")
-    bench.drive(_FLEX, 40)
-    with pytest.raises(RobotError, match=r"no servo answers as LUM \(id 5\)"):
-        bench.robot.arm()
-
-
-def test_servos_release_without_packets(bench: _Bench) -> None:
-    bench.drive(_FLEX, 25)
-    bench.rig.bus.advance(90_000_000)
-    assert bench.rig.tensions()["FDP"] > 5.0
-    bench.rig.bus.advance(500_000_000)
-    assert [servo.pulls_a for servo in bench.rig.bus.servos.values()] == [0.0] * 7
-    assert max(bench.rig.tensions().values()) < 2.0
 
 
 def test_placing_the_finger_keeps_the_tendons_taut(bench: _Bench) -> None:

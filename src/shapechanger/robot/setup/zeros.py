@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from typing import Final
 
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
-from shapechanger.robot.drivers.servos.bus import ServoBus
-from shapechanger.robot.drivers.servos.homing import Homing
-from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
+from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
+from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_settings
 from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
 
 _START_TICKS: Final = 50  # Half a second, in which servos start that get their power now.
 _READINGS: Final = 50  # Half a second; single readings differ by a count or two.
+# Chosen: half a percent of the longest excursion of a finger's tendon.
+_STILL_M: Final = 0.2e-3
 
 
 def find_joint_zeros(
@@ -35,8 +37,7 @@ def find_joint_zeros(
     """
     zeros: dict[str, int] = {}
     for sensor in (one for one in plan.sensors if one.driver == "as5600"):
-        opened = connect_encoders(sensor, hardware)
-        try:
+        with closing(connect_encoders(sensor, hardware)) as opened:
             for encoder in opened.encoders:
                 turns: list[float] = []
                 for _ in range(_READINGS):
@@ -46,9 +47,78 @@ def find_joint_zeros(
                 mean = math.atan2(sum(map(math.sin, turns)), sum(map(math.cos, turns)))
                 counts = round(mean * COUNTS_PER_TURN / (2.0 * math.pi)) % COUNTS_PER_TURN
                 zeros[f"{sensor.name}.{encoder.joint}"] = counts
-        finally:
-            opened.close()
     return zeros
+
+
+def require_homing(settings: BusSettings) -> None:
+    """Refuse a homing tension below the gears' measured friction.
+
+    Its servo would stand still at once, with its tendon slack.
+    """
+    for servo in settings.servos:
+        gears, pull = servo.known.gears, servo.homing_n
+        friction = gears.friction_nm / servo.spool_radius_m
+        if gears.is_measured and pull <= friction:
+            raise RobotError(
+                f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
+                f"about {friction:.1f} N. Set homing_n, to {1.5 * friction:.1f} N for example."
+            )
+
+
+def home(
+    settings: BusSettings,
+    cycle: Callable[[Mapping[str, float]], BusState],
+    *,
+    still_ms: int = 300,
+    within_ms: int = 10_000,
+    travel_m: float = 0.06,
+) -> dict[str, int]:
+    """Pull all tendons of a held bus until nothing moves, so that they hold a known posture.
+
+    Slack tendons are taken up meanwhile.
+
+    Args:
+        settings: The bus.
+        cycle: Sends the tension of each tendon, N, and returns the state of the bus.
+        still_ms: Time for which no servo may move, ms.
+        within_ms: Time limit, ms.
+        travel_m: Limit of winding in, m.
+
+    Returns:
+        Position of each servo at the zero of its tendon, in counts, by name.
+
+    Raises:
+        RobotError: If there are none.
+    """
+    servos = {servo.name: servo for servo in settings.servos}
+    tensions = {name: servo.homing_n for name, servo in servos.items()}
+    starts: dict[str, int] = {}
+    zeros: dict[str, int] = {}
+    moved: dict[str, tuple[int, int]] = {}  # Position and time at which each last moved.
+    began_ns: int | None = None
+    while True:
+        state = cycle(tensions)
+        if state.faults:
+            raise RobotError(f"No zero: {state.reason}")
+        now_ns = state.at_ns
+        began_ns = now_ns if began_ns is None else began_ns
+        for name, reading in state.servos.items():
+            servo, at = servos[name], reading.position
+            zeros[name] = at
+            wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
+            if wound_m > travel_m:
+                reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
+                raise RobotError(f"{servo.words} has no zero: {reason}. Its tendon has come off.")
+            was_at, _ = moved.setdefault(name, (at, now_ns))
+            if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
+                moved[name] = at, now_ns
+        still_ns = now_ns - still_ms * 1_000_000
+        moving = [name for name in servos if name not in moved or moved[name][1] > still_ns]
+        if not moving:
+            return zeros
+        if now_ns - began_ns > within_ms * 1_000_000:
+            seconds = within_ms / 1e3
+            raise RobotError(f"No zero: {', '.join(moving)} still moved after {seconds:g} s.")
 
 
 def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:
@@ -68,25 +138,22 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
     if not outputs:
         raise RobotError(f"{plan.name} has no tendons on a servo bus.")
     settings = bus_settings(outputs)
-    homing = Homing(settings)
-    switches = Switches(plan, hardware)
-    try:
-        bus = ServoBus(settings, hardware.servo_port(settings))
-        try:
-            for _ in range(_START_TICKS if plan.enable_pin is not None else 0):
-                switches.toggle()
-                wait()
-            bus.set_up(switches.toggle)
-            bus.hold()
-            while homing.zeros is None and not homing.failure:
-                switches.toggle()
-                bus.send(homing.tensions)
-                homing.see(bus.cycle(hardware.clock.now_ns()))
-                wait()
-        finally:
-            bus.close()
-    finally:
-        switches.close()
-    if homing.zeros is None:
-        raise RobotError(homing.failure)
-    return homing.zeros
+    require_homing(settings)
+    with (
+        closing(Switches(plan, hardware)) as switches,
+        closing(ServoBus(settings, hardware.servo_port(settings))) as bus,
+    ):
+
+        def cycle(tensions: Mapping[str, float]) -> BusState:
+            switches.toggle()
+            bus.send(tensions)
+            state = bus.cycle(hardware.clock.now_ns())
+            wait()
+            return state
+
+        for _ in range(_START_TICKS if plan.enable_pin is not None else 0):
+            switches.toggle()
+            wait()
+        bus.set_up(switches.toggle)
+        bus.hold()
+        return home(settings, cycle)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dynamixel_sdk import PortHandler
 from msgspec.structs import replace
 
-from shapechanger.robot.drivers.servos.bus import ServoBus
-from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
 from shapechanger.robot.drivers.servos.rig import SimulatedBus
 from shapechanger.robot.drivers.servos.serial_port import SerialServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
@@ -149,7 +148,10 @@ class Rig:
     ) -> None:
         self.settings = settings() if bus is None else bus
         if plans is None:
-            plans = [ServoPlan(s.id, s.model, angle=2.0 * s.id) for s in self.settings.servos]
+            plans = [
+                ServoPlan(s.id, s.model, direction=s.direction, angle=2.0 * s.id)
+                for s in self.settings.servos
+            ]
         self.line = SimulatedBus(plans)
         self.port = FaultyPort(self.line)
         self.bus = ServoBus(self.settings, self._open())
@@ -181,6 +183,10 @@ class Rig:
             state = self.bus.cycle(self.line.now_ns)
             self.line.advance(CYCLE_NS)
         return state
+
+    def cycle(self, tensions: Mapping[str, float]) -> BusState:
+        """Command the tension of each tendon, and return the next state."""
+        return self.run(0.0, **tensions)
 
     def pulls(self) -> list[float]:
         """Return the goal current in effect of each simulated servo, A."""

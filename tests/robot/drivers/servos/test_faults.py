@@ -6,7 +6,7 @@ from typing import Literal
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.bus import BusState
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.simulation import ServoPlan
 from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, settings
@@ -46,7 +46,7 @@ def _damaged(rig: Rig) -> None:
 
 
 def _snapped(rig: Rig) -> None:
-    rig.twin("EIP").plan.tendon.snapped = True
+    rig.twin("EIP").motor.snapped = True
 
 
 _FAULTS: list[tuple[Callable[[Rig], None], str]] = [

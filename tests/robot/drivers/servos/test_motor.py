@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from shapechanger.robot.drivers.servos.family import MODELS
 from shapechanger.robot.drivers.servos.rig import EndStops
-from shapechanger.robot.drivers.servos.settings import MODELS
-from shapechanger.robot.drivers.servos.simulation import SimulatedMotor, Tendon
+from shapechanger.robot.drivers.servos.simulation import ServoPlan, SimulatedMotor
 
 
 def _run(
@@ -23,7 +23,8 @@ def _run(
 def test_the_no_load_speed_matches_the_data_sheet(name: str) -> None:
     """At the stall current limit and without load, the motor reaches its data-sheet speed."""
     model = MODELS[name]
-    motor = SimulatedMotor(MODELS[name], Tendon(snapped=True))
+    motor = SimulatedMotor(ServoPlan(model=name))
+    motor.snapped = True
     _run(motor, model.stall_a, model.volts, 3.0)
     assert motor.speed * 60 / (2 * math.pi) == pytest.approx(model.no_load_rpm, rel=0.02)
 
@@ -36,12 +37,11 @@ def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) ->
     The tension can exceed the goal: the spool overshoots, and friction holds it there.
     """
     model = MODELS[name]
-    tendon = Tendon(direction=direction)
-    motor = SimulatedMotor(MODELS[name], tendon)
+    motor = SimulatedMotor(ServoPlan(model=name, direction=direction))
     amperes = 0.4 * model.stall_a
     _run(motor, direction * amperes, model.volts, 1.5)
-    pull = model.torque_constant * amperes / tendon.spool_radius_m
-    friction = MODELS[name].gears.friction_nm / tendon.spool_radius_m
+    pull = model.torque_constant * amperes / 0.005
+    friction = MODELS[name].gears.friction_nm / 0.005
     assert motor.tension == pytest.approx(pull, abs=1.01 * friction)
     assert motor.speed == 0.0
 
@@ -49,14 +49,14 @@ def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) ->
 def test_friction_holds_a_torque_below_it() -> None:
     """A motor torque below the friction of the gears moves nothing."""
     model = MODELS["XL330-M288"]
-    motor = SimulatedMotor(model, Tendon())
+    motor = SimulatedMotor(ServoPlan(model=model.name, angle=0.0))
     _run(motor, 0.9 * model.gears.friction_nm / model.torque_constant, 5.0, 0.5)
     assert (motor.angle, motor.tension) == (0.0, 0.0)
 
 
 def test_a_tendon_carries_no_compression() -> None:
     """Unwinding the spool makes the tendon slack."""
-    motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+    motor = SimulatedMotor(ServoPlan(model="XL330-M077", angle=0.0))
     _run(motor, -0.3, 5.0, 0.3)
     assert motor.angle < -1.0
     assert motor.tension == 0.0
@@ -65,10 +65,10 @@ def test_a_tendon_carries_no_compression() -> None:
 def test_a_pull_ends_at_the_stop_of_its_load() -> None:
     """At the stop of the load, spool and load differ by the stretch of the cable alone."""
     load = EndStops(1, nearest_m=0.01)
-    motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+    motor = SimulatedMotor(ServoPlan(model="XL330-M077", angle=0.0))
     _run(motor, 0.5, 5.0, 2.0, load)
     assert load.travels[0] == 0.01
-    stretch = motor.tension / Tendon().stiffness
+    stretch = motor.tension / ServoPlan().stiffness
     assert motor.angle * 0.005 == pytest.approx(0.01 + stretch, abs=1e-6)
 
 
@@ -76,7 +76,7 @@ def test_the_temperature_rises_with_the_square_of_the_current() -> None:
     """The temperature rise is proportional to i^2 and follows the thermal time constant."""
     rises: list[float] = []
     for share in (0.25, 0.5):
-        motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+        motor = SimulatedMotor(ServoPlan(model="XL330-M077", angle=0.0))
         motor.advance(share * 1.47, 5.0, 0.0, 120.0)
         rises.append(motor.temperature - 25.0)
     assert rises[1] == pytest.approx(4 * rises[0], rel=1e-9)
@@ -86,7 +86,8 @@ def test_the_temperature_rises_with_the_square_of_the_current() -> None:
 def test_a_lower_supply_voltage_lowers_the_top_speed() -> None:
     speeds: list[float] = []
     for volts in (5.0, 2.5):
-        motor = SimulatedMotor(MODELS["XL330-M077"], Tendon(snapped=True))
+        motor = SimulatedMotor(ServoPlan(model="XL330-M077"))
+        motor.snapped = True
         _run(motor, 1.47, volts, 2.0)
         speeds.append(motor.speed)
     assert 0.3 * speeds[0] < speeds[1] < 0.55 * speeds[0]

@@ -2,44 +2,45 @@
 
 import pytest
 
-from shapechanger.robot.drivers.servos.family import DYNAMIXEL, FEETECH, Present
-from shapechanger.robot.drivers.servos.health import ServoHealth
+from shapechanger.robot.drivers.servos.family import DYNAMIXEL, FEETECH
+from shapechanger.robot.drivers.servos.tendon import TendonServo
 from tests.robot.drivers.servos.rigs import servo, settings
 
 MS = 1_000_000
-# 70 % of the speed without load, 383 turns per minute with a spool of 5 mm, are 140 mm/s.
-_FAST, _SLOW = 0.15 / 0.005, 0.13 / 0.005  # rad/s.
+_MM = -4096 / (2 * 3.14159 * 5)  # Counts for a millimetre of length on a spool of 5 mm.
 
 
-def _health() -> ServoHealth:
-    return ServoHealth(servo("FDP"), settings())
+def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0) -> str:
+    """Return the fault after a cycle in which a tendon has a length and gets longer."""
+    speed = round(-mm_per_s / 5 / DYNAMIXEL.rad_per_s)
+    position = round(length_mm * _MM)
+    data = b"\0\0" + speed.to_bytes(4, "little", signed=True)
+    data += position.to_bytes(4, "little", signed=True) + bytes(8) + b"\x32\0\x1e"
+    one.see(data, now_ms * MS, pulls=True)
+    return one.fault
 
 
-def _see(health: ServoHealth, speed: float, now_ms: int, length: float | None = None) -> str:
-    health.see(Present(0, speed, 0, 5.0, 30.0), length, now_ms * MS, pulls=True)
-    return health.fault
+@pytest.fixture
+def one() -> TendonServo:
+    """A servo with a zero. 70 % of its speed without load, 383 turns/min, are 140 mm/s."""
+    made = TendonServo(servo("FDP"), settings())
+    made.zero = 0
+    return made
 
 
-def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
+def test_a_fast_tendon_is_slack_only_after_a_while(one: TendonServo) -> None:
     """A short flick of the finger is not a snapped tendon; a pause restarts the timer."""
-    health = _health()
-    assert _see(health, _FAST, 0) == ""
-    assert _see(health, _FAST, 99) == ""
-    assert _see(health, _SLOW, 100) == ""
-    assert _see(health, _FAST, 110) == ""
-    assert _see(health, _FAST, 209) == ""
-    assert "winds in at 150 mm/s" in _see(health, _FAST, 210)
+    speeds = [(-150, 0), (-150, 99), (-130, 100), (-150, 110), (-150, 209)]
+    assert [_see(one, speed, at_ms) for speed, at_ms in speeds] == [""] * 5
+    assert "winds in at 150 mm/s" in _see(one, -150, 210)
 
 
-def test_unwinding_fast_is_not_slack() -> None:
-    """Only winding in without load counts."""
-    health = _health()
-    assert [_see(health, -100.0, t, 0.01) for t in (0, 500)] == ["", ""]
+def test_unwinding_fast_is_not_slack(one: TendonServo) -> None:
+    assert [_see(one, 500, t, 10) for t in (0, 500)] == ["", ""]
 
 
-def test_a_tendon_shorter_than_the_finger_allows_is_slack_at_once() -> None:
-    """A length outside the finger's range is reported immediately."""
-    assert "wound in by 61 mm" in _see(_health(), 0.0, 0, -0.061)
+def test_a_tendon_shorter_than_the_finger_allows_is_slack_at_once(one: TendonServo) -> None:
+    assert "wound in by 61 mm" in _see(one, 0, 0, -61)
 
 
 def test_present_values_of_dynamixel_are_signed() -> None:

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.family import FEETECH
-from shapechanger.robot.drivers.servos.settings import MODELS, ServoSettings
+from shapechanger.robot.drivers.servos.family import FEETECH, MODELS
+from shapechanger.robot.drivers.servos.settings import ServoSettings
 from tests.robot.drivers.servos.rigs import feetech, servo
 
 

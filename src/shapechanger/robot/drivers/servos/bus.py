@@ -5,17 +5,46 @@ The bus has no thread, never sleeps, and takes the time from its caller.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Final
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN, Register
-from shapechanger.robot.drivers.servos.health import BusState, Mode, ServoHealth, ServoState
 from shapechanger.robot.drivers.servos.registers import RegisterBus, ServoPort, ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
+from shapechanger.robot.drivers.servos.tendon import ServoState, TendonServo
 
-# Counts ahead of its position to which a servo with control of the length is sent to pull.
-_AHEAD: Final = 1024
+Mode = Literal["off", "held", "stopping", "silent"]
+"""Mode of the bus.
+
+"off": no servo has torque. "held": servos pull the requested tensions. "stopping": tensions ramp
+down, then the servos let go. "silent": nothing is sent any more, so that the servos' own watchdogs
+stop them, or without any the power switch.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class BusState:
+    """The bus after a cycle.
+
+    Attributes:
+        at_ns: Time of the cycle.
+        mode: Mode from now on.
+        servos: Readings of this cycle by tendon, without servos that did not answer.
+        faults: Faults as sentences, by tendon, or "" for the bus. They stay until
+            `ServoBus.set_up`.
+    """
+
+    at_ns: int
+    mode: Mode
+    servos: Mapping[str, ServoState]
+    faults: Mapping[str, str]
+
+    @property
+    def reason(self) -> str:
+        """All faults as one text; empty without faults."""
+        return " ".join(self.faults.values())
 
 
 class ServoBus:
@@ -31,26 +60,18 @@ class ServoBus:
     Attributes:
         mode: Mode of the bus.
         is_ready: Whether `set_up` has succeeded.
-        zeros: Position of each servo at the zero of its tendon, in counts, for those with a zero.
     """
 
     def __init__(self, settings: BusSettings, port: ServoPort) -> None:
         self._settings = settings
         self._family = family = settings.family
-        self._servos = {servo.name: servo for servo in settings.servos}
-        self._ids = {servo.id: servo for servo in settings.servos}
+        self._ids = {servo.id: TendonServo(servo, settings) for servo in settings.servos}
+        self._names = {one.settings.name: one for one in self._ids.values()}
         self._registers = RegisterBus(port, settings.device, family, tuple(self._ids))
         # One of them is read in each cycle, so a trip is detected within four.
         self._audited = (family.mark, family.torque_enable, family.goal, family.hardware_error)
-        self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
-        self.zeros: dict[str, int] = {}
         self.mode: Mode = "off"
-        self._stopped_at: dict[str, float] = {}  # N, when the stop began.
         self._stopped_ns = 0
-        self._goals = dict.fromkeys(self._ids, 0)  # Counts, as last sent.
-        self._pulls: dict[str, float] = {}  # N, as last requested.
-        self._lengths: dict[str, float] = {}  # m, of tendons that are to have a length.
-        self._positions: dict[int, int] = {}  # Counts, as last read.
         self._cycles = 0
         self._gone = ""
         self.is_ready = False
@@ -58,26 +79,27 @@ class ServoBus:
     @property
     def faults(self) -> dict[str, str]:
         """Faults, as in `BusState.faults`."""
-        faults = {"": self._gone} if self._gone else {}
-        for servo_id, servo in self._ids.items():
-            if fault := self._health[servo_id].fault:
-                faults[servo.name] = fault
-        return faults
+        faults = {"": self._gone, **{name: one.fault for name, one in self._names.items()}}
+        return {name: fault for name, fault in faults.items() if fault}
+
+    @property
+    def zeros(self) -> dict[str, int]:
+        """Position of each servo at the zero of its tendon, in counts, for those with a zero."""
+        return {name: one.zero for name, one in self._names.items() if one.zero is not None}
 
     def set_up(self, alive: Callable[[], object] = lambda: None) -> None:
         """Check and prepare all servos, without torque, and clear all faults."""
         self.is_ready = False
         if self.mode != "silent":  # A servo may still pull, until all have been set up.
             self.mode = "off"
-        self._goals = dict.fromkeys(self._ids, 0)
-        self._registers.write_all(self._family.torque_enable, dict.fromkeys(self._ids, 0))
+        self._let_go()
         self._check_servos(alive)
         for servo in self._settings.servos:
             alive()
             self._prepare(servo)
         self._registers.suspects.clear()
-        for health in self._health.values():
-            health.clear()
+        for one in self._ids.values():
+            one.clear()
         self.mode, self._gone, self.is_ready = "off", "", True
 
     def hold(self) -> None:
@@ -90,25 +112,23 @@ class ServoBus:
             why = " ".join(self.faults.values())
             why = why or ("they are not set up." if not self.is_ready else "they are already.")
             raise RobotError(f"The servos at {self._settings.device} are not held: {why}")
-        family = self._family
-        self._goals = dict.fromkeys(self._ids, 0)
-        self._lengths = {}
+        registers, family = self._registers, self._family
         try:
-            for servo in self._settings.servos:
-                self._registers.write(servo.id, family.mark, 0)
+            for one in self._ids.values():
+                servo, one.goal, one.length = one.settings, 0, None
+                registers.write(servo.id, family.mark, 0)
                 self._set_mark(servo)
                 if servo.control == "length":  # An old goal must not turn it.
-                    at = self._registers.read(servo.id, family.position)
-                    self._registers.write(servo.id, family.goal_position, at)
-                    self._positions[servo.id] = at
-                self._registers.write(servo.id, family.torque_enable, 1)
+                    one.position = registers.read(servo.id, family.position)
+                    registers.write(servo.id, family.goal_position, one.position)
+                registers.write(servo.id, family.torque_enable, 1)
         except RobotError:
             self.release()
             raise
         self.mode = "held"
 
     def set_zeros(self, zeros: Mapping[str, int], *, knows_turns: bool = True) -> None:
-        """Set the zeros of tendons, as `Homing` finds them.
+        """Set the zeros of tendons.
 
         Args:
             zeros: Position in counts, by name; other tendons keep theirs.
@@ -117,15 +137,13 @@ class ServoBus:
 
         Raises:
             RobotError: If a servo does not answer.
-            UnknownName: If there is no such tendon.
         """
         for name, position in zeros.items():
-            servo = self._servo(name)
+            one = self._names[name]
             if not knows_turns:
-                at = self._registers.read(servo.id, self._family.position)
+                at = self._registers.read(one.settings.id, self._family.position)
                 position += round((at - position) / COUNTS_PER_TURN) * COUNTS_PER_TURN
-            self.zeros[name] = position
-            self._health[servo.id].was_reset = False
+            one.zero = position
 
     def cycle(self, now_ns: int) -> BusState:
         """Read the state of all servos, and go on with a stop."""
@@ -134,7 +152,8 @@ class ServoBus:
         heard: dict[int, ServoReply] = {}
         try:
             if self.mode == "stopping":
-                self._send_goals(now_ns)
+                left = self._ramp_left(now_ns)
+                self._send_goals({id_: one.ramp_n(left) for id_, one in self._ids.items()})
             heard = self._registers.poll(self._family.present)
             self._audit(heard)
         except RobotError as error:
@@ -164,36 +183,36 @@ class ServoBus:
                 Without one, such a tendon is pulled with its tension, as all others.
 
         Raises:
-            RobotError: If a tension is missing or not finite, or a length has no meaning. Then
-                nothing is sent.
-            UnknownName: If there is no such tendon.
+            RobotError: If a tension is not finite, or a length has no meaning. Then nothing is
+                sent.
         """
         lengths = lengths or {}
-        for name in tensions:
-            self._servo(name)
-        if missing := [name for name in self._servos if name not in tensions]:
-            raise RobotError(f"There is no tension for {', '.join(missing)}.")
         # Check all before using any.
-        pulls = {name: servo.clip(tensions[name]) for name, servo in self._servos.items()}
+        pulls = {
+            id_: one.settings.clip(tensions[one.settings.name]) for id_, one in self._ids.items()
+        }
         for name, length in lengths.items():
-            servo = self._servo(name)
-            if servo.control != "length" or name not in self.zeros:
-                lacks = (
-                    "no zero" if servo.control == "length" else f"control of its {servo.control}"
+            servo, zero = self._names[name].settings, self._names[name].zero
+            if servo.control != "length":
+                raise RobotError(
+                    f"{servo.words} cannot go to a length: it has control of its tension."
                 )
-                raise RobotError(f"{servo.words} cannot go to a length: it has {lacks}.")
-            servo.position_at(length, self.zeros[name])
+            if zero is None:
+                raise RobotError(f"{servo.words} cannot go to a length: it has no zero.")
+            servo.position_at(length, zero)
         if self.mode == "held":
-            self._pulls, self._lengths = pulls, dict(lengths)
+            for name, one in self._names.items():
+                one.length = lengths.get(name)
             try:
-                self._send_goals(0)  # The time matters only to a ramp.
+                self._send_goals(pulls)
             except RobotError as error:
                 self._gone = self._gone or str(error)
 
     def stop(self, now_ns: int) -> None:
         """Start to ramp the tensions down in the coming cycles, and then to let go."""
         if self.mode == "held":
-            self._stopped_at = {one.name: self._goal_n(one) for one in self._settings.servos}
+            for one in self._ids.values():
+                one.begin_stop()
             self._stopped_ns = now_ns
             self.mode = "stopping"
 
@@ -203,22 +222,21 @@ class ServoBus:
         If a servo does not confirm it, even when asked twice, the bus falls silent, so that the
         watchdog of that servo stops it, or the power switch. `set_up` ends the silence.
         """
-        self._goals = dict.fromkeys(self._ids, 0)
-        enable, holding = self._family.torque_enable, set(self._ids)
+        holding = set(self._ids)
         try:
             for _ in range(2):
-                self._registers.write_all(enable, dict.fromkeys(self._ids, 0))
-                torques = self._registers.read_each(enable)
+                self._let_go()
+                torques = self._registers.read_each(self._family.torque_enable)
                 holding -= {one for one, torque in torques.items() if torque == 0}
                 if not holding:
                     self.mode = "off"
                     return
         except RobotError as error:
             self._gone = self._gone or str(error)
-        names = ", ".join(servo.name for one, servo in self._ids.items() if one in holding)
-        words = f"{names} did not confirm to let go, so nothing is sent any more"
-        what = "the servos' own watchdogs stop" if self._family.has_watchdog else "[enable] stops"
-        self._gone = f"{self._gone} {words}: {what} them.".lstrip()
+        names = ", ".join(one.settings.name for id_, one in self._ids.items() if id_ in holding)
+        silence = f"{names} did not confirm to let go, so nothing is sent any more"
+        who = "the servos' own watchdogs stop" if self._family.has_watchdog else "[enable] stops"
+        self._gone = f"{self._gone} {silence}: {who} them.".lstrip()
         self.mode = "silent"
 
     def close(self) -> None:
@@ -226,6 +244,12 @@ class ServoBus:
         if self.mode != "silent" and (self.is_ready or self._family.has_watchdog):
             self.release()
         self._registers.port.close()
+
+    def _let_go(self) -> None:
+        """Send to all servos that they have no torque."""
+        for one in self._ids.values():
+            one.goal = 0
+        self._registers.write_all(self._family.torque_enable, dict.fromkeys(self._ids, 0))
 
     def _check_servos(self, alive: Callable[[], object]) -> None:
         """Check that every servo answers, has the right model and firmware that is new enough."""
@@ -288,31 +312,16 @@ class ServoBus:
         self._registers.write(servo.id, self._family.goal, 0)
         self._registers.write(servo.id, self._family.mark, self._settings.mark)
 
-    def _send_goals(self, now_ns: int) -> None:
-        for name, servo in self._servos.items():
-            pull = self._pulls.get(name, 0.0)
-            if self.mode == "stopping":
-                start = self._stopped_at[name]
-                end = min(servo.pretension_n, start)  # A tendon that was not pulled yet stays so.
-                pull = end + self._ramp_left(now_ns) * (start - end)
-                if self._health[servo.id].fault:
-                    pull = 0.0  # Such a servo lets go at once, while the others ramp down.
-            self._goals[servo.id] = servo.goal_count(pull)
-        if positions := self._goal_positions():
+    def _send_goals(self, pulls: Mapping[int, float]) -> None:
+        """Send the tensions, N, by id, and the positions of servos with control of the length."""
+        positions: dict[int, int] = {}
+        for id_, one in self._ids.items():
+            one.goal = one.settings.goal_count(pulls[id_])
+            if one.settings.control == "length":
+                positions[id_] = one.goal_position
+        if positions:
             self._registers.write_all(self._family.goal_position, positions)
-        self._registers.write_all(self._family.goal, self._goals)
-
-    def _goal_positions(self) -> dict[int, int]:
-        """Return the goals of the servos with control of the length, in counts, by id."""
-        goals: dict[int, int] = {}
-        for name, servo in self._servos.items():
-            if servo.control != "length":
-                continue
-            if name in self._lengths and name in self.zeros:
-                goals[servo.id] = servo.position_at(self._lengths[name], self.zeros[name])
-            else:
-                goals[servo.id] = self._positions[servo.id] + servo.direction * _AHEAD
-        return goals
+        self._registers.write_all(self._family.goal, {id_: o.goal for id_, o in self._ids.items()})
 
     def _ramp_left(self, now_ns: int) -> float:
         """Return the share of the ramp of a stop that is left, 1 to 0."""
@@ -322,54 +331,30 @@ class ServoBus:
     def _audit(self, heard: dict[int, ServoReply]) -> None:
         """Read a register that shows obedience, and drop servos that may have restarted."""
         # A servo that was away may have lost power, and with it the meaning of its position.
-        back = [one for one in heard if self._health[one].missed]
-        known = self._audit_register(self._family.mark, back)
-        for one in back:
-            if one not in known:
-                del heard[one]
+        back = [one for one in heard if self._ids[one].missed]
+        for one in set(back) - self._audit_register(self._family.mark, back):
+            del heard[one]
         alerting = [one for one, answer in heard.items() if answer.error & self._family.alert]
         # An alert cannot wait for its turn.
         turn = self._audited[self._cycles % len(self._audited)]
-        register = self._family.hardware_error if alerting else turn
-        self._audit_register(register, alerting or [*heard])
+        self._audit_register(self._family.hardware_error if alerting else turn, alerting or heard)
 
-    def _audit_register(self, register: Register, ids: list[int]) -> set[int]:
+    def _audit_register(self, register: Register, ids: Iterable[int]) -> set[int]:
         """Evaluate a register of some servos; return those that answered."""
-        answers = self._registers.read_several(register, ids)
+        answers = self._registers.read_several(register, [*ids])
         for one, answer in answers.items():
-            pulls, goal = self.mode != "off", self._goals[one]
-            self._health[one].audit(register, register.decode(answer.data), pulls=pulls, goal=goal)
+            value = register.decode(answer.data)
+            self._ids[one].audit(register, value, pulls=self.mode != "off")
         return set(answers)
 
     def _evaluate(
         self, heard: Mapping[int, ServoReply], now_ns: int, *, late: bool
     ) -> dict[str, ServoState]:
         states: dict[str, ServoState] = {}
-        for servo_id, servo in self._ids.items():
-            health = self._health[servo_id]
-            if health.was_reset:
-                self.zeros.pop(servo.name, None)
-            if servo_id not in heard:
-                health.miss(late=late)
-                continue
-            present = self._family.decode(heard[servo_id].data)
-            self._positions[servo_id] = present.position
-            zero = self.zeros.get(servo.name)
-            length = None if zero is None else servo.length_m(present.position, zero)
-            health.see(present, length, now_ns, pulls=self.mode != "off")
-            states[servo.name] = ServoState(
-                position=present.position,
-                length_m=length,
-                lengthening_m_per_s=servo.lengthening(present.speed),
-                tension_n=servo.tension_n(present.current),
-                goal_n=self._goal_n(servo),
-            )
+        for servo_id, one in self._ids.items():
+            if servo_id in heard:
+                data = heard[servo_id].data
+                states[one.settings.name] = one.see(data, now_ns, pulls=self.mode != "off")
+            else:
+                one.miss(late=late)
         return states
-
-    def _goal_n(self, servo: ServoSettings) -> float:
-        return abs(self._goals[servo.id]) * servo.newton_per_goal
-
-    def _servo(self, name: str) -> ServoSettings:
-        if name not in self._servos:
-            raise UnknownName("tendon", name, self._servos)
-        return self._servos[name]

@@ -1,4 +1,4 @@
-"""Families of servos on a bus: their registers, units, errors, and what stops them.
+"""Servos on a bus: the registers, units and errors of their families, and their models.
 
 Sources: ROBOTIS e-manual, control tables of the X series and DYNAMIXEL Protocol 2.0; for Feetech's
 STS series the maker's memory table of the STS3215, as the crate `st3215` 0.0.2 reproduces it, and
@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
 COUNTS_PER_TURN: Final = 4096
@@ -155,6 +156,13 @@ class ServoFamily:
         )
         return Present(current, speed * self.rad_per_s, position, volts * 0.1, float(degrees))
 
+    @property
+    def registers(self) -> list[Register]:
+        """All registers but the block of present values."""
+        named = [getattr(self, field.name) for field in fields(self)]
+        registers = [*named, *(register for register, _, _ in self.constants)]
+        return [one for one in registers if isinstance(one, Register) and one != self.present]
+
     def error_words(self, bits: int) -> str:
         """Describe the bits of the hardware error status."""
         words = (words for bit, words in sorted(self.errors.items()) if bits >> bit & 1)
@@ -248,3 +256,110 @@ FEETECH: Final = ServoFamily(
     temperature=Register("present temperature", 63, 1),
 )
 """Feetech servos of the STS series, which have no bus watchdog."""
+
+
+ModelName = Literal["XL330-M288", "XL330-M077", "XC330-M288", "XM430-W210", "XM430-W350", "STS3215"]
+"""Name of a model that the driver supports."""
+
+
+class Gears(NamedTuple):
+    """Motor and gears of a servo, at the output.
+
+    Attributes:
+        inertia: Inertia, kg·m2.
+        friction_nm: Coulomb friction, N·m.
+        viscous: Viscous friction, N·m·s/rad.
+        is_measured: Whether the friction was measured.
+    """
+
+    inertia: float
+    friction_nm: float
+    viscous: float
+    is_measured: bool
+
+
+# XL330-M288 and STS3215: identified by Rhoban's `bam` (m1). M077: those of the M288, scaled by the
+# square of the gear ratio. XC330-M288: fits on joints of a LEAP hand, with the viscous part of the
+# XL330 assumed. XM430: chosen for want of a source.
+_GEARS: Final = {
+    "XL330-M288": Gears(0.00199, 0.018, 0.0059, True),
+    "XL330-M077": Gears(0.000144, 0.005, 0.00043, False),
+    "XC330-M288": Gears(0.00141, 0.029, 0.0059, True),
+    "XM430-W210": Gears(0.003, 0.09, 0.02, False),
+    "XM430-W350": Gears(0.008, 0.12, 0.05, False),
+    "STS3215": Gears(0.0261, 0.0515, 0.0599, True),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ServoModel:
+    """Model of a servo.
+
+    Attributes:
+        name: Name of the model.
+        number: Model number.
+        ampere_per_count: Unit of its present current, A.
+        most_counts: Largest value of its goal, see `ServoFamily.goal`.
+        stall_nm: Stall torque at `volts`, N·m.
+        stall_a: Stall current at `volts`, A.
+        no_load_rpm: Speed without load at `volts`, turns per minute.
+        volts: Nominal voltage, V.
+        least_v: Lowest operating voltage, V.
+        most_v: Highest operating voltage, V.
+        most_c: Temperature at which it shuts itself off, degrees Celsius.
+        shutdown: Hardware errors that shut it off, as bits.
+        least_firmware: First version with a reliable bus watchdog.
+        family: Family of the servo.
+    """
+
+    name: str
+    number: int
+    ampere_per_count: float
+    most_counts: int
+    stall_nm: float
+    stall_a: float
+    no_load_rpm: float
+    volts: float
+    least_v: float
+    most_v: float
+    most_c: int
+    shutdown: int
+    least_firmware: int = 0
+    family: ServoFamily = DYNAMIXEL
+
+    @property
+    def gears(self) -> Gears:
+        """Motor and gears."""
+        return _GEARS[self.name]
+
+    @property
+    def torque_constant(self) -> float:
+        """Torque at the output per current, N·m/A."""
+        return self.stall_nm / self.stall_a
+
+    @property
+    def no_load_rad_per_s(self) -> float:
+        """Speed without load, rad/s."""
+        return self.no_load_rpm * 2.0 * math.pi / 60.0
+
+    @property
+    def ampere_per_goal(self) -> float:
+        """Unit of its goal, A; where that is a share of the stall torque, for a motor at rest."""
+        is_current = "tension" in self.family.modes
+        return self.ampere_per_count if is_current else self.stall_a / self.most_counts
+
+
+# Dynamixel: ROBOTIS e-manual; the bus watchdog of the X430 needs firmware 38 (Bus Watchdog).
+# Feetech: makers' memory table, data sheet of the version for 7.4 V (19.5 kg·cm, 52 turns per
+# minute) and its 8 kg·cm/A as in `bam`. The numbers are in the order of the attributes.
+_MODELS: Final = (
+    ServoModel("XL330-M288", 1200, 1e-3, 1750, 0.52, 1.47, 103.0, 5.0, 3.5, 7.0, 70, 53),
+    ServoModel("XL330-M077", 1190, 1e-3, 1750, 0.215, 1.47, 383.0, 5.0, 3.5, 7.0, 70, 53),
+    ServoModel("XC330-M288", 1240, 1e-3, 2352, 0.93, 1.80, 81.0, 5.0, 3.5, 7.0, 70, 52),
+    ServoModel("XM430-W210", 1030, 2.69e-3, 1193, 3.0, 2.3, 77.0, 12.0, 9.5, 16.0, 80, 52, 38),
+    ServoModel("XM430-W350", 1020, 2.69e-3, 1193, 4.1, 2.3, 46.0, 12.0, 9.5, 16.0, 80, 52, 38),
+    ServoModel("STS3215", 777, 6.5e-3, 1000, 1.91, 2.44, 52.0, 7.4, 4.0, 8.0, 70, 44, 0, FEETECH),
+)
+
+MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for one in _MODELS})
+"""Models that the driver supports, keyed by name."""

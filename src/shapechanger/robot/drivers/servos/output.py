@@ -15,7 +15,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OutputChip, SensorChip
 from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.servos.bus import ServoBus
-from shapechanger.robot.drivers.servos.health import BusState
 from shapechanger.robot.drivers.servos.settings import ServoSettings, bus_settings, servo_settings
 from shapechanger.robot.drivers.simulation import WiredOutput
 from shapechanger.robot.hardware import Hardware
@@ -28,28 +27,40 @@ class SharedBus:
     """All servos at one device; see `SharedDevice`.
 
     Servos without a watchdog get their power from a switch that the guard feeds while it runs, so
-    they are only set up when the robot is armed. Where one of them cannot be released, `flush` and
+    they are only set up when the robot is armed. If one of them cannot be released, `flush` and
     `let_go` raise errors, so that the guard stops to feed the switch, until that has cut the power.
 
     Args:
         hardware: Hardware of the bus.
         device: Its device.
+
+    Attributes:
+        device: Its device.
+        tensions: Tension of each tendon from the next `flush` on, N; with a length its limit.
+        lengths: Length beyond its zero of each tendon that is to have one, m.
     """
 
     def __init__(self, hardware: Hardware, device: str) -> None:
         self.device = device
+        self.tensions: dict[str, float] = {}
+        self.lengths: dict[str, float] = {}
         self._hardware = hardware
         self._plans: dict[str, OutputPlan] = {}
-        self._tensions: dict[str, float] = {}
-        self._lengths: dict[str, float] = {}
         self._bus: ServoBus | None = None
         self._silent_since_ns: int | None = None
+
+    @property
+    def bus(self) -> ServoBus:
+        """The bus, while it is in use."""
+        if self._bus is None:
+            raise RobotError(f"The bus at {self.device} is not in use.")
+        return self._bus
 
     def add(self, plan: OutputPlan) -> ServoSettings:
         """Add a servo."""
         servo = servo_settings(plan)
         self._plans[plan.name] = plan
-        self._tensions[plan.name] = servo.pretension_n
+        self.tensions[plan.name] = servo.pretension_n
         return servo
 
     def begin(self) -> None:
@@ -69,11 +80,9 @@ class SharedBus:
 
     def ready(self, alive: Callable[[], object] = lambda: None) -> None:
         """Clear all faults; see `SharedDevice.ready`."""
-        bus = self._open_bus()
+        bus = self.bus
         if bus.faults or not bus.is_ready:
-            if bus.mode not in ("off", "silent"):
-                bus.release()
-            self._require_release(bus)
+            self.let_go()
             bus.set_up(alive)
             self._silent_since_ns = None
             if not self._has_watchdog:
@@ -84,44 +93,22 @@ class SharedBus:
                 "with `shapechanger robot home`, and serve the robot afresh."
             )
 
-    def stage(self, name: str, tension: float, length: float | None = None) -> bool:
-        """Set the tension or the length of a tendon from the next `flush` on.
-
-        Args:
-            name: Name of the tendon.
-            tension: Tension, N; with a length its limit.
-            length: Length beyond the zero, m; None to pull with the tension.
-
-        Returns:
-            Whether it will be pulled; a bus with a fault lets go.
-        """
-        self._tensions[name] = tension
-        self._lengths.pop(name, None)
-        if length is not None:
-            self._lengths[name] = length
-        return not self._open_bus().faults
-
     def flush(self, *, grip: bool) -> None:
         """Send the tensions of all servos; see `SharedDevice.flush`."""
-        bus = self._open_bus()
-        self._require_release(bus)
+        self._require_release()
+        bus = self.bus
         if bus.faults:
             return  # The bus is stopping, which its cycles complete.
         if bus.mode == "off" and grip:
             bus.hold()
         if bus.mode == "held":
-            bus.send(self._tensions, self._lengths)
+            bus.send(self.tensions, self.lengths)
 
     def let_go(self) -> None:
         """Switch the torque of all servos off."""
-        bus = self._open_bus()
-        if bus.mode not in ("off", "silent"):
-            bus.release()
-        self._require_release(bus)
-
-    def cycle(self, now_ns: int) -> BusState:
-        """Run a cycle of the bus."""
-        return self._open_bus().cycle(now_ns)
+        if self.bus.mode not in ("off", "silent"):
+            self.bus.release()
+        self._require_release()
 
     def leave(self, name: str) -> None:
         """Remove a servo; the last one closes the bus."""
@@ -132,20 +119,15 @@ class SharedBus:
                 self._bus.close()
                 self._bus = None
 
-    def _require_release(self, bus: ServoBus) -> None:
+    def _require_release(self) -> None:
         """Raise RobotError while a servo pulls that only the power switch can stop."""
-        if bus.mode != "silent" or self._has_watchdog:
+        if self.bus.mode != "silent" or self._has_watchdog:
             return
         now_ns = self._hardware.clock.now_ns()
         if self._silent_since_ns is None:
             self._silent_since_ns = now_ns
         if now_ns - self._silent_since_ns < self._settings.cut_ms * 1_000_000:
-            raise RobotError(" ".join(bus.faults.values()))
-
-    def _open_bus(self) -> ServoBus:
-        if self._bus is None:
-            raise RobotError(f"The bus at {self.device} is not in use.")
-        return self._bus
+            raise RobotError(" ".join(self.bus.faults.values()))
 
 
 # Open buses of this process, by hardware and device.
@@ -172,7 +154,6 @@ class TendonOutput:
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         key = (id(hardware), plan.settings["device"])
         self.device = _OPEN.get(key) or SharedBus(hardware, plan.settings["device"])
-        self._name = plan.name
         self._servo = self.device.add(plan)
         _OPEN[key] = self.device
 
@@ -187,14 +168,16 @@ class TendonOutput:
             The value in effect: 0 if the bus has a fault and lets go.
         """
         value = min(max(value, 0.0), 1.0)
-        servo = self._servo
-        tension, length = servo.pretension_n, None
+        servo, bus = self._servo, self.device
+        bus.lengths.pop(servo.name, None)
+        tension = servo.pretension_n
         if servo.control == "tension":
             tension += value * (servo.most_tension_n - servo.pretension_n)
         elif value > 0.0:
             tension = servo.most_tension_n
-            length = servo.longest_m + value * (servo.shortest_m - servo.longest_m)
-        return value if self.device.stage(self._name, tension, length) else 0.0
+            bus.lengths[servo.name] = servo.longest_m + value * (servo.shortest_m - servo.longest_m)
+        bus.tensions[servo.name] = tension
+        return 0.0 if bus.bus.faults else value
 
     def release(self) -> None:
         """Switch the torque of all servos on the bus off."""
@@ -202,7 +185,7 @@ class TendonOutput:
 
     def close(self) -> None:
         """Leave the bus."""
-        self.device.leave(self._name)
+        self.device.leave(self._servo.name)
 
 
 class TendonSensor:
@@ -232,7 +215,7 @@ class TendonSensor:
         Raises:
             RobotError: If there is a fault.
         """
-        state = self._bus.cycle(now_ns)
+        state = self._bus.bus.cycle(now_ns)
         if state.reason:
             raise RobotError(state.reason)
         readings: dict[str, float] = {}

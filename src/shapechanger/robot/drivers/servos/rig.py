@@ -11,14 +11,12 @@ from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
-from shapechanger.robot.drivers.servos.simulation import (
-    COUNTS_PER_RAD,
-    ServoPlan,
-    SimulatedServo,
-    Tendon,
-)
+from shapechanger.robot.drivers.servos.simulation import COUNTS_PER_RAD, ServoPlan, SimulatedServo
 
 _STEP_NS: Final = 1_000_000
+# Of the end stops.
+_SPRING_N_PER_M: Final = 300.0
+_DAMPER_NS_PER_M: Final = 60.0
 
 
 class Load(Protocol):
@@ -39,35 +37,23 @@ class EndStops:
 
     Args:
         count: Number of tendons.
-        stiffness: Stiffness of each spring, N/m.
-        damping: Damping of each spring, N·s/m.
-        nearest_m: How far an end can be pulled, m.
-        farthest_m: How far it can go the other way, m; at most 0.
+        nearest_m: How far an end can be pulled, m; it cannot go the other way.
 
     Attributes:
         travels: How far the ends are towards their spools, m.
     """
 
-    def __init__(
-        self,
-        count: int,
-        stiffness: float = 300.0,
-        damping: float = 60.0,
-        nearest_m: float = 0.02,
-        farthest_m: float = 0.0,
-    ) -> None:
-        self._stiffness = stiffness
-        self._lag_s = damping / stiffness
-        self._range = (farthest_m, nearest_m)
+    def __init__(self, count: int, nearest_m: float = 0.02) -> None:
+        self._nearest_m = nearest_m
         self.travels = [0.0] * count
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
         """Move under these tensions; see `Load.pull`."""
-        keep = math.exp(-dt_s / self._lag_s)
-        low, high = self._range
+        keep = math.exp(-dt_s * _SPRING_N_PER_M / _DAMPER_NS_PER_M)
         for i, tension in enumerate(tensions_n):
-            rest = tension / self._stiffness
-            self.travels[i] = min(max(rest + keep * (self.travels[i] - rest), low), high)
+            rest = tension / _SPRING_N_PER_M
+            travel = rest + keep * (self.travels[i] - rest)
+            self.travels[i] = min(max(travel, 0.0), self._nearest_m)
         return self.travels
 
 
@@ -199,12 +185,14 @@ class Rig:
         self._device = settings[0]["device"]
         self._names = tuple(output.name for output in outputs)
         self._world = world if isinstance(world, TendonWorld) else None
-        stiffness = Tendon().stiffness if self._world is None else self._world.cable_stiffness
+        stiffness = ServoPlan().stiffness if self._world is None else self._world.cable_stiffness
         plans = [
             ServoPlan(
                 id=one["id"],
                 model=one["model"],
-                tendon=Tendon(one["spool_radius_m"], one["direction"], stiffness),
+                spool_radius_m=one["spool_radius_m"],
+                direction=one["direction"],
+                stiffness=stiffness,
                 # In the middle of a count, as it stands while the finger is straight.
                 angle=(one["zero"] + 0.5) / COUNTS_PER_RAD,
             )
@@ -238,8 +226,8 @@ class Rig:
             return
         travels = list(self._world.travels())
         for servo, travel in zip(self._servos.values(), travels, strict=True):
-            tendon, motor = servo.plan.tendon, servo.motor
-            motor.angle = servo.plan.angle + travel / (tendon.direction * tendon.spool_radius_m)
+            motor = servo.motor
+            motor.angle = servo.plan.angle + travel / servo.plan.lever_m
             motor.speed = motor.tension = 0.0
         self.bus.set_travels(travels)
 
@@ -264,7 +252,7 @@ class Rig:
             case "overload":
                 servo.overload()
             case "snapped":
-                servo.plan.tendon.snapped = True
+                servo.motor.snapped = True
             case "power":
                 servo.lose_power()
             case _:

@@ -20,17 +20,17 @@ want of a source, to be tried on a rig:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, Literal
 
 from shapechanger.robot.drivers.servos.family import (
     COUNTS_PER_TURN,
+    MODELS,
     TRIPPED,
     WATCHDOG_STEP_MS,
     Register,
 )
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.drivers.servos.settings import MODELS, ServoModel
 
 # Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
 # degrees warmer, with a time constant of two minutes.
@@ -39,31 +39,42 @@ _KELVIN_PER_WATT: Final = 30.0
 _HEAT_S: Final = 120.0
 
 
-@dataclass(slots=True)
-class Tendon:
-    """Tendon between a spool and the load.
+@dataclass(frozen=True, slots=True)
+class ServoPlan:
+    """A servo, its spool and its tendon.
 
     Attributes:
+        id: Id on the bus.
+        model: Name of its model.
         spool_radius_m: Radius of the spool, m.
         direction: 1 if a positive angle winds in, -1 if it lets out.
         stiffness: Stiffness of cable and frame, N/m. Chosen: a good millimetre for 25 N. The end
             of the load needs a mass of more than 0.01 kg to follow such a spring in steps of 1 ms.
-        snapped: Whether it is torn.
+        angle: Angle of the spool at power-on, with the tendon just taut, rad.
+        firmware: Version of its firmware.
+        on_trip: Effect of its watchdog; see the module.
     """
 
+    id: int = 1
+    model: str = "XL330-M288"
     spool_radius_m: float = 0.005
     direction: int = 1
     stiffness: float = 20e3
-    snapped: bool = False
+    angle: float = 1.0
+    firmware: int = 52
+    on_trip: Literal["coast", "release"] = "coast"
+
+    @property
+    def lever_m(self) -> float:
+        """Length of tendon that is wound in per angle, m/rad."""
+        return self.direction * self.spool_radius_m
 
 
 class SimulatedMotor:
     """A motor with its gears, its spool and its end of a tendon.
 
     Args:
-        model: Model of the servo.
-        tendon: Its tendon.
-        angle: Angle of the spool while the tendon is just taut and its far end at 0, rad.
+        plan: The servo.
 
     Attributes:
         angle: Angle of the spool over many turns, rad.
@@ -71,20 +82,21 @@ class SimulatedMotor:
         current: Current, A.
         tension: Tension of the tendon, N.
         temperature: Temperature, degrees Celsius.
+        snapped: Whether the tendon is torn.
     """
 
-    def __init__(self, model: ServoModel, tendon: Tendon, angle: float = 0.0) -> None:
-        self._model = model
-        self._tendon = tendon
+    def __init__(self, plan: ServoPlan) -> None:
+        self._plan = plan
+        self._model = model = MODELS[plan.model]
         no_load, gears = model.no_load_rad_per_s, model.gears
         lost = (gears.friction_nm + gears.viscous * no_load) / model.stall_nm
         self._electric_rad_per_s = no_load / (1.0 - lost)  # No current: friction takes some speed.
-        self._taut_at = angle
-        self.angle = angle
+        self.angle = plan.angle
         self.speed = 0.0
         self.current = 0.0
         self.tension = 0.0
         self.temperature = _ROOM_C
+        self.snapped = False
 
     def current_at(self, volts: float) -> float:
         """Return the current at a voltage and the present speed, A."""
@@ -93,19 +105,17 @@ class SimulatedMotor:
 
     def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
         """Turn for one short step."""
-        model, gears, tendon = self._model, self._model.gears, self._tendon
+        model, gears, lever = self._model, self._model.gears, self._plan.lever_m
         # The faster it turns, the less current the voltage can still drive.
         least, most = min(self.current_at(-volts), 0.0), max(self.current_at(volts), 0.0)
         self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, least), most)
-        lever = tendon.direction * tendon.spool_radius_m
         # Friction and cable use the speed at the end of the step, so that a stiff cable does not
         # need a tiny step.
         inertia = gears.inertia + dt_s * gears.viscous
         torque = model.torque_constant * self.current
-        if self._pull(travel_m) > 0.0:
-            stretch = lever * (self.angle - self._taut_at) - travel_m
-            torque -= lever * tendon.stiffness * stretch
-            inertia += (dt_s * lever) ** 2 * tendon.stiffness
+        if (pull := self._pull(travel_m)) > 0.0:
+            torque -= lever * pull
+            inertia += (dt_s * lever) ** 2 * self._plan.stiffness
         speed = (gears.inertia * self.speed + dt_s * torque) / inertia
         held = dt_s * gears.friction_nm / inertia
         self.speed = math.copysign(max(abs(speed) - held, 0.0), speed)
@@ -115,11 +125,8 @@ class SimulatedMotor:
 
     def _pull(self, travel_m: float) -> float:
         """Return the tension for the positions of both ends, N."""
-        tendon = self._tendon
-        if tendon.snapped:
-            return 0.0
-        stretch = tendon.direction * tendon.spool_radius_m * (self.angle - self._taut_at) - travel_m
-        return max(0.0, tendon.stiffness * stretch)
+        stretch = self._plan.lever_m * (self.angle - self._plan.angle) - travel_m
+        return 0.0 if self.snapped else max(0.0, self._plan.stiffness * stretch)
 
     def _warm(self, dt_s: float) -> None:
         ohm = self._model.volts / self._model.stall_a
@@ -144,39 +151,14 @@ _START_NS: Final = 300_000_000
 _STALL_AT: Final = 2.0 * math.pi / 32.0  # rad.
 
 
-@dataclass(frozen=True, slots=True)
-class ServoPlan:
-    """A servo and what is attached to it.
-
-    Attributes:
-        id: Id on the bus.
-        model: Name of its model.
-        tendon: Its tendon.
-        angle: Angle of the spool at power-on, with the tendon just taut, rad.
-        firmware: Version of its firmware.
-        on_trip: Effect of its watchdog; see the module.
-    """
-
-    id: int
-    model: str = "XL330-M288"
-    tendon: Tendon = field(default_factory=Tendon)
-    angle: float = 1.0
-    firmware: int = 52
-    on_trip: Literal["coast", "release"] = "coast"
-
-
-class _Refusal(Exception):
-    """An instruction that the servo refuses; its argument is the number of the reason."""
-
-
 class SimulatedServo:
     """A servo.
 
     Args:
-        plan: The servo and its tendon.
+        plan: The servo.
 
     Attributes:
-        plan: The servo and its tendon.
+        plan: The servo.
         family: Family of the servo.
         mute: Whether it obeys without answering.
         deaf: Whether it receives nothing, as without its data line.
@@ -190,15 +172,9 @@ class SimulatedServo:
         self.family = family = model.family
         self.mute = self.deaf = False
         self.volts = model.volts
-        self.motor = SimulatedMotor(model, plan.tendon, plan.angle)
-        constants = [register for register, _, _ in family.constants]
-        registers = (*constants, family.model_number, family.firmware, family.mode, family.most)
-        registers += (family.torque_enable, family.hardware_error, family.mark, family.goal)
-        registers += (family.goal_position, family.current, family.speed, family.position)
-        registers += (family.voltage, family.temperature)
-        registers += () if family.lock is None else (family.lock,)
-        self._registers = {one.address: one for one in registers}
-        self._values = {one.address: one.initial for one in registers}
+        self.motor = SimulatedMotor(plan)
+        self._registers = {one.address: one for one in family.registers}
+        self._values = {one.address: one.initial for one in family.registers}
         self._values[family.model_number.address] = model.number
         self._values[family.firmware.address] = plan.firmware
         self._values[family.most.address] = model.most_counts
@@ -235,17 +211,37 @@ class SimulatedServo:
 
     def read(self, at: int, size: int) -> ServoReply:
         """Reply with bytes of the registers."""
-        try:
-            return self._reply(0, self._read(at, size))
-        except _Refusal as refusal:
-            return self._reply(refusal.args[0])
+        self._measure()
+        data, block = b"", self.family.present
+        while len(data) < size:
+            here = at + len(data)
+            if (register := self._registers.get(here)) is not None:
+                data += register.encode(self._values[here])
+            elif block.address <= here < block.address + block.size:
+                data += b"\0"
+            else:
+                return self._reply(_ACCESS)
+        return self._reply(0, data) if len(data) == size > 0 else self._reply(_ACCESS)
 
     def write(self, at: int, data: bytes) -> ServoReply:
         """Write one register and reply."""
-        try:
-            self._write(at, data)
-        except _Refusal as refusal:
-            return self._reply(refusal.args[0])
+        family, values, register = self.family, self._values, self._registers.get(at)
+        if register is None or register.values is None:
+            return self._reply(_ACCESS)
+        if len(data) != register.size:
+            return self._reply(_LENGTH)
+        locked = self.has_torque if family.lock is None else values[family.lock.address]
+        if at < family.eeprom_end and locked:
+            return self._reply(_ACCESS)
+        value = register.decode(data)
+        if refusal := self._refusal(register, value):
+            return self._reply(refusal)
+        values[at] = value
+        if register == family.mode:  # A change of mode sets the goal to its limit.
+            values[family.goal.address] = values[family.most.address]
+        if register in (family.torque_enable, family.mark):
+            self._fed_ns = self._now_ns
+        self._cache()
         return self._reply(0)
 
     def overload(self) -> None:
@@ -323,55 +319,18 @@ class SimulatedServo:
             self._values[self.family.torque_enable.address] = 0
         self._cache()
 
-    def _read(self, at: int, length: int) -> bytes:
-        self._measure()
-        data, block = b"", self.family.present
-        while len(data) < length:
-            here = at + len(data)
-            if (register := self._registers.get(here)) is not None:
-                data += register.encode(self._values[here])
-            elif block.address <= here < block.address + block.size:
-                data += b"\0"
-            else:
-                raise _Refusal(_ACCESS)
-        if len(data) != length or not length:
-            raise _Refusal(_ACCESS)
-        return data
-
-    def _write(self, at: int, data: bytes) -> None:
-        """Write one register."""
-        family, values = self.family, self._values
-        register = self._registers.get(at)
-        if register is None or register.values is None:
-            raise _Refusal(_ACCESS)
-        if len(data) != register.size:
-            raise _Refusal(_LENGTH)
-        locked = self.has_torque if family.lock is None else values[family.lock.address]
-        if at < family.eeprom_end and locked:
-            raise _Refusal(_ACCESS)
-        value = register.decode(data)
-        self._check(register, value)
-        values[at] = value
-        if register == family.mode:  # A change of mode sets the goal to its limit.
-            values[family.goal.address] = values[family.most.address]
-        if register in (family.torque_enable, family.mark):
-            self._fed_ns = self._now_ns
-        self._cache()
-
-    def _check(self, register: Register, value: int) -> None:
-        """Refuse a value that the register or the present state of the servo does not allow."""
+    def _refusal(self, register: Register, value: int) -> int:
+        """Return why the register, or the present state of the servo, refuses a value; 0 if not."""
         family, values = self.family, self._values
         allowed = range(self._model.most_counts + 1) if register == family.most else register.values
-        if allowed is None or value not in allowed:
-            raise _Refusal(_RANGE)
-        if register == family.goal:
-            if family.has_watchdog and values[family.mark.address] == TRIPPED:
-                raise _Refusal(_RANGE)
-            if abs(value) > values[family.most.address]:
-                raise _Refusal(_LIMIT)
         failed = values[family.hardware_error.address] & self._model.shutdown
-        if register == family.torque_enable and value and failed:
-            raise _Refusal(_RANGE)  # Until a reboot.
+        tripped = family.has_watchdog and values[family.mark.address] == TRIPPED
+        if allowed is None or value not in allowed or (register == family.goal and tripped):
+            return _RANGE
+        if register == family.goal and abs(value) > values[family.most.address]:
+            return _LIMIT
+        # Until a reboot.
+        return _RANGE if register == family.torque_enable and value and failed else 0
 
     def _measure(self) -> None:
         """Update the registers of its measurements."""
