@@ -139,7 +139,7 @@ _MODULES: Final = {
         *("JointRange", "Lock", "Mass", "Radius", "Remove", "Split", "StartHeight", "Stiffness"),
         *("Stretch", "compile_body", "interpolate", "reshape"),
         *("PlaceBody", "PlaceGeom", "TotalMass", "AddMotor", "AddFreeJoint", "AddFloor"),
-        ),
+    ),
     "morphology.certificate": ("Certificate", "certify"),
     "policy": ("load_policy", "save_policy"),
     "robot.client.client": ("RobotClient",),
