@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Look, Obstacle
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
-from shapechanger.vehicles.courses.harbour import BANK_M, add_banks, extent, fittings, moored
-from shapechanger.vehicles.courses.surfaces import QuadMesh, Surfaces
+from shapechanger.vehicles.courses.harbour import BANK_M, add_banks, fittings, moored
+from shapechanger.vehicles.courses.surfaces import QuadMesh, Surfaces, extent
 
 _SEEDS = (0, 1, 2, 5, 1_000_000)
 # Tyres and ladders stand out of their wall.

@@ -207,7 +207,8 @@ def _furnish(
     """Add furniture along the walls, and a few boxes in the way."""
     density = rng.uniform(0.1, 0.35)  # Obstacles per metre.
     ahead, lengths = _legs(corners)
-    for k, length in enumerate(lengths.tolist()):
+    for k in range(len(corners)):
+        length = float(lengths[k])
         yaw = float(np.arctan2(ahead[k, 1], ahead[k, 0]))
         for _ in range(rng.poisson(density * length)):
             size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
@@ -249,7 +250,8 @@ def _lamps(
     across = rng.random() < 0.35
     lamps: list[Lamp] = []
     ahead, lengths = _legs(corners)
-    for k, length in enumerate(lengths.tolist()):
+    for k in range(len(corners)):
+        length = float(lengths[k])
         count = max(1, round(length / every))
         yaw = float(np.arctan2(ahead[k, 1], ahead[k, 0])) + (np.pi / 2.0 if across else 0.0)
         for i in range(count):

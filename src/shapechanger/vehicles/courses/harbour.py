@@ -13,13 +13,10 @@ import numpy as np
 
 from shapechanger.vehicles.courses.course import Course, Wall
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
-from shapechanger.vehicles.courses.surfaces import Array, QuadMesh
+from shapechanger.vehicles.courses.surfaces import Array, QuadMesh, extent
 
 BANK_M: Final = 0.4
 """Width of quays and rocks; two parts of the lane are at least twice this apart."""
-
-SHORE_M: Final = 45.0
-"""Distance of the far shore from the corners of the course."""
 
 _PAVING_PERIOD: Final = 2.4
 # Probabilities that a quay wall of 2 m has them.
@@ -125,12 +122,6 @@ def moored(course: Course) -> list[MooredBoat]:
         ):
             placed.append(boat)
     return placed
-
-
-def extent(course: Course) -> tuple[Array, float]:
-    """Middle of a course, m, (2,), and radius of the far shore around it, m."""
-    low, high = course.route.min(axis=0), course.route.max(axis=0)
-    return 0.5 * (low + high), 0.5 * float(np.hypot(*(high - low))) + SHORE_M
 
 
 def far_shore(course: Course) -> QuadMesh:

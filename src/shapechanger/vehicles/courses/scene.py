@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.bodies.visuals import add_lit_mesh
 from shapechanger.vehicles.courses.course import FLOODED, Colour, Course, Look
+from shapechanger.vehicles.courses.harbour import add_banks, far_shore, fittings
 from shapechanger.vehicles.courses.surfaces import Array, QuadMesh, Surfaces
 from shapechanger.vehicles.courses.textures import texture
 
@@ -68,7 +69,10 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
             mirrored = look.gloss > 0.0 and opacity == 1.0
             _add_surface(spec, f"world/{name}", mesh.arrays(mirrored), painted, (*colour, opacity))
 
-    for surface, mesh in surfaces.walls().items():
+    walls = surfaces.walls()
+    if course.world == "harbour":
+        add_banks(course, walls, surfaces.light_at)
+    for surface, mesh in walls.items():
         show(surface, mesh, look.tone(look.wall))
     if course.ceiling_m > 0.0:
         show("ceiling", surfaces.ceiling(), plain)
@@ -79,8 +83,6 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     if course.world == "yard":
         show("grass", surfaces.verges(), plain)
     if course.world == "harbour":
-        from shapechanger.vehicles.courses.harbour import far_shore, fittings
-
         show("shore", far_shore(course), plain)
         show("harbour", fittings(course), plain)
     show("things", surfaces.obstacles(), plain)

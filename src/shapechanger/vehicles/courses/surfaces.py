@@ -140,6 +140,9 @@ _LONGEST: Final = 0.8
 _ROWS: Final = np.array([0.0, 0.35, 1.0])
 _UPWARDS: Final = np.array([0.86, 1.0, 0.94])
 
+SHORE_M: Final = 45.0
+"""Distance of the far shore from the corners of the course."""
+
 
 class Surfaces:
     """Surfaces of a course with precomputed light."""
@@ -157,13 +160,13 @@ class Surfaces:
         corners = self._tiles()
         if self._course.world == "harbour":
             corners = np.concatenate([corners, self._open_water(corners)])
-        return _level(corners, 0.0, _GROUND_PERIOD, self._light_at(corners))
+        return _level(corners, 0.0, _GROUND_PERIOD, self.light_at(corners))
 
     def ceiling(self) -> QuadMesh:
         """Ceiling, seen from below."""
         corners = self._tiles()[:, ::-1]
         return _level(
-            corners, self._course.ceiling_m, _CEILING_PERIOD, 0.9 * self._light_at(corners)
+            corners, self._course.ceiling_m, _CEILING_PERIOD, 0.9 * self.light_at(corners)
         )
 
     def lamps(self) -> QuadMesh:
@@ -182,7 +185,7 @@ class Surfaces:
             flat = np.array([start, end, end + inwards, start + inwards])
             far = wall.frame()[2] / 1.5
             uvs = np.array([[(0.0, 0.2), (far, 0.2), (far, 0.0), (0.0, 0.0)]])
-            mesh.add(_raised(flat[None], _VERGE_RISE), uvs, self._light_at(flat)[None])
+            mesh.add(_raised(flat[None], _VERGE_RISE), uvs, self.light_at(flat)[None])
         return mesh
 
     def walls(self) -> dict[str, QuadMesh]:
@@ -199,11 +202,7 @@ class Surfaces:
             else:
                 name = "panel" if clad and wall.surface == "plaster" else wall.surface
                 self._add_wall(result[name], wall, 0.0, wall.height, offset)
-        if self._course.world == "harbour":
-            from shapechanger.vehicles.courses.harbour import add_banks
-
-            add_banks(self._course, result, self._light_at)
-        return dict(result)
+        return result
 
     def obstacles(self) -> QuadMesh:
         """All obstacles of a course, which share one texture."""
@@ -213,13 +212,13 @@ class Surfaces:
                 (obstacle.x, obstacle.y),
                 (obstacle.length, obstacle.width, obstacle.height),
             )
-            light = float(self._light_at(np.array(place)))
+            light = float(self.light_at(np.array(place)))
             has_cabin = obstacle.kind == "dinghy" and round(1000.0 * obstacle.length) % 2
             name = "cabin dinghy" if has_cabin else obstacle.kind
             mesh.add_solid(name, (*place, 0.0), obstacle.yaw, size, light)
         return mesh
 
-    def _light_at(self, points: Array) -> Array:
+    def light_at(self, points: Array) -> Array:
         """Light at points, m, (..., 2), from 0 to 1."""
         if not len(self._lamps):
             return np.ones(points.shape[:-1])
@@ -255,8 +254,6 @@ class Surfaces:
 
     def _open_water(self, tiles: Array) -> Array:
         """Corners of four large tiles around the others, up to the far shore, m, (4, 4, 2)."""
-        from shapechanger.vehicles.courses.harbour import extent
-
         (x0, y0), (x1, y1) = tiles.min(axis=(0, 1)), tiles.max(axis=(0, 1))
         middle, radius = extent(self._course)
         (left, bottom), (right, top) = middle - radius, middle + radius
@@ -279,7 +276,13 @@ class Surfaces:
         uvs[..., 1] = (1.0 - _ROWS[:, None]) * down
         dx, dy = end - start
         facing = self._facing(float(np.arctan2(dx, -dy)))
-        mesh.add_grid(points, uvs, _UPWARDS[:, None] * (facing * self._light_at(base)))
+        mesh.add_grid(points, uvs, _UPWARDS[:, None] * (facing * self.light_at(base)))
+
+
+def extent(course: Course) -> tuple[Array, float]:
+    """Middle of a course, m, (2,), and radius of the far shore around it, m."""
+    low, high = course.route.min(axis=0), course.route.max(axis=0)
+    return 0.5 * (low + high), 0.5 * float(np.hypot(*(high - low))) + SHORE_M
 
 
 def _level(corners: Array, height: float, period: float, lights: Array) -> QuadMesh:
