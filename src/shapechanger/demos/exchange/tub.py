@@ -164,10 +164,9 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
 
 
 def _kind_of(value: Any) -> str:
-    if isinstance(value, str) and value.lower().endswith(_ENDINGS):
-        return _PICTURES[0]
-    kind: Any = type(value)
-    return _KINDS.get(kind, "list")
+    kind = _KINDS.get(type(value), "list")
+    is_picture = kind == "str" and str(value).lower().endswith(_ENDINGS)
+    return _PICTURES[0] if is_picture else kind
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
