@@ -80,7 +80,7 @@ _V1_TIME: Final = "milliseconds"
 _MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
 _MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two times.
 _NUMBERS: Final = ("float", "int", "boolean")
-_KINDS: Final = {str: "str", bool: "boolean", int: "float", float: "float"}
+_KINDS: Final[dict[type[object], str]] = {str: "str", bool: "boolean", int: "float", float: "float"}
 _PICTURES: Final = ("image_array", "image")
 _DEPTH: Final = "gray16_array"
 _KNOWN: Final = (*_NUMBERS, *_PICTURES, _DEPTH, "str", "list", "vector", "nparray")
@@ -163,7 +163,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         yield episode_of(part, header, context, name=name, what="record")
 
 
-def _kind_of(value: Any) -> str:
+def _kind_of(value: object) -> str:
     kind = _KINDS.get(type(value), "list")
     is_picture = kind == "str" and str(value).lower().endswith(_ENDINGS)
     return _PICTURES[0] if is_picture else kind
