@@ -285,7 +285,7 @@ class Radius(Edit, frozen=True):
             require_geometry(spec, body)
             release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
             for geom in body.geoms:
-                thicken_geom(geom, factor)
+                thicken_geom(spec, geom, factor)
 
 
 # Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
