@@ -142,6 +142,7 @@ def pairs_of(folder: Path, camera: str = "") -> tuple[list[list[tuple[int, int]]
     """
     context = ImportContext(camera=camera)
     found: list[list[tuple[int, int]]] = []
+    assert FORMAT.read is not None
     for episode in FORMAT.read(folder, context):
         picture = -1
         steps: list[tuple[int, int]] = []

@@ -99,6 +99,7 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
 
     folder = write_set(tmp_path / "set", rows=spoil, **stored(images))
     context = ImportContext()
+    assert FORMAT.read is not None
     rows = [list(episode.rows) for episode in FORMAT.read(folder, context)]
     assert [[row.jpeg is not None for row in episode] for episode in rows] == [
         [True, False, False, False, True, False, False],

@@ -71,6 +71,7 @@ def _observe(group: h5py.Group, name: str, space: gym.Space[Any]) -> None:
 def actions_of(folder: Path) -> tuple[list[list[int]], ImportContext]:
     """Return the actions of each episode, and the findings."""
     context = ImportContext()
+    assert FORMAT.read is not None
     episodes = [list(episode.rows) for episode in FORMAT.read(folder, context)]
     return [[int(row.step.action[0]) for row in rows] for rows in episodes], context
 
