@@ -242,7 +242,7 @@ def test_certificates_name_the_files(dog: Path, tmp_path: Path) -> None:
     other = shapechanger.from_mjcf(dog, body=Stretch("front", 1.5))
     text = str(_inner(one).certify_shift(one, other))
     assert "front: length 0.4123 m -> 0.6185 m (x1.5)" in text
-    with pytest.raises(EmptyShift, match="dog and dog behave alike"):
+    with pytest.raises(EmptyShift, match="dog and dog behave the same"):
         _inner(one).certify_shift(one, shapechanger.from_mjcf(dog))
     cat = tmp_path / "cat.xml"
     cat.write_text(DOG.replace('mass="3"', 'mass="1"'))
@@ -371,7 +371,7 @@ def test_velocity_servos_have_a_unit(dog: Path) -> None:
         ({"frame_skip": 0}, EnvArgumentError, "frame_skip must be at least 1"),
         ({"reset_noise_scale": -1.0}, EnvArgumentError, "reset_noise_scale must be a number"),
         ({"width": "wide"}, EnvArgumentError, "width must be a number"),
-        ({"rig": AddMotor("*", 1.0)}, MorphologyError, "has a motor, or there is none"),
+        ({"rig": AddMotor("*", 1.0)}, MorphologyError, "has a motor, or none matches"),
     ],
 )
 def test_wrong_arguments_are_refused(

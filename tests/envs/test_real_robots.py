@@ -208,7 +208,7 @@ def test_its_shift_is_certified(robot: _Robot) -> None:
     source, target = robot.make(), robot.make((Mass("*", scale=1.3),))
     certificate = source.unwrapped.certify_shift(source, target)
     assert "mass" in str(certificate)
-    with pytest.raises(EmptyShift, match="behave alike"):
+    with pytest.raises(EmptyShift, match="behave the same"):
         source.unwrapped.certify_shift(source, robot.make())
 
 

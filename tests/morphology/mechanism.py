@@ -23,7 +23,7 @@ _TEXT = """
         <joint name="crank" axis="0 1 0" range="{wide}"/>
         <geom name="crank" type="capsule" fromto="0 0 0 {crank}" size=".01"/>
         <geom name="drum" type="sphere" size=".02" pos="{drum}" contype="0" conaffinity="0"/>
-        <site name="beside" pos="{beside}"/>
+        <site name="side" pos="{side}"/>
         <site name="rim" pos="{drum}"/>
         <body name="coupler" pos="{crank}">
           <joint name="coupler" axis="0 1 0" range="{wide}" damping=".1"/>
@@ -71,7 +71,7 @@ _TEXT = """
   </contact>
   <tendon>
     <spatial name="rope" range="0 9" limited="true">
-      <site site="origin"/><geom geom="drum" sidesite="beside"/><site site="pull"/>
+      <site site="origin"/><geom geom="drum" sidesite="side"/><site site="pull"/>
     </spatial>
     <fixed name="sum"><joint joint="left" coef="1"/></fixed>
   </tendon>
@@ -184,7 +184,7 @@ class Mechanism(NamedTuple):
                 pin=_text(pin),
                 tool=_text(self.tool * coupler),
                 drum=_text(0.5 * crank),
-                beside=_text(0.5 * crank + np.array([0.0, 0.05, 0.0])),
+                side=_text(0.5 * crank + np.array([0.0, 0.05, 0.0])),
                 housing=_text(0.15 * coupler),
                 along=_text(along),
                 pin_text=pins[self.form],

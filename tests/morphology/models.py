@@ -170,7 +170,7 @@ def capsule_inertia(radius: float, length: float, density: float) -> tuple[float
 def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> dict[str, Array]:
     """Return the physical properties of a model by name, with joints at given positions.
 
-    Mass, centre of mass and inertia are those of all bodies together, so that models with
+    Mass, centre of mass and inertia add up all bodies, so that models with
     different bodies can be compared.
     """
     data = posed(model, {j: p for j, p in (angles or {}).items() if _has_joint(model, j)})

@@ -148,7 +148,7 @@ _WALKER = """
 
 
 def test_objects_neither_carry_the_robot_nor_move() -> None:
-    """The standing height, the start, the mass and the limbs are those of the robot alone."""
+    """The standing height, the start, the mass and the limbs count the robot alone."""
     model = mujoco.MjModel.from_xml_string(_WALKER)
     rules = StartRules(model)
     start = start_pose(model)

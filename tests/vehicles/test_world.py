@@ -42,7 +42,7 @@ def _drive(world: MujocoWorld, outputs: Mapping[str, float | None], seconds: flo
 def test_poses_that_are_computed_once_change_no_drive(
     vehicle: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With MuJoCo's sleep flag a drive into a wall and a picture's poses are bit for bit alike."""
+    """With MuJoCo's sleep flag, a drive into a wall and the poses of images keep every bit."""
     states: list[tuple[bytes, ...]] = []
     world = _world(vehicle)
     assert world.model.opt.enableflags == mujoco.mjtEnableBit.mjENBL_SLEEP
@@ -64,7 +64,7 @@ def test_poses_that_are_computed_once_change_no_drive(
 def test_wheels_that_meet_only_the_ground_change_no_drive(
     vehicle: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Until it hits a wall with its hull, a coarse world of equal steps is bit for bit alike."""
+    """Until it hits a wall with its hull, a coarse world of equal steps is bit for bit the same."""
     monkeypatch.setattr(world_module, "_COARSE_DT", SIM_DT)
     poses: list[Pose] = []
     for coarse in (False, True):

@@ -86,7 +86,7 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
 
 
 def is_grey(jpeg: bytes, name: str) -> bool:
-    """Return whether a JPEG has no colours; errors are those of `picture_size`.
+    """Return whether a JPEG has no colours; errors as in `picture_size`.
 
     Args:
         jpeg: Its bytes.

@@ -226,7 +226,7 @@ def _timeline(episode: Episode) -> dict[str, Any]:
 
 
 def _reach(*bounds: float) -> float:
-    """Largest magnitude of the finite bounds; 1 if there are none."""
+    """Largest magnitude of the finite bounds; 1 without finite bounds."""
     return max((abs(bound) for bound in bounds if math.isfinite(bound)), default=1.0)
 
 

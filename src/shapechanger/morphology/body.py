@@ -56,7 +56,7 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
 
     Raises:
         UnknownName: As of `from_json`.
-        MorphologyError: If `value` is none of these.
+        MorphologyError: If `value` is something else.
     """
     if isinstance(value, str):
         return from_json(value)
@@ -175,7 +175,7 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
 
 
 def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjModel:
-    """Compile a specification with edits applied; derived constants are computed anew.
+    """Compile a specification with edits applied; derived constants are computed again.
 
     Args:
         spec: The specification; not changed.

@@ -68,9 +68,9 @@ def trunk_joint(model: mujoco.MjModel) -> int | None:
 
 
 def travelling_body(model: mujoco.MjModel) -> int | None:
-    """Return the index of the body that can go anywhere; None if there is none.
+    """Return the index of the body that can go anywhere; None without one.
 
-    It is that of the robot's free joint or, without one, of its first slide without limits on a
+    It has the robot's free joint or, without one, of its first slide without limits on a
     body on the world, as of runners in a plane.
     """
     trunk = trunk_joint(model)
@@ -81,7 +81,7 @@ def travelling_body(model: mujoco.MjModel) -> int | None:
 def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     """Return the coordinate that raises the trunk; None for a body that cannot be raised.
 
-    It is that of the robot's free joint or, without one, of its first vertical slide without limits
+    It has the robot's free joint or, without one, of its first vertical slide without limits
     on a body on the world. A slide with limits is a hoist, which does not stand.
     """
     trunk = trunk_joint(model)
@@ -276,7 +276,7 @@ class StartRules:
         """Return the clearance of the robot's lowest point above the floor, m; negative inside it.
 
         The floor is every plane and height field that is fixed to the world and can touch the
-        robot's geoms; 1000 if there is none.
+        robot's geoms; 1000 without one.
 
         Args:
             data: Data of the model after `mj_kinematics`.

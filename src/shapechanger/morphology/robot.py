@@ -1,7 +1,7 @@
 """The part of a model that is the robot: all that its actuators move, directly or by a coupling.
 
 A file may hold a robot and objects, in any order. Trunk, standing height, mass, start poses and
-limbs are those of the robot.
+limbs are the robot's.
 """
 
 from __future__ import annotations

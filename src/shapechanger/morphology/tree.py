@@ -1,7 +1,7 @@
 """The kinematic tree of a body: its trunk, its limbs, and numbers that describe each.
 
-A policy for many bodies reads them beside what it senses: N. Bohlinger and others, One Policy to
-Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
+A policy for many bodies reads them in addition to what it senses: N. Bohlinger and others, One
+Policy to Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _EQUAL: Final = 1e-6
 LIMB_NUMBERS: Final = (
     *("joint x", "joint y", "joint z", "distance"),  # From the trunk's origin: direction, and m.
     *("axis x", "axis y", "axis z"),
-    *("end x", "end y", "end z", "length"),  # From the joint to the limb's farthest end: likewise.
+    *("end x", "end y", "end z", "length"),  # From the joint to the limb's farthest end: the same.
     *("mass", "mass with limbs"),  # Decades above 1 kg.
     *("start", "lower", "upper"),  # Of the joint, rad or m; 0 for limits that it has not.
     *("strength", "damping", "armature"),  # Decades, so that each is about 1.
@@ -54,7 +54,7 @@ class Limb(msgspec.Struct, frozen=True):
         joint: Name of its hinge or slide.
         bodies: Names of its body and of those fixed to it; none if another joint of the same body
             has them.
-        actuator: Name of the actuator that moves the joint; empty if there is none. One of a
+        actuator: Name of the actuator that moves the joint; empty without one. One of a
             tendon, site or body counts for the joint that it turns most in the start pose, of those
             without an actuator yet; of equal ones, for the nearest to the trunk.
         numbers: What describes it, see `LIMB_NUMBERS`.

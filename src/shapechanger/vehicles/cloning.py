@@ -118,7 +118,7 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
         budgets = ", ".join(f"{budget:,}" for budget in self.budgets)
         return (
             f"after {budgets} steps. Steps are demonstrated steps: at each budget a policy is "
-            "cloned anew from the same start, and all arms use the same demonstrations."
+            "cloned again from the same start, and all arms use the same demonstrations."
         )
 
     def within(self, steps: int) -> tuple[int, ...]:
@@ -366,8 +366,8 @@ STUDENT_CLONING: Final = CloneSettings(held_out=0.0, passes=50.0, most_steps=300
 """Default settings of its cloning."""
 
 _EPISODE_STEPS: Final = 200
-# Rounds that the student drives, trained anew before each, after one round of the teacher. With one
-# round of as many steps students had 1.8 collisions per 100 m.
+# Rounds that the student drives, trained again before each, after one round of the teacher. With
+# one round of as many steps students had 1.8 collisions per 100 m.
 _ROUNDS: Final = 2
 # Limit of the training steps of the clones that drive a round.
 _BETWEEN: Final = 1500

@@ -427,13 +427,13 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     if not kept.any():
         raise DemosError("In no step of these demonstrations does the vehicle drive forward.")
     lengths = [int(part.sum()) for part in np.split(kept, np.cumsum(data.episodes)[:-1])]
-    beside = np.abs(labels.actions[kept, 0]) * WIDEST_RAD > HALF_WIDTH_RAD
+    outside = np.abs(labels.actions[kept, 0]) * WIDEST_RAD > HALF_WIDTH_RAD
     notes = (
         f"The vehicle turns {response.per_metre:.2f} rad for each metre and "
         f"{response.per_second:.2f} for each second at full steering, {source}.",
         f"{np.mean(~kept):.1%} of the steps are left out: it stands still, drives backward, or did "
         "not measure its speed.",
-        f"{np.mean(beside):.1%} of the waypoints are beside the picture, which ends "
+        f"{np.mean(outside):.1%} of the waypoints are outside the picture, which ends "
         f"{math.degrees(HALF_WIDTH_RAD):.0f} degrees to each side; "
         f"{np.mean(labels.at_limit[kept]):.1%} are at the limit of the steering, so that the way "
         "may be farther aside.",

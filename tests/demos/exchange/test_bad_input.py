@@ -41,10 +41,10 @@ from tests.demos.exchange.small import (
 def refused(folder: Path, out: Path, format: str = "auto", *, strict: bool = False) -> str:
     """Return the error of a refused import; check that no file was created or changed."""
     before = snapshot(folder) if folder.is_dir() else {}
-    beside = sorted(out.parent.iterdir())
+    neighbours = sorted(out.parent.iterdir())
     with pytest.raises(ShapechangerError) as caught:
         import_recording(folder, out, format, strict=strict)
-    assert sorted(out.parent.iterdir()) == beside
+    assert sorted(out.parent.iterdir()) == neighbours
     assert (snapshot(folder) if folder.is_dir() else {}) == before
     text = str(caught.value)
     assert "\n" not in text

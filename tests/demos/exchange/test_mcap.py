@@ -70,7 +70,7 @@ def exported(tmp_path: Path) -> Path:
 
 
 def test_every_value_is_there(exported: Path) -> None:
-    """By topic, with the times of the robot's clock, and of the rate where there is none."""
+    """By topic, with the times of the robot's clock, and from the rate without times."""
     found = messages(exported)
     start = 7 * 10**9 + 5
     times = [at for at, _ in of(found, "/state")]
@@ -130,7 +130,7 @@ def test_unknown_times_fit_the_known_ones(
 
 
 def test_schemas_and_metadata(exported: Path) -> None:
-    """Schemas say what is measured in which unit; the header is kept."""
+    """Schemas name each quantity and its unit; the header is kept."""
     with exported.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         summary = reader.get_summary()

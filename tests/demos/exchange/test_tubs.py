@@ -380,7 +380,7 @@ def test_cameras_of_other_names(tmp_path: Path) -> None:
         (folder / f"images/{n}_left.jpg").write_bytes(picture(n))
         (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
     _, done = imported(folder)
-    assert (done.pictures, done.notes) == (3, ("The pictures are those of the column cam/left.",))
+    assert (done.pictures, done.notes) == (3, ("The pictures come from the column cam/left.",))
     both = [r | {"cam/right": f"{r['_index']}_right.jpg"} for r in made]
     two = tub_folder(
         tmp_path / "two", both, inputs={"cam/left": "image_array", "cam/right": "jpeg"}

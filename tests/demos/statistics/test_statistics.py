@@ -29,9 +29,9 @@ def test_without_bounds_the_range_is_that_of_the_numbers() -> None:
     found = spread([2.0, 4.0])
     assert found is not None
     assert (found.low, found.high) == (2.0, 4.0)
-    alike = spread([3.0, 3.0])
-    assert alike is not None
-    assert (alike.low, alike.high, alike.total) == (2.5, 3.5, 2)
+    equal = spread([3.0, 3.0])
+    assert equal is not None
+    assert (equal.low, equal.high, equal.total) == (2.5, 3.5, 2)
     assert spread([math.nan, math.inf]) is None
 
 

@@ -177,9 +177,9 @@ def test_switches_count(option: str, value: int) -> None:
 
 def test_the_mix_counts_where_there_is_something_to_mix() -> None:
     """The weight of a geom's solver parameters is nothing between equal ones."""
-    alike, apart = everything(), everything()
+    equal, apart = everything(), everything()
     apart.geom_solref[0, 0] *= 2.0
-    for model, counts in ((alike, False), (apart, True)):
+    for model, counts in ((equal, False), (apart, True)):
         nominal = fingerprint(model)
         model.geom_solmix[0] *= 0.5
         assert (fingerprint(model) != nominal) is counts

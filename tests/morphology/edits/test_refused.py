@@ -245,7 +245,7 @@ def test_the_nearest_element_of_the_kind_is_suggested(edit: Edit, kind: str, nea
         ),
         (leg, PlaceGeom("sole", (0.0, 0.0, 0.0), _END), "'sole' is no capsule or cylinder"),
         (leg, PlaceGeom("trunk", radius=0.1), "'trunk' is no sphere, capsule or cylinder"),
-        (leg, AddMotor("*"), r"matches '\*' has a motor, or there is none"),
+        (leg, AddMotor("*"), r"matches '\*' has a motor, or none matches"),
         (leg, AddFreeJoint("trunk"), "'trunk' is not fixed: it has the joint 'root'"),
         (leg, AddFloor(), "A new geom needs an unused name, got 'floor'"),
         (ant, StartHeight("aux_1", 1.0), r"No trunk matches 'aux_1'\..* There are: torso\."),

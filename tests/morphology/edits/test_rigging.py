@@ -56,7 +56,7 @@ def test_a_joint_gets_one_motor() -> None:
     """A glob leaves joints with a motor as they are; nothing to do is refused."""
     model = built(urdf(), AddMotor("elbow", 3.0), AddMotor("*", 5.0))
     np.testing.assert_array_equal(model.actuator_gear[:, 0], [3.0, 5.0])
-    with pytest.raises(MorphologyError, match=r"matches '\*' has a motor, or there is none"):
+    with pytest.raises(MorphologyError, match=r"matches '\*' has a motor, or none matches"):
         reshape(leg(), [AddMotor("*")])
     with pytest.raises(UnknownName, match="Did you mean 'elbow'"):
         reshape(urdf(), [AddMotor("elbw")])

@@ -44,7 +44,7 @@ def test_a_profile_in_the_working_folder_has_a_name(
     ],
 )
 def test_a_missing_profile_has_a_nearest_spelling(tmp_path: Path, name: str, hint: str) -> None:
-    """Files beside it come first, then shipped profiles."""
+    """Files next to it come first, then shipped profiles."""
     (tmp_path / "my-car.toml").touch()
     with pytest.raises(ProfileError, match=hint):
         load_profile(tmp_path / name)

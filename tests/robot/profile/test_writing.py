@@ -25,7 +25,7 @@ def rover(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("kind", shipped_profiles())
 def test_a_first_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> None:
-    """All other lines are those of the shipped file, including comments."""
+    """All other lines equal the shipped file's, including comments."""
     path = write_profile(kind, tmp_path / "new" / "my.toml", 'Ann\'s "7" \\ ü')
     profile = load_profile(path)
     assert profile.name == 'Ann\'s "7" \\ ü'

@@ -1,6 +1,6 @@
 """A whole robot in this process: guard, drivers, pins and world.
 
-The guard and the drivers are those of a served robot. `step` gives the guard one command and
+The guard and the drivers are a served robot's. `step` gives the guard one command and
 advances one control period. There is no link, no control lease and no deadline to miss; time
 advances only in steps, as with `--clock twin`.
 """

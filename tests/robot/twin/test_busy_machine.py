@@ -1,4 +1,4 @@
-"""A twin in real time beside other work on a busy machine."""
+"""A twin in real time, next to other work on a busy machine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SHORT_S = 0.15  # Shorter than the board needs to lay out a course.
 def test_a_busy_machine_does_not_cost_the_guard(tmp_path: Path) -> None:
     """On busy cores the board is held up for longer than the deadline, and nothing fails.
 
-    Without the privilege of real time, as most users are, and as a training beside it leaves them.
+    Without the privilege of real time, as most users are, and as a training next to it leaves them.
     """
     profile = tmp_path / "lab-car.toml"
     text = find_profile("lab-car").read_text()

@@ -259,7 +259,7 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
 
 
 def test_a_feetech_rig_needs_a_power_switch() -> None:
-    """Without [enable] the profile says what to add."""
+    """Without [enable] the error names the missing table."""
     text = finger_text("Feetech")
     words = r"FDP\] is an STS3215, which does not stop when its bus is silent: add \[enable\] with"
     with pytest.raises(ProfileError, match=words):

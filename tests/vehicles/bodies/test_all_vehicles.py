@@ -89,7 +89,7 @@ def test_zero_brakes_and_none_coasts(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_stalled_motor_draws_the_most_current(name: str) -> None:
-    """The stall current is that of the winding, and less flows at speed."""
+    """The stall current is the winding's, and less flows at speed."""
     here = ground(name)
     here.vehicle.drive(AHEAD[name], BATTERY_V)
     stalled = here.vehicle.current_a()

@@ -120,7 +120,7 @@ f 4 3 2 1
 
 
 def test_meshes_are_read_by_object_and_material(tmp_path: Path) -> None:
-    """The last corner of a triangle is there twice; texture coordinates are those of corners."""
+    """The last corner of a triangle is there twice; texture coordinates belong to corners."""
     path = tmp_path / "cube.obj"
     path.write_text(_CUBE)
     objects = read_obj(path)

@@ -119,7 +119,7 @@ def _nearest(one: np.ndarray, other: np.ndarray) -> float:
 
 @pytest.mark.parametrize("seed", range(25))
 def test_distances_are_those_of_the_nearest_points(seed: int) -> None:
-    """Distances equal those of the nearest samples, and are 0 or less on overlap."""
+    """Distances equal the nearest samples', and are 0 or less on overlap."""
     rng = np.random.default_rng(seed)
     one, other = _random_obstacle(rng), _random_obstacle(rng)
     measured = _nearest(_samples(one), _samples(other))

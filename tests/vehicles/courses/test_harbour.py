@@ -58,7 +58,7 @@ def test_the_lane_stays_free(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_boats_lie_behind_quays(seed: int) -> None:
-    """Several boats lie beside a quay, and none overlaps with a quay or another boat."""
+    """Several boats lie at a quay, and none overlaps with a quay or another boat."""
     course = lay_out("harbour", seed)
     boats = moored(course)
     assert len(boats) >= 3

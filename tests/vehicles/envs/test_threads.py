@@ -13,7 +13,7 @@ import shapechanger
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_pictures_do_not_depend_on_threads() -> None:
-    """Pictures of two threads equal those of one."""
+    """Pictures of two threads equal one thread's."""
 
     def pictures(threads: int) -> list[Any]:
         envs = shapechanger.make_vec(

@@ -42,7 +42,7 @@ class CheckRobot:
     """Move nothing: check the computer, the settings and the wires, and list the pins with their
     positions on the header."""
     leds: bool = False
-    """Check a bench of one Pi with LEDs in place of motors, light each of them, let faults happen,
+    """Check a bench of one Pi with LEDs instead of motors, light each of them, let faults happen,
     and write a report to send."""
     faults: bool = False
     """Inject every fault into the robot's twin, and judge by the ledger of its pins."""
@@ -160,8 +160,7 @@ class CheckRobot:
         require_pins(profile)
         if self.leds and not (asks or self.yes):
             raise RobotError(
-                "All outputs will be driven: put LEDs in place of the motors, and say so with "
-                "--yes."
+                "All outputs will be driven: put LEDs where the motors were, and say so with --yes."
             )
         question = "All outputs will be driven. Is every motor taken off?"
         if self.leds and asks and not ask_person(question):

@@ -1,4 +1,4 @@
-"""Card of a policy: metadata that is stored beside the weights."""
+"""Card of a policy: metadata that is stored with the weights."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         if self.eyes == "none":
             pictures = None
         elif pictures is None:
-            raise CloningError("This policy needs a picture, but there is none.")
+            raise CloningError("This policy needs a picture, and none was given.")
         seen = None if pictures is None else prepare(pictures, self.framing)
         layout = self.state_layout
         if layout is None:

@@ -151,7 +151,7 @@ def steering_examples(
 def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]:
     """Return a mask of the examples to hold out: the last ones of each episode.
 
-    The last ones are taken because neighbours in time look alike: a picture between two training
+    The last ones are taken because neighbours in time look the same: a picture between two training
     pictures would test nothing.
 
     Args:

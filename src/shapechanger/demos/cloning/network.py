@@ -1,6 +1,6 @@
 """Networks of cloned policies: encoders for pictures and states, and a linear output layer.
 
-The names of the attributes (`eyes`, `nerves`, `hands`, ...) are those of the weights in the file of
+The names of the attributes (`eyes`, `nerves`, `hands`, ...) name the weights in the file of
 a policy, and must not change.
 """
 
@@ -120,7 +120,7 @@ class Eyes(nn.Module):
         )
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Return the features; shapes are those of `EdgeEyes`."""
+        """Return the features, with the shapes of `EdgeEyes`."""
         # Colours are last in memory, so that each picture is one row: several times faster than
         # over three dimensions.
         rows = pictures.permute(0, 2, 3, 1).flatten(1)

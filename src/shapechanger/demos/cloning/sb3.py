@@ -154,7 +154,7 @@ def as_sac(
 ) -> SAC:
     """Return the policy as a SAC model on raw observations; its `save` writes a file.
 
-    Its deterministic action is that of the policy. Its critics are untrained, and lead the actor
+    Its deterministic action equals the policy's. Its critics are untrained, and lead the actor
     astray at first. `learning_starts` is 0, and the replay buffer holds 10,000 raw observations.
 
     Args:
@@ -191,7 +191,7 @@ def as_ppo(
 ) -> PPO:
     """Return the policy as a PPO model on raw observations; its `save` writes a file.
 
-    Its deterministic action is that of the policy. The actions of a policy with classes are class
+    Its deterministic action equals the policy's. The actions of a policy with classes are class
     indices; wrap the env in `ChosenActions`.
 
     Args:

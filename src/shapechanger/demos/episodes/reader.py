@@ -251,7 +251,7 @@ def episodes_of(data: Path) -> tuple[Path, ...]:
         data: Folder of a recording, or of one episode.
 
     Raises:
-        DemosError: If there is none.
+        DemosError: If the episode does not exist.
     """
     if is_episode(data):
         return (data,)
@@ -397,7 +397,7 @@ def drop(path: Path, first: int, last: int, why: str) -> None:
 
 
 def keep(path: Path, first: int, last: int, why: str = "") -> None:
-    """Include steps of an episode again; errors are those of `drop`.
+    """Include steps of an episode again; errors as in `drop`.
 
     Args:
         path: Folder of the episode.

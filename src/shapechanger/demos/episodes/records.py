@@ -190,7 +190,7 @@ class Step(
         captured_ns: When the picture was taken or the state was read; monotonic clock of the robot.
         decided_ns: When the action reached the robot; same clock.
         wall_ns: When the step was recorded; Unix time of the recorder.
-        reward: Reward of the step; None if there is none.
+        reward: Reward of the step; None without a reward.
         terms: Terms of the reward, by name.
         terminated: Whether the task ended with this step.
         truncated: Whether the episode was cut short at this step.

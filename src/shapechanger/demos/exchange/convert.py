@@ -119,7 +119,7 @@ def export_recording(
         format: Name of one of the `formats`.
         dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
         task: What the robot does, in words, for policies that follow language; lerobot only.
-        images: Whether to store pictures as they were recorded, in place of video; lerobot only.
+        images: Whether to store pictures as they were recorded, instead of video; lerobot only.
 
     Raises:
         DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies

@@ -188,7 +188,7 @@ def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     }
     if not values["action"]:
         raise DemosError(
-            f"There is no {_HEADER} beside {table.path}, and no column of an action: restore it, "
+            f"There is no {_HEADER} next to {table.path}, and no column of an action: restore it, "
             f"or name columns action/NAME, or {', '.join(COMMANDS)}."
         )
     table.columns = {field: values.get(field, [name]) for field, name in _NAMES.items()}

@@ -164,7 +164,7 @@ def with_pictures(
 ) -> tuple[list[SourceRecord], tuple[int, int] | None]:
     """Return the records with a whole picture, or with none, and the most frequent size.
 
-    All pictures are decoded, so that rates and jumps are those of the records that remain.
+    All pictures are decoded, so that rates and jumps follow from the records that remain.
     """
     sizes: dict[int, tuple[int, int]] = {}
     encoded = 0
@@ -331,7 +331,7 @@ def measured_hz(periods_ns: Sequence[float]) -> float | None:
         return None
     if 2 * sum(period > 0.0 for period in periods_ns) < len(periods_ns):
         return _NS_PER_S * len(periods_ns) / sum(driven)  # The clock is coarser than a period.
-    # Where no period prevails, the rate is that of all.
+    # If no period prevails, all count.
     return _NS_PER_S / statistics.fmean(near if 2 * len(near) > len(driven) else driven)
 
 

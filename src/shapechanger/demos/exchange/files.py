@@ -70,7 +70,7 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
         source: The folder that is read meanwhile, if any; `out` must not lie in it.
 
     Yields:
-        A hidden folder beside `out` to write to.
+        A hidden folder next to `out` to write to.
     """
     if os.path.lexists(out):
         raise DemosError(f"{out} exists already: choose another name, or move it away.")

@@ -206,7 +206,7 @@ class ExportContext:
     Attributes:
         out: The folder that the user asked for; a writer gets another one, which is moved there.
         task: What the robot does, in words; "" if not given.
-        images: Whether to store pictures as they were recorded, in place of video.
+        images: Whether to store pictures as they were recorded, instead of video.
         rewarded: Whether all steps have a reward.
     """
 

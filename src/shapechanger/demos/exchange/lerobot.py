@@ -283,7 +283,7 @@ def _own_header(
             f"{where} is of another dataset, with other actions, states or pictures: remove the "
             "file if the dataset was edited."
         )
-    # The times are those of the dataset.
+    # The times come from the dataset.
     clock = "real" if header.clock == "none" else header.clock
     return replace(header, clock=clock, notes=found.notes | header.notes), drivers
 

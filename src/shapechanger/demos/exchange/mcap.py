@@ -4,12 +4,12 @@
 /camera    foxglove.CompressedImage   the JPEG as recorded, once for the steps that share it
 /state     shapechanger.State         values by name; those that nothing measured are left out
 /action    shapechanger.Action        the decided action, by name
-/applied, /wanted                     likewise, where they are known
+/applied, /wanted                     the same, where they are known
 /reward    shapechanger.Reward        the reward and its terms
 /step      shapechanger.Step          number, driver, ends, stop reason, marks, why it was dropped
 ```
 
-Messages are JSON, and their schemas state the units. Log times are those of the robot's clock, ns:
+Messages are JSON, and their schemas state the units. Log times are on the robot's clock, ns:
 of the capture for pictures and states, of the decision for actions, and never moved. Where a time
 is unknown, the step follows the one before at the rate of the episode, or precedes the first one
 with a time. The header of the episode is the metadata

@@ -13,7 +13,7 @@ are in `metadata.json`.
 
 Of a dataset of others, at most one part of an observation may be a picture; all other values become
 the state, in order. Pictures that are not JPEG are encoded with quality 100. The driver is unknown
-and taken to be an "expert". The rate is that of the key `control_hz`, that of `--hz`, or 20 Hz.
+and taken to be an "expert". The rate is the key `control_hz`, `--hz`, or 20 Hz.
 
 Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
 encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
@@ -486,7 +486,7 @@ def _write_episode(
     header, steps, more, frames = episode.header, list[Step](), list[str](), list[int]()
     state_at, picture_at = _observed(picture is not None, bool(header.state_layout))
     size, grey = None, False
-    observed: list[Any] = []  # The columns of the pictures; the last one is that of Minari.
+    observed: list[Any] = []  # The columns of the pictures; the last one is Minari's.
     if picture is not None:
         size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
         as_jpeg = _stored_as_jpeg(picture)

@@ -123,7 +123,7 @@ def picture_size_of(space: spaces.Space[Any]) -> tuple[int, int] | None:
 
 
 def _colours_first(shape: tuple[int, ...]) -> bool:
-    """Return whether the first of three axes is that of the colours."""
+    """Return whether the first of three axes counts the colours."""
     return shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 

@@ -1,4 +1,4 @@
-"""Pictures and videos of other projects: checked, and turned into JPEGs if they are none.
+"""Pictures and videos of other projects: checked, and converted to JPEG if needed.
 
 MP4 videos are written and read by an FFmpeg process, the program of imageio-ffmpeg. Files of
 strangers are decoded in that process and not in this one: as MP4 only, without references to other

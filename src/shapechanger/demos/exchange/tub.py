@@ -7,7 +7,7 @@ the other modes `pilot/...` drives, except that in "local_angle" the throttle is
 Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
 metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
 indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names
-the start of the car. Version 1 has a file `record_N.json` per record, its picture beside it,
+the start of the car. Version 1 has a file `record_N.json` per record, its picture next to it,
 optionally `milliseconds` since the start, `meta.json`, and the deleted numbers in `exclude.json`.
 
 Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
@@ -182,7 +182,7 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
         return _IMAGE
     camera = choose_camera(folder, cameras, context)
     if camera not in {_IMAGE, context.camera}:
-        context.note(f"The pictures are those of the column {camera}.")
+        context.note(f"The pictures come from the column {camera}.")
     return camera
 
 
@@ -330,8 +330,8 @@ def _read_catalog(path: Path, rows: list[tuple[int, _Fields]], context: ImportCo
     if not path.is_file():
         context.leave_out("catalog", "that is missing", path.name)
         return
-    beside = path.with_suffix(".catalog_manifest")
-    about = (_object(read_bytes(beside)) if beside.is_file() else None) or {}
+    manifest = path.with_suffix(".catalog_manifest")
+    about = (_object(read_bytes(manifest)) if manifest.is_file() else None) or {}
     start = about.get("start_index")
     if type(start) is not int:
         start = rows[-1][0] + 1 if rows else 0

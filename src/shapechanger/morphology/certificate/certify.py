@@ -45,7 +45,7 @@ _CONSTANTS: Final = {
     "dof_invweight0": "constraints have the wrong softness",
     "geom_rbound": "contacts may be missed",
     "geom_sameframe": "geom_pos or geom_quat is ignored",
-    "geom_fluid": "forces of the fluid are those of the old shape",
+    "geom_fluid": "forces of the fluid still fit the old shape",
     "site_sameframe": "site_pos or site_quat is ignored",
     "jnt_actuatorid": "the actuator's damping or armature is ignored",
     "tendon_length0": "lengths derived from it are wrong",
@@ -104,15 +104,15 @@ class Certificate(msgspec.Struct, frozen=True):
     def verdict(self) -> str:
         """Verdict in one sentence."""
         both, steps = f"{self.source} and {self.target}", f"{self.rollout.steps} steps"
-        alike = self.source_fingerprint == self.target_fingerprint
-        if self.is_empty and alike and self.rollout.identical:
+        same_names = self.source_fingerprint == self.target_fingerprint
+        if self.is_empty and same_names and self.rollout.identical:
             return (
-                f"{both} behave alike: both models have the fingerprint "
+                f"{both} behave the same: both models have the fingerprint "
                 f"{self.source_fingerprint}, and {steps} gave the same numbers."
             )
         if self.is_empty:
-            names = "" if alike else ", or in names"
-            return f"{both} behave alike: their models and {steps} differ by rounding only{names}."
+            names = "" if same_names else ", or in names"
+            return f"{both} behave the same: their models and {steps} differ by rounding{names}."
         if self.same_model:
             return (
                 f"The models of {both} are the same ({self.source_fingerprint}); only what is "
@@ -174,7 +174,7 @@ def certify(
     """Compare two environments and certify the shift between them.
 
     Both are reset and stepped, and left in the middle of an episode. Wrappers count: observations
-    are those of the outermost one.
+    belong to the outermost one.
 
     Args:
         source: The environment in which a policy is trained.

@@ -178,7 +178,7 @@ def compare(
     changes += _lengths(source, target, one, two)
     if found[0].quantity == "derived constant" and changes:
         return tuple(changes)
-    # `_lengths` says what the sizes of round geoms would.
+    # `_lengths` covers the sizes of round geoms.
     return (*changes, *(item for item in found if not _is_round(item, one, two)))
 
 

@@ -241,7 +241,7 @@ def moved_numbers(model: mujoco.MjModel, *, anonymous: bool = False) -> Numbers:
 
     Args:
         model: The compiled model.
-        anonymous: Whether elements are numbered in the order of the model in place of their names.
+        anonymous: Whether elements are numbered in the order of the model instead of named.
     """
     reader = _Reader(model, anonymous=anonymous)
     kept = reader.kept
@@ -333,7 +333,7 @@ class _Reader:
         return np.frombuffer(bytes(values), np.uint8) if name == "plugin_attr" else values
 
     def _values(self, field: Field) -> Any:
-        """Return an array with words in place of enumerations, and names in place of indices."""
+        """Return an array with words for enumerations, and names for indices."""
         values = self.array(field.array)
         if isinstance(field.of, type):
             return np.array([field.of(v).name.partition("_")[2].lower() for v in values.tolist()])
@@ -397,7 +397,7 @@ class _Reader:
         return {"bodies": bodies, "geoms": geoms, "sites": sites, "moving": bodies & moving}
 
     def _numbered(self) -> dict[str, list[str]]:
-        """Return numbers in place of names; elements that do not count change none of them."""
+        """Return numbers for names; elements that do not count change none of them."""
         found: dict[str, list[str]] = {}
         for kind, (_, count) in NAMED.items():
             everything = np.full(int(getattr(self._model, count)), fill_value=True)

@@ -212,7 +212,7 @@ def compare_rollouts(
     before = one.observations[: done + 1, [old.index(name) for name in shared]]
     after = two.observations[: done + 1, [new.index(name) for name in shared]]
     gaps, excess = _gaps(before, after)
-    # The first reward is that of the first step.
+    # The first reward belongs to the first step.
     rewards, reward_excess = _gaps(one.rewards[:done, None], two.rewards[:done, None])
     ended = one.ended and len(one.rewards) == done, two.ended and len(two.rewards) == done
     parted = np.flatnonzero(gaps.any(axis=1)).tolist()

@@ -67,7 +67,7 @@ class AddMotor(Edit, frozen=True):
         ]
         if not joints:
             raise MorphologyError(
-                f"Each hinge and slide that matches {self.joint!r} has a motor, or there is none; "
+                f"Each hinge and slide that matches {self.joint!r} has a motor, or none matches; "
                 "a joint that follows another one needs none."
             )
         for joint in joints:

@@ -76,7 +76,7 @@ class ValueEdit(Edit, frozen=True, tag=None):
         return value >= 0.0
 
     def changed(self, old: float) -> float:
-        """Return the new value in place of `old`."""
+        """Return the new value that replaces `old`."""
         new = old * self.scale if self.scale is not None else self.to
         assert new is not None  # `check` requires one of the two.
         return part_of_the_way(old, new, self.amount)
@@ -149,7 +149,7 @@ class Gear(ValueEdit, frozen=True):
             elif self.scale is None:
                 raise MorphologyError(
                     f"{actuator.name!r} is no motor, so its gear is not its strength: give a scale "
-                    "in place of a value."
+                    "instead of a value."
                 )
             else:
                 factors[actuator.name] = factor = self.changed(1.0)

@@ -23,7 +23,7 @@ _UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
 
 
 def make_explicit(spec: mujoco.MjSpec) -> None:
-    """Name every element, and write out whatever the compiler would derive anew, in place.
+    """Name every element, and write out whatever the compiler would derive again, in place.
 
     These are frames, a total mass, least masses and inertias, and primitives that are fitted to
     meshes. The physics does not change.

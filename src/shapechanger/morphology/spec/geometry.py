@@ -160,7 +160,7 @@ def _move_outwards(
 def stretch_geom(
     spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float, axis: str | None = None
 ) -> None:
-    """Make a geom `factor` times as long, at the same thickness, and move it outwards likewise.
+    """Make a geom `factor` times as long, at the same thickness, moved outwards by this factor.
 
     Args:
         spec: The model that `geom` is in.

@@ -278,8 +278,8 @@ class _Copies:
                 copy.wrap_site(self._name(_O.mjOBJ_SITE, name))
             else:
                 side = wrap.sidesite
-                beside = self._name(_O.mjOBJ_SITE, side.name) if side else ""
-                copy.wrap_geom(self._name(_O.mjOBJ_GEOM, name), beside)
+                side_site = self._name(_O.mjOBJ_SITE, side.name) if side else ""
+                copy.wrap_geom(self._name(_O.mjOBJ_GEOM, name), side_site)
 
     def _name(self, kind: mujoco.mjtObj, name: str) -> str:
         """Return the name of the copy of an element; of one that is shared, its own.

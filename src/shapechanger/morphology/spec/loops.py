@@ -34,7 +34,7 @@ _STILL: Final = 1e-12
 _MOST_STEPS: Final = 200
 # A longer step, rad or m, can jump to another way to assemble the loop.
 _LONGEST_STEP: Final = 0.2
-# Singular values below this share of the largest are those of motions that close nothing.
+# Singular values below this share of the largest belong to motions that close nothing.
 _SINGULAR: Final = 1e-6
 _UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
 _WITHOUT: Final = (

@@ -1,1 +1,1 @@
-"""Checks of a robot: of its computer and settings, its wires, and LEDs in place of its motors."""
+"""Checks of a robot: of its computer and settings, its wires, and LEDs instead of its motors."""

@@ -249,7 +249,7 @@ def _output_enable(guard: GuardPlan) -> Results:
     if any(board["output_enable"] == -1 for board in _boards(guard)):
         yield (
             "bad",
-            "A PCA9685 without output_enable keeps its last pulse for ever: wire OE to a pin with "
+            "A PCA9685 without output_enable keeps its last pulse: wire OE to a pin with "
             "a pull-up and name it as output_enable.",
         )
 

@@ -82,7 +82,7 @@ def adapted(text: str, path: Path, camera: str = "", arming: str = "") -> str:
         elif before.get("driver") != CAMERAS[camera]:
             table: Any = tomlkit.table()
             table["driver"] = CAMERAS[camera]
-            # Other settings are those of the other camera.
+            # Other settings belong to the other camera.
             table.update({key: before[key] for key in ("size", "fps") if key in before})
             table.add(tomlkit.nl())
             document["camera"] = table

@@ -85,7 +85,7 @@ def profile_text(path: str | os.PathLike[str]) -> str:
 
 
 def _nearest(path: Path) -> str:
-    """Return the end of a sentence about a missing profile: the nearest one, or those beside it."""
+    """Return the end of a sentence about a missing profile: the nearest one, or its folder's."""
     there = sorted(file.name for file in path.parent.glob(f"*{_SUFFIX}"))
     if close := difflib.get_close_matches(path.name, there, n=1):
         return f"; did you mean {path.with_name(close[0])}?"

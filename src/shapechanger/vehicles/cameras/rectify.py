@@ -31,7 +31,7 @@ HALF_WIDTH_RAD: Final = math.atan(0.5 * CANONICAL_SIZE[0] / _FOCAL)
 """Bearing of the left and right edge of a rectified picture, rad."""
 
 _SAMPLES: Final = 3  # In each direction of a pixel.
-_NEAREST: Final = 1e-3  # Depth of a ray below which it points beside or behind the camera.
+_NEAREST: Final = 1e-3  # Depth of a ray below which it points sideways or behind the camera.
 _MOST_MISSING: Final = 0.15  # Share of the pixels.
 
 # Vertical fields of view from which the search for the camera's own begins, degrees.

@@ -75,12 +75,12 @@ class MeanOutputs:
         total = [0.0] * len(self._plan.outputs)
         left = ticks
         while left:
-            # Once at the target, the rest of the period is alike.
-            alike = left if self.applied == target else 1
-            left -= alike
+            # Once at the target, the rest of the period is the same.
+            repeats = left if self.applied == target else 1
+            left -= repeats
             values_now = output_values(self._plan, self.applied)
-            total = [one + alike * now for one, now in zip(total, values_now, strict=True)]
-            if alike == 1:
+            total = [one + repeats * now for one, now in zip(total, values_now, strict=True)]
+            if repeats == 1:
                 self.applied = tuple(
                     slewed(action, now, aim, self._tick_s)
                     for action, now, aim in zip(actions, self.applied, target, strict=True)

@@ -78,7 +78,7 @@ def certify_vehicles(
     is_empty = all(map(np.array_equal, one, two))
     if is_empty and not allow_empty:
         raise EmptyShift(
-            f"{names[0]} and {names[1]} behave alike: {_STEPS} steps gave the same frames, places "
+            f"{names[0]} and {names[1]} behave the same: {_STEPS} steps gave equal frames, places "
             "and rewards, so there is nothing to transfer."
         )
     changes = tuple(f"{name}: {old[name]} -> {new[name]}" for name in old if old[name] != new[name])

@@ -78,11 +78,11 @@ class VehicleEnv(DriveEnv):
         steering: Replaces the profile's steering; None to keep it.
         size: Width and height of frames in pixels; None for the profile's.
         image: Whether observations include the frame.
-        state: Whether observations include the state besides the frame.
+        state: Whether observations include the state next tos the frame.
         reward: Weights by name that replace those of the profile.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
         randomise: Whether `reset` samples light, textures and the camera's pose too.
-        put_back: Whether to put the vehicle back on the lane after a collision, as a person beside
+        put_back: Whether to put the vehicle back on the lane after a collision, as a person next to
             it would do. A collision then does not end the episode.
         lenses: Impairments of the camera, such as ("night", "dirt"); see
             `shapechanger.vehicles.cameras.corruptions`.

@@ -228,8 +228,8 @@ class Recovery:
         if self._tries > 2 and self._rng.random() < 0.4:
             side = -1 if side == 1 else 1
         if self._traits.drive == "rudder" and scraping:
-            # A rudder swings the stern, which a quay beside it prevents. Steering towards the quay
-            # puts the bow there and frees the stern; then the boat backs away.
+            # A rudder swings the stern, which a quay at its side prevents. Steering towards the
+            # quay puts the bow there and frees the stern; then the boat backs away.
             self._moves.append((1.5 * longer, float(side), 0.5))
         seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
         # Going back, wheels and rudders turn the other way; tracks do not.

@@ -282,8 +282,8 @@ def plan_path(
     Args:
         course: The course.
         half_width_m: Half width of the vehicle, m.
-        margin_m: Smallest clearance beside the vehicle, m.
-        comfort_m: Preferred clearance beside the vehicle, m.
+        margin_m: Smallest clearance to each side of the vehicle, m.
+        comfort_m: Preferred clearance to each side of the vehicle, m.
 
     Returns:
         A path with a clearance of at least `half_width_m + margin_m` at every point.

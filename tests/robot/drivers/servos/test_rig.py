@@ -174,7 +174,7 @@ def test_an_invalid_bus_is_refused() -> None:
 
 
 def _feetech(line: SimulatedBus, at: int, value: int, size: int = 1) -> int:
-    """Write a register of the first Feetech servo, and return what it holds then."""
+    """Write a register of the first Feetech servo, and return its new value."""
     line.write({1: value.to_bytes(size, "little")}, at)
     return line.servos[1].register(at)
 

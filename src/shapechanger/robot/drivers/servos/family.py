@@ -83,7 +83,7 @@ class ServoFamily:
 
     Attributes:
         name: Name of the family.
-        protocol: Version of the packets in `dynamixel_sdk`; Feetech's are those of 1.0, with the
+        protocol: Version of the packets in `dynamixel_sdk`; Feetech's follow 1.0, with the
             instructions for several servos of 2.0.
         address_size: Bytes of an address, a length or a checksum in a packet.
         most_id: Highest id.

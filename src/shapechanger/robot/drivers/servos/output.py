@@ -137,8 +137,8 @@ _OPEN: Final[dict[tuple[int, str], SharedBus]] = {}
 class TendonOutput:
     """A tendon as an output; see `OutputDriver`.
 
-    0 is its pretension in every control, so that a stop ends alike, and 1 its largest tension. With
-    control "length" values above 0 go from its longest to its shortest length.
+    0 is its pretension in every control, so that all stops end the same, and 1 its largest tension.
+    With control "length" values above 0 go from its longest to its shortest length.
 
     Args:
         plan: The output.

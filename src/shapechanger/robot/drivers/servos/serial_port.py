@@ -20,7 +20,7 @@ except ImportError as error:
     raise MissingExtra("dynamixel-sdk", "finger") from error
 
 # Bytes that may still be read after the timeout of an answer: they arrived while the process did
-# not run. More is endless noise, which the SDK would read for ever.
+# not run. More is endless noise, which the SDK would read endlessly.
 _MAX_LATE_BYTES: Final = 1024
 # Damaged packets to skip while waiting for valid ones.
 _MAX_DAMAGED: Final = 8

@@ -36,7 +36,7 @@ def stops_itself(output: OutputPlan) -> bool:
 class ServoSettings(Keys, frozen=True, kw_only=True):
     """A servo and its tendon.
 
-    A tension is that of the current without friction. The gears take some newtons of it when the
+    A tension follows from the current without friction. The gears take some newtons of it when the
     spool winds in, and add as much when the tendon pulls it out; see `Gears.friction_nm`.
 
     Attributes:
