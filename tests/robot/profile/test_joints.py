@@ -66,7 +66,7 @@ def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
         (_TEXT.replace(_SENSOR, _HEAD), r"needs a table for each joint, such as \[sensor.joints."),
         (
             changed("channel = 3\n", "channel = 2\n", _TEXT),
-            r"DIP_flexion of .* has the channel 2, .* PIP_flexion, too",
+            r"DIP_flexion of .* has the channel 2, .* PIP_flexion has, too",
         ),
         (changed("channel = 3\n", "channel = 8\n", _TEXT), "channel of .* from 0 to 7"),
         (changed("channel = 3\n", "chanel = 3\n", _TEXT), "did you mean 'channel'"),
