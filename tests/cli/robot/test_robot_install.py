@@ -107,7 +107,7 @@ def test_the_profile_of_this_folder_is_named(
 ) -> None:
     """A shipped name is meant for the file of that name, if it exists."""
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(RobotError, match="`shapechanger robot init car` writes one"):
+    with pytest.raises(RobotError, match="`shapechanger robot init car` writes your own"):
         Install("car").run()
     Path("car.toml").touch()
     with pytest.raises(RobotError, match=r"car\.toml in this folder is your own"):
