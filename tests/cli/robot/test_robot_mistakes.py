@@ -20,8 +20,8 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.robot.daemon.credentials import make_credentials
+from shapechanger.robot.discovery import FoundRobot
 from shapechanger.robot.link.address import Address
-from shapechanger.robot.link.discovery import FoundRobot
 from tests.robot.twin.robots import until
 from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 
@@ -375,7 +375,7 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
 ) -> None:
     """Other robots are found."""
     found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
-    monkeypatch.setattr("shapechanger.robot.link.discovery.find", lambda _: [found])
+    monkeypatch.setattr("shapechanger.robot.discovery.find", lambda _: [found])
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     assert run("remember", "mine", "192.0.2.1", "--fingerprint", "ab" * 32)[0] == 0
     broken = home / "config" / "shapechanger" / "known" / "broken.toml"

@@ -250,7 +250,7 @@ class _Bounded(gym.Env[Any, Any]):
 def test_other_bounds_are_refused() -> None:
     """The error names the class of an env without a body."""
     require_same_spaces([_Bounded(1.0), _Bounded(1.0)])
-    with pytest.raises(SpaceMismatch, match=r"env 1 \(_Bounded\) has other bounds than .* env 0"):
+    with pytest.raises(SpaceMismatch, match=r"env 1 \(_Bounded\) has other bounds than env 0"):
         require_same_spaces([_Bounded(1.0), _Bounded(2.0)])
 
 

@@ -31,7 +31,7 @@ class Find:
 
     def run(self) -> None:
         """Print a table with the robots' local names."""
-        from shapechanger.robot.link.discovery import find
+        from shapechanger.robot.discovery import find
 
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")

@@ -26,13 +26,13 @@ from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
 from shapechanger.robot.daemon.session import Authenticator
+from shapechanger.robot.discovery import announce, withdraw
 from shapechanger.robot.guard.messages import GuardState
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.hardware import Clock, connect
 from shapechanger.robot.link.address import Address, is_loopback
 from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
-from shapechanger.robot.link.discovery import announce, withdraw
 
 _log = logging.getLogger(__name__)
 

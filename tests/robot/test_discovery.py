@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from zeroconf import Zeroconf
 
-from shapechanger.robot.link import discovery
+from shapechanger.robot import discovery
+from shapechanger.robot.discovery import FoundRobot, announce, find, withdraw
 from shapechanger.robot.link.address import SERVICE, Address
-from shapechanger.robot.link.discovery import FoundRobot, announce, find, withdraw
 from tests.robot.daemon.plans import car_plan
 
 
