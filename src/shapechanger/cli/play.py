@@ -51,6 +51,8 @@ class Watching:
             from shapechanger.reports.films import require_film
 
             require_film(out)
+            if self.out is None:
+                say(f"There is no screen, so this writes {out}; drawing can take minutes.")
         frames: list[NDArray[Any]] = []
         with opened(ref, render_mode="human" if out is None else "rgb_array") as env:
             if policy is None:

@@ -41,6 +41,7 @@ def test_a_profile_in_the_working_folder_has_a_name(
         ("my-cra.toml", r"There is no file .*my-cra\.toml; did you mean .*my-car\.toml\?$"),
         ("trcuk.toml", "did you mean truck, which comes with Shapechanger"),
         ("zzz.toml", r"zzz\.toml; its folder has my-car\.toml\.$"),
+        ("m.toml", r"m\.toml; its folder has my-car\.toml\.$"),
     ],
 )
 def test_a_missing_profile_has_a_nearest_spelling(tmp_path: Path, name: str, hint: str) -> None:

@@ -247,3 +247,11 @@ def test_without_matplotlib_the_extra_is_named(
     assert verdict(study)
     with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):
         study_html(study)
+
+
+def test_a_body_is_named_by_its_edits() -> None:
+    """The title has words instead of JSON."""
+    body = '[{"edit": "stretch", "body": "pole", "factor": 3}, {"edit":"gravity","value":-5.0}]'
+    target = EnvRef("shapechanger/InvertedPendulum-v1", {"body": body})
+    title = Reader(study_html(make_study(target=target))).headings[0]
+    assert title.endswith("InvertedPendulum-v1 (stretch pole x3, gravity -5.0)")

@@ -86,12 +86,13 @@ def profile_text(path: str | os.PathLike[str]) -> str:
 
 def _nearest(path: Path) -> str:
     """Return the end of a sentence about a missing profile: the nearest one, or its folder's."""
-    there = sorted(file.name for file in path.parent.glob(f"*{_SUFFIX}"))
-    if close := difflib.get_close_matches(path.name, there, n=1):
-        return f"; did you mean {path.with_name(close[0])}?"
+    there = sorted(file.stem for file in path.parent.glob(f"*{_SUFFIX}"))
+    if close := difflib.get_close_matches(path.stem, there, n=1):
+        return f"; did you mean {path.with_name(close[0] + _SUFFIX)}?"
     if close := difflib.get_close_matches(path.stem, shipped_profiles(), n=1):
         return f"; did you mean {close[0]}, which comes with Shapechanger?"
-    return f"; its folder has {', '.join(there[:_MOST_LISTED])}." if there else "."
+    listed = ", ".join(f"{name}{_SUFFIX}" for name in there[:_MOST_LISTED])
+    return f"; its folder has {listed}." if there else "."
 
 
 _NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)

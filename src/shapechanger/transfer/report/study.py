@@ -121,9 +121,24 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 
 def _short_name(env: EnvRef) -> str:
     """The env's name without its namespace, and its arguments, truncated if they are long."""
-    arguments = ", ".join(f"{name}={_truncate(str(value))}" for name, value in env.kwargs.items())
+    arguments = ", ".join(
+        _truncate(argument_text(value) if name == "body" else f"{name}={value}")
+        for name, value in env.kwargs.items()
+    )
     name = env.id.rpartition("/")[2]
     return f"{name} ({arguments})" if arguments else name
+
+
+def argument_text(value: object) -> str:
+    """Format an argument of an env; the JSON of edits in words, such as `stretch pole x3`."""
+    try:
+        edits = msgspec.json.decode(str(value), type=list[dict[str, Any]])
+    except msgspec.DecodeError:
+        return str(value)
+    return ", ".join(
+        " ".join(f"x{part}" if name == "factor" else str(part) for name, part in edit.items())
+        for edit in edits
+    )
 
 
 def _truncate(words: str) -> str:

@@ -21,6 +21,7 @@ from shapechanger.transfer.metrics import (
     probability_of_improvement,
     total_reward_gain,
 )
+from shapechanger.transfer.report.study import argument_text
 from shapechanger.transfer.report.verdict import (
     direction,
     estimate_text,
@@ -277,7 +278,7 @@ def _name(env: EnvRef) -> str:
     lenses = env.kwargs.get("lenses") or ""
     extra = ", ".join(
         # A flag, such as `put_back`, holds for all envs of a suite and names none of them.
-        str(value)
+        argument_text(value)
         for key, value in env.kwargs.items()
         if key != "lenses" and not isinstance(value, bool)
     )
