@@ -60,7 +60,7 @@ _STRONG: Final = 0.8
 _FOLLOWED: Final = 2.0
 # Time that the whole command may take for a finger, min.
 _LIMIT_MIN: Final = 30.0
-# Distance within which a target counts as reached, m, like in `Finger-v1`.
+# Distance within which a target counts as reached, m; `Finger-v1` has the same.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
 

@@ -248,7 +248,7 @@ class RigMixin(FingerEnv):
                 senses = self._on_the_way(rig.length_values(by_length.lengths(senses)))
             else:
                 senses = self._on_the_way(rig.values(way.tensions(senses)))
-        # The command for the present tensions, like in simulation.
+        # The simulation also starts with the command for the present tensions.
         tensions = np.clip(senses.tensions, rig.least, rig.most)
         command = self.drive.command(tensions, senses.lengths, rig.speeds)
         self._command = np.clip(command, -1.0, 1.0)

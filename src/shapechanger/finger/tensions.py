@@ -25,7 +25,7 @@ from shapechanger.finger.parameters import FingerParameters
 # as Cui, Perreault, Maas & Sandercock 2008 measured (J. Biomechanics 41:1945, PMC2488157). The size
 # is a slow stretch's rather than of the first millimetres, which are ten times as stiff: at
 # full flexion, 18 mm shorter than at rest, a flexor with fibres of 65 mm has about half of its
-# force left, like on the ascending limb of the force-length curve. The damping is chosen.
+# force left, as on the ascending limb of the force-length curve. The damping is chosen.
 _MUSCLE_STIFFNESS: Final = 25.0
 _MUSCLE_DAMPING: Final = 1.0
 # Smallest share of its tension that a muscle is taken to have left.

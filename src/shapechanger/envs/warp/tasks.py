@@ -255,7 +255,7 @@ class DeviceDoublePendulum(DeviceTask):
         part = tip[:, 2] - constants["foot_m"]
         height = part * (constants["plain_length_m"] / constants["length_m"])
         height = height + constants["plain_foot_m"]
-        fallen = ~(height > FALLEN_M)  # True if the height is not a number.
+        fallen = ~(height > FALLEN_M)  # Also true if the height is not a number.
         # Gymnasium's formula, without the bonus, which it adds by a condition.
         there = SimpleNamespace(
             data=SimpleNamespace(qvel=worlds.qvel.T), _healthy_reward=env._healthy_reward

@@ -89,7 +89,7 @@ class Motors:
 
 
 def fit_motors(log: FingerLog) -> Motors:
-    """Fit lag, delay and strength of the motors to a log, starting from its motors, if known."""
+    """Fit lag, delay and strength of motors to a log; the strength is relative to known motors."""
     known = log.motors or NOMINAL
     most = np.array(known.most_tension)
     drive = drive_of(log.actions, NOMINAL)

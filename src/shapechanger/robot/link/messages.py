@@ -487,7 +487,7 @@ class Piece(_Message, frozen=True):
 
     Attributes:
         episode: Id of the episode.
-        first: Number of the first line, like in the request.
+        first: Number of the first line, as requested.
         total: Number of complete lines in `steps.jsonl` now.
         lines: Lines from `first` on, without line ends; fewer than requested at the end of the
             file, and if they would make the message too large.

@@ -88,7 +88,7 @@ def home(
         Position of each servo at the zero of its tendon, in counts, by name.
 
     Raises:
-        RobotError: If no tendon has servos.
+        RobotError: If a servo fails, or winds in too far or for too long.
     """
     servos = {servo.name: servo for servo in settings.servos}
     tensions = {name: servo.homing_n for name, servo in servos.items()}

@@ -126,7 +126,7 @@ def _standing(played: Sequence[_Episode]) -> float | None:
 
 
 def _means(episodes: Sequence[dict[str, float]]) -> dict[str, float]:
-    """Average numbers of one name over all episodes; a missing one counts as 0."""
+    """Average each named number over all episodes; a missing one counts as 0."""
     names = dict.fromkeys(name for episode in episodes for name in episode)
     return {name: sum(e.get(name, 0.0) for e in episodes) / len(episodes) for name in names}
 
