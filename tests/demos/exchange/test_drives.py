@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext
-from shapechanger.demos.exchange.drives import SourceRecord, episode_of, stretches
+from shapechanger.demos.exchange.drives import (
+    SourceRecord,
+    episode_of,
+    stretches,
+    with_pictures,
+)
 from shapechanger.demos.exchange.exports import kept_steps
 from tests.demos.exchange.small import header, picture
 
@@ -42,6 +47,25 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
     assert kept == [(n, shown[n][0]) for n in good]
     left = [int(name) for names in context.left_out.values() for name in names]
     assert sorted([*left, *good]) == [*range(len(shown))]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.sampled_from([None, *GOOD, *BAD]), max_size=8))
+def test_records_with_whole_pictures_of_one_size_remain(shown: list[Any]) -> None:
+    """So that rates and jumps see the others as missing."""
+    step = Step(action=(0.0,), driver="person")
+    records = [SourceRecord(name=str(n), step=step, picture=data) for n, data in enumerate(shown)]
+    kept, size = with_pictures(records, "record", ImportContext())
+    small = sum(data == BAD[3] for data in shown)
+    large = sum(data in GOOD for data in shown)
+    pictures = [record.picture for record in kept if record.picture is not None]
+    if size == (8, 8):
+        assert small >= large
+        assert pictures == [BAD[3]] * small
+    else:
+        assert large >= small
+        assert pictures == [data for data in shown if data in GOOD]
+    assert len(kept) - len(pictures) == shown.count(None)
 
 
 @settings(max_examples=50, deadline=None)
