@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import shapechanger
+from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
+from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy
-from shapechanger.policy import load_policy, save_policy
+from shapechanger.layout import Feature, Layout
+from shapechanger.policy import load_policy
 from shapechanger.transfer.export import export_onnx
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.onnx_policy import OnnxPolicy
@@ -60,13 +64,25 @@ def test_exported_clones_load_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(onboard.act(frames), clone.act(frames), atol=1e-3)
 
 
-def test_a_policy_on_a_state_acts_on_states(tmp_path: Path) -> None:
-    """Without pictures an observation is the state; with both it is a mapping."""
-    card = CameraPolicy.load(CLONES["car"]).card
-    frames, state = np.zeros((1, 120, 160, 3), np.uint8), np.zeros((1, 2))
-    assert card.inputs_of({"image": frames, "state": state}) == (frames, state)
-    assert card.inputs_of(frames)[1] is None
-    assert save_policy is shapechanger.save_policy
+@pytest.mark.parametrize("eyes", ["none", "colours"])
+def test_a_clone_with_a_state_acts_on_states(eyes: Any) -> None:
+    """Without images an observation is the state; with both it is a mapping."""
+    state_layout = Layout((Feature("speed", "m/s"), Feature("distance", "m")))
+    card = CloneCard(
+        framing=Framing(height=24, width=32),
+        channels=(4, 6),
+        features=8,
+        eyes=eyes,
+        nerves=(8,),
+        state_layout=state_layout,
+    )
+    clone = CameraPolicy.blank(card, seed=1)
+    states = np.array([[0.5, 1.0], [1.5, 0.2]])
+    images = None if eyes == "none" else np.full((2, 60, 80, 3), 90, np.uint8)
+    observations = states if images is None else {"image": images, "state": states}
+    acted = clone.act(observations)
+    np.testing.assert_array_equal(acted, clone.predict_many(images, states))
+    assert not np.array_equal(acted[0], acted[1])
 
 
 @pytest.mark.parametrize("name", ["no.safetensors", "no.onnx"])

@@ -696,7 +696,7 @@ def _discrete(body_map: BodyMap) -> Any:
         (_sac_gsde, "explores with gSDE"),
         (_custom_mlp, "has a Sequential instead of a MlpExtractor"),
         (_own_extractor, "extracts features with Own"),
-        (_discrete, "has a CategoricalDistribution in place"),
+        (_discrete, "has a CategoricalDistribution instead"),
         (lambda body_map: nn.Linear(1, 1), "This model is Linear"),
     ],
 )
