@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from shapechanger.demos.exchange import Imported, import_recording
-from shapechanger.demos.exchange.drives import measured_hz
+from shapechanger.demos.exchange.imports import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.small import all_of, picture, tub_folder

@@ -20,14 +20,6 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.drives import (
-    SourceRecord,
-    as_json,
-    episode_of,
-    features_of,
-    stretches,
-    with_pictures,
-)
 from shapechanger.demos.exchange.exports import value_names
 from shapechanger.demos.exchange.files import (
     cannot_read,
@@ -45,6 +37,14 @@ from shapechanger.demos.exchange.format import (
     ImportContext,
     fields_of,
     name_in,
+)
+from shapechanger.demos.exchange.imports import (
+    SourceRecord,
+    as_json,
+    episode_of,
+    features_of,
+    stretches,
+    with_pictures,
 )
 from shapechanger.errors import DemosError, LayoutError
 from shapechanger.layout import Layout

@@ -1,4 +1,4 @@
-"""The way from episodes to datasets, which all formats share.
+"""Export: the steps of a dataset from episodes, for all formats.
 
 Episodes are split where steps do not follow each other, episodes of one dataset are compared, and
 pictures are decoded once for each step that has a new one.

@@ -20,13 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Driver, EpisodeHeader, Step
-from shapechanger.demos.exchange.drives import (
-    SourceRecord,
-    as_json,
-    choose_camera,
-    episode_of,
-    features_of,
-)
 from shapechanger.demos.exchange.files import (
     MAX_PACKED,
     MAX_UNPACKED,
@@ -39,6 +32,13 @@ from shapechanger.demos.exchange.files import (
     rows_at,
 )
 from shapechanger.demos.exchange.format import ExchangeEpisode, Format, ImportContext, name_in
+from shapechanger.demos.exchange.imports import (
+    SourceRecord,
+    as_json,
+    choose_camera,
+    episode_of,
+    features_of,
+)
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
 from shapechanger.demos.exchange.lerobot_index import Index, Located
 from shapechanger.demos.exchange.pictures import read_pictures

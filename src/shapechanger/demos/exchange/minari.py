@@ -40,12 +40,6 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.drives import (
-    SourceRecord,
-    as_json,
-    episode_of,
-    unreadable,
-)
 from shapechanger.demos.exchange.exports import decoded_steps, require_alike
 from shapechanger.demos.exchange.files import (
     chunk_of,
@@ -67,6 +61,12 @@ from shapechanger.demos.exchange.format import (
     few,
     fields_of,
     name_in,
+)
+from shapechanger.demos.exchange.imports import (
+    SourceRecord,
+    as_json,
+    episode_of,
+    unreadable,
 )
 from shapechanger.demos.exchange.minari_spaces import (
     is_imported,

@@ -1,4 +1,4 @@
-"""Spaces of Minari datasets of others: their leaves as features of a layout, and as pictures."""
+"""Spaces of other projects' Minari datasets: features of a layout, and images."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.drives import features_of
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library, parse_json
 from shapechanger.demos.exchange.format import ImportContext
+from shapechanger.demos.exchange.imports import features_of
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Feature

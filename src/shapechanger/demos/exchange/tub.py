@@ -28,16 +28,6 @@ from typing import Any, Final, cast
 from msgspec.structs import replace
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.drives import (
-    SourceRecord,
-    as_json,
-    choose_camera,
-    episode_of,
-    features_of,
-    iso_time,
-    stretches,
-    with_pictures,
-)
 from shapechanger.demos.exchange.exports import kept_steps
 from shapechanger.demos.exchange.files import (
     is_inside,
@@ -51,6 +41,16 @@ from shapechanger.demos.exchange.format import (
     counted,
     few,
     name_in,
+)
+from shapechanger.demos.exchange.imports import (
+    SourceRecord,
+    as_json,
+    choose_camera,
+    episode_of,
+    features_of,
+    iso_time,
+    stretches,
+    with_pictures,
 )
 from shapechanger.demos.exchange.tub_records import (
     IMAGES,

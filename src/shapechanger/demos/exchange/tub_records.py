@@ -1,4 +1,4 @@
-"""The records of Donkeycar tubs of versions 1 and 2; `tub` converts them."""
+"""Read the records of Donkeycar tubs of versions 1 and 2, which `tub` converts."""
 
 from __future__ import annotations
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext
-from shapechanger.demos.exchange.drives import (
+from shapechanger.demos.exchange.exports import kept_steps
+from shapechanger.demos.exchange.imports import (
     SourceRecord,
     episode_of,
     stretches,
     with_pictures,
 )
-from shapechanger.demos.exchange.exports import kept_steps
 from tests.demos.exchange.small import header, picture
 
 GOOD = [picture(n) for n in range(4)]

@@ -1,4 +1,4 @@
-"""The way from records to episodes, which all formats share.
+"""Import: episodes from the records of a file, for all formats.
 
 A reader fills `SourceRecord`s from its file. Here their actions, drivers and pictures are checked,
 rates are measured, and sessions are split where time jumps.
