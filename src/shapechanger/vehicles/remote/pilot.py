@@ -74,17 +74,18 @@ def require_fit(
             f"The policy learned at {control_hz:g} actions a second{within}, and {robot.robot} has "
             f"control_hz = {robot.control_hz:g}."
         )
-    if card.eyes != "none" and robot.image_size is None:
-        raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by pictures.")
-    if not _has_waypoints(card):
+    has_waypoints = _has_waypoints(card)
+    if not has_waypoints:
         actions, state = map(Layout.from_json, (robot.action_layout, robot.state_layout))
         card.require_layouts(actions, state)
-    elif not robot.has_geometry:
+    if card.eyes != "none" and robot.image_size is None:
+        raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by pictures.")
+    if has_waypoints and not robot.has_geometry:
         raise RobotRefused(
             f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
             "which waypoints need: measure them with `shapechanger robot camera`."
         )
-    elif robot.turning is None and not measures:
+    if has_waypoints and robot.turning is None and not measures:
         raise RobotRefused(
             f"The profile of {robot.robot} does not state turn_deg_per_m or turn_deg_per_s, which "
             "waypoints need on board: `shapechanger robot drive --policy` measures them."
