@@ -147,3 +147,21 @@ def test_a_generator_may_take_any_whole_number() -> None:
     assert check_seed(2**80, StudyError, largest=None) == 2**80
     with pytest.raises(StudyError, match=r"It must be a whole number from 0, got -1\."):
         check_seed(-1, StudyError, "It must be", largest=None)
+
+
+def test_translated_error_keeps_its_cause() -> None:
+    translated = errors.translate_errors(
+        KeyError, OSError, to=lambda error: errors.RobotError(f"The pin is gone: {error}")
+    )
+    with (
+        pytest.raises(errors.RobotError, match="The pin is gone: no such pin") as caught,
+        translated,
+    ):
+        raise OSError("no such pin")
+    assert isinstance(caught.value.__cause__, OSError)
+
+
+def test_other_errors_are_not_translated() -> None:
+    translated = errors.translate_errors(OSError, to=lambda error: errors.RobotError(str(error)))
+    with pytest.raises(ZeroDivisionError), translated:
+        raise ZeroDivisionError

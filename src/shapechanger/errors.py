@@ -42,9 +42,10 @@ from __future__ import annotations
 import difflib
 import glob
 import operator
-from collections.abc import Iterable
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 # A humanoid has some forty names; a longer list would hide the sentence.
 _MOST_NAMES_LISTED: Final = 40
@@ -216,6 +217,28 @@ class MissingExtra(ShapechangerError, ImportError):
     def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str]]:
         """Pickle the error with its two arguments, for worker processes."""
         return type(self), (self.package, self.extra)
+
+
+_Error = TypeVar("_Error", bound=Exception)
+
+
+@contextmanager
+def translate_errors(*kinds: type[_Error], to: Callable[[_Error], Exception]) -> Generator[None]:
+    """Raise another error, with its own sentence, for each error of these kinds.
+
+    ```python
+    with translate_errors(OSError, to=lambda error: RobotError(f"Cannot read {file}: {error}.")):
+        text = file.read_text()
+    ```
+
+    Args:
+        *kinds: Kinds of errors of the block to translate.
+        to: Function that makes the error to raise; the original one becomes its cause.
+    """
+    try:
+        yield
+    except kinds as error:
+        raise to(error) from error
 
 
 def check_seed(
