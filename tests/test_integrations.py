@@ -37,6 +37,20 @@ def test_what_the_package_imports_from_here_exists(file: Path) -> None:
             importlib.import_module(f"{module}.{name}")
 
 
+@pytest.mark.parametrize(
+    "file", sorted(LEROBOT.glob("tests/test_*.py")), ids=lambda file: file.stem
+)
+def test_shared_test_modules_exist(file: Path) -> None:
+    """The package's tests import from `tests` here without that name, because draccus takes it."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("robot."):
+            assert (
+                (ROOT / "tests" / (node.module or "").replace(".", "/"))
+                .with_suffix(".py")
+                .is_file()
+            )
+
+
 def test_the_package_uses_ours() -> None:
     """The test above has something to check."""
     assert len({pair for file in FILES for pair in _imports_of_ours(file)}) > 10

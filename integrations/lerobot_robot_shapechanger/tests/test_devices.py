@@ -14,7 +14,7 @@ import pytest
 from lerobot.robots import make_robot_from_config
 from lerobot.teleoperators import make_teleoperator_from_config
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
-from remote.robot import Robot
+from robot.client.robot import Robot
 
 from lerobot_robot_shapechanger import (
     Shapechanger,
