@@ -63,7 +63,7 @@ demo: $(INSTALLED_ALL)  ## transfer a policy to a pole three times as long; see 
 		--seeds 5 --source-steps 16384 --steps 16384 --out results/demo
 
 test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
-	$(PYTEST) -m "not slow and not system" --cov $(COVERING)
+	$(PYTEST) -m "not slow and not system" $(COVERING) --cov
 	$(PYTEST) -m "not slow and not system" $(COVERING:%=--ignore=%)
 
 test-system: $(INSTALLED_DEV)  ## run the tests of whole programs: processes, browsers, terminals
