@@ -36,49 +36,48 @@ def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observatio
 
 
 def test_the_inbox_holds_only_the_newest_observation() -> None:
-    inbox = Inbox(lambda: 5.0)
+    inbox = Inbox(lambda: 5.0, 1.0)
     for seq in (1, 2, 3):
         inbox.put(seen(seq))
-    found = inbox.take(0, 0.0)
+    found = inbox.observation(0, 0.0)
     assert (found.message.seq, found.received_at) == (3, 5.0)
 
 
 def test_an_observation_is_returned_once() -> None:
     now = [10.0]
-    inbox = Inbox(lambda: now[0])
+    inbox = Inbox(lambda: now[0], 1.0)
     inbox.put(seen(1))
     now[0] = 12.5
-    assert inbox.wait(1, 0.0) is None
     with pytest.raises(StaleObservation, match=r"within 0.00 s \(the last is 2.50 s old\)"):
-        inbox.take(1, 0.0)
+        inbox.observation(1, 0.0)
     with pytest.raises(StaleObservation, match="none ever"):
-        Inbox(lambda: 0.0).take(0, 0.0)
+        Inbox(lambda: 0.0, 1.0).observation(0, 0.0)
 
 
 @pytest.mark.parametrize("seq", [1, 2])
 def test_a_replay_is_an_error(seq: int) -> None:
-    inbox = Inbox(lambda: 0.0)
+    inbox = Inbox(lambda: 0.0, 1.0)
     inbox.put(seen(2))
     with pytest.raises(LinkError, match="as in a replay"):
         inbox.put(seen(seq))
 
 
 def test_a_frame_outlives_its_observation() -> None:
-    inbox = Inbox(lambda: 0.0)
+    inbox = Inbox(lambda: 0.0, 1.0)
     inbox.put(seen(1, frame_seq=7, frame=b"seven"))
     inbox.put(seen(2, frame_seq=7))
-    assert inbox.take(0, 0.0).jpeg == b"seven"
+    assert inbox.observation(0, 0.0).jpeg == b"seven"
     inbox.put(seen(3, frame_seq=8))
-    assert inbox.take(2, 0.0).jpeg is None
+    assert inbox.observation(2, 0.0).jpeg is None
 
 
 def test_a_lost_link_ends_all_waits_at_once() -> None:
-    inbox = Inbox(lambda: 0.0)
+    inbox = Inbox(lambda: 0.0, 1.0)
     errors: list[LinkError] = []
 
     def wait() -> None:
         try:
-            inbox.take(0, 60.0)
+            inbox.observation(0, 60.0)
         except LinkError as error:
             errors.append(error)
 
@@ -88,5 +87,5 @@ def test_a_lost_link_ends_all_waits_at_once() -> None:
     inbox.fail(LinkError("Second."))
     thread.join(10.0)
     with pytest.raises(RobotRefused, match="First"):
-        inbox.take(0, 0.0)
+        inbox.observation(0, 0.0)
     assert [str(error) for error in errors] == ["First."]

@@ -20,19 +20,21 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Final, Self, TypeVar
 
+import aiohttp
+
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.client.connection import (
-    Access,
+    CLOSE_S,
     Inbox,
     Received,
-    RobotConnection,
+    lost,
     open_connection,
+    receive,
 )
-from shapechanger.robot.client.known_robots import KnownRobot, parse_trust, untrusted
+from shapechanger.robot.client.known_robots import KnownRobot, untrusted
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import parse_address
-from shapechanger.robot.link.authentication import parse_key
-from shapechanger.robot.link.messages import ClientMessage, Event, RobotMessage, Welcome
+from shapechanger.robot.link.messages import ClientMessage, Hello, RobotMessage, Welcome
 
 _Answer = TypeVar("_Answer", bound=RobotMessage)
 
@@ -49,37 +51,39 @@ def _own_name() -> str:
     return f"{user}@{socket.gethostname()}"[:64]
 
 
-class RobotClient:
+class RobotClient(Inbox):
     """Connection to a robot, made by `connect` and kept by its own thread.
 
     All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
     the robot refuses.
 
     Args:
-        access: Settings of the connection.
+        robot: The robot.
+        hello: The client's first message, without a proof.
+        timeout_s: Time limit of the handshake, and of silence before the link is lost, s.
 
     Attributes:
         welcome: Description of the robot.
         pace: Whether the clocks or the client set the pace.
     """
 
-    def __init__(self, access: Access) -> None:
-        self.pace = access.pace
-        self._access = access
-        self._process = os.getpid()
-        self._inbox = Inbox(time.monotonic)
+    def __init__(self, robot: KnownRobot, hello: Hello, timeout_s: float) -> None:
+        super().__init__(time.monotonic, timeout_s + _MARGIN_S)
+        self.pace = hello.pace
+        self._settings = robot, hello, timeout_s
         self._asking = threading.Lock()
         self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stop = asyncio.Event()
-        self._connection: RobotConnection | None = None
+        self._posted = asyncio.Event()
+        self._pending: list[ClientMessage] = []
         self._thread = threading.Thread(
-            target=self._run, name=f"robot {access.address}", daemon=True
+            target=self._run, name=f"robot {robot.address}", daemon=True
         )
-        welcome = self._inbox.expect(Welcome)
-        self._thread.start()
         try:
-            self.welcome = welcome.result()
+            with self.request(Welcome) as welcome:
+                self._thread.start()
+                self.welcome = self.answered(welcome, threading.TIMEOUT_MAX)
         except BaseException:  # Ctrl-C too: leave no thread behind.
             self.close()
             raise
@@ -121,37 +125,20 @@ class RobotClient:
             if not fingerprint:
                 raise untrusted(parse_address(robot), timeout_s)
             robot = KnownRobot("robot", robot, key, fingerprint)
-        access = Access(
-            parse_address(robot.address),
-            parse_key(robot.key) if robot.key else b"",
-            parse_trust(robot.fingerprint),
-            name or _own_name(),
-            role,
-            pace,
-            frames,
-            timeout_s,
+        hello = Hello(
+            version=messages.VERSION,
+            proof=b"",
+            name=name or _own_name(),
+            role=role,
+            pace=pace,
+            frames=frames,
         )
-        return cls(access)
+        return cls(robot, hello, timeout_s)
 
     @property
     def alive(self) -> bool:
         """True while the link is up, in the process that made it."""
-        return self._inbox.failure is None and self._process == os.getpid()
-
-    @property
-    def newest(self) -> Received | None:
-        """The newest observation of any age; None before the first."""
-        return self._inbox.newest
-
-    @property
-    def recorder(self) -> messages.RecorderState | None:
-        """Last reported state of the robot's recorder, or None."""
-        return self._inbox.recorder
-
-    @property
-    def policies(self) -> messages.PolicyState | None:
-        """Last report of the policies on board, or None."""
-        return self._inbox.policies
+        return self.failure is None and self._process == os.getpid()
 
     def take(self) -> None:
         """Take control.
@@ -172,18 +159,15 @@ class RobotClient:
         seen = self.newest or self.ask()
         # Answer a new observation, but end only an emergency stop that was seen before the call.
         newest = self.ask()
-        refused = self._inbox.expect(messages.Refused)
-        try:
+        until_s = time.monotonic() + self._settings[2]
+        with self.request(messages.Refused) as refused:
             self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
-            until = time.monotonic() + self._access.timeout_s
-            while time.monotonic() < until:
+            while time.monotonic() < until_s:
                 newest = self.ask()
-                if refused.done():
-                    refused.result()
+                if refused.answer is not None:
+                    raise RobotRefused(refused.answer.reason)
                 if newest.message.armed:
                     return
-        finally:
-            refused.cancel()
         reason = newest.message.stop_reason
         raise RobotRefused(f"The robot did not arm{f': {reason}' if reason else ''}.")
 
@@ -235,33 +219,6 @@ class RobotClient:
         """Ask for the next observation without a command."""
         newest = self.newest
         self._post(messages.Acknowledge(seq=newest.message.seq if newest else 0))
-
-    def observation(self, newer_than: int = 0, timeout_s: float | None = None) -> Received:
-        """Wait for an observation, and return the newest one.
-
-        Args:
-            newer_than: Its `seq` is larger than this.
-            timeout_s: Time limit, s; None for the link's.
-
-        Raises:
-            StaleObservation: If none arrives in time.
-            LinkError: If the link is lost.
-        """
-        self._require_own()
-        return self._inbox.take(newer_than, self._limit(timeout_s))
-
-    def newer(self, newer_than: int, timeout_s: float) -> Received | None:
-        """Wait for an observation as `observation` does, but return None after the time limit.
-
-        Args:
-            newer_than: Its `seq` is larger than this.
-            timeout_s: Time limit, s.
-
-        Raises:
-            LinkError: If the link is lost.
-        """
-        self._require_own()
-        return self._inbox.wait(newer_than, timeout_s)
 
     def ask(self) -> Received:
         """Ask for a new observation, and wait for it.
@@ -318,7 +275,7 @@ class RobotClient:
 
     def mark(self, text: str = "") -> messages.RecorderState:
         """Mark the newest step of the episode being recorded; raises as `record` does."""
-        before = 0 if self._inbox.recorder is None else self._inbox.recorder.marks
+        before = 0 if self.recorder is None else self.recorder.marks
         return self._ask_disk(
             messages.Mark(text=text),
             messages.RecorderState,
@@ -331,7 +288,7 @@ class RobotClient:
         Args:
             seconds: How far back, s, above 0.
         """
-        before = 0 if self._inbox.recorder is None else self._inbox.recorder.dropped
+        before = 0 if self.recorder is None else self.recorder.dropped
         return self._ask_disk(
             messages.Undo(seconds=seconds),
             messages.RecorderState,
@@ -413,23 +370,12 @@ class RobotClient:
         pong = self._ask(messages.Ping(), messages.Pong, timeout_s)
         return time.monotonic() - start, pong.now_ns
 
-    def events(self) -> list[Event]:
-        """Return the events since the last call, oldest first, at most 256."""
-        return self._inbox.events()
-
-    def refusal(self, seq: int) -> str:
-        """Return the reason why the robot refused a command, or "" if it has not."""
-        return self._inbox.refusal(seq)
-
     def close(self) -> None:
         """End the connection after pending messages are sent; may be called again."""
         if self._process != os.getpid():
             return  # A copy made by fork: the connection belongs to the other process.
-        self._inbox.fail(LinkError("The connection was closed: make a new one."))
-        loop = self._loop
-        if loop is not None and not loop.is_closed():
-            with contextlib.suppress(RuntimeError):  # It may close in between.
-                loop.call_soon_threadsafe(self._stop.set)
+        self.fail(LinkError("The connection was closed: make a new one."))
+        self._call(self._stop.set)
         self._thread.join()
 
     def abandon(self) -> None:
@@ -438,12 +384,9 @@ class RobotClient:
         For clients that are dropped without `close`: the garbage collector may call this in any
         thread, including the connection's.
         """
-        loop, connection = self._loop, self._connection
-        if self._process != os.getpid() or loop is None or connection is None:
-            return
-        with contextlib.suppress(RuntimeError):  # It has ended already.
-            loop.call_soon_threadsafe(connection.post, messages.Release())
-            loop.call_soon_threadsafe(self._stop.set)
+        if self._process == os.getpid():
+            self._call(self._enqueue, messages.Release())
+            self._call(self._stop.set)
 
     def __enter__(self) -> Self:
         """The client itself."""
@@ -455,23 +398,17 @@ class RobotClient:
 
     # In the callers' threads.
 
-    def _limit(self, timeout_s: float | None) -> float:
-        return self._access.timeout_s + _MARGIN_S if timeout_s is None else timeout_s
-
-    def _require_own(self) -> None:
-        if self._process != os.getpid():
-            raise LinkError("This connection belongs to another process: make one in this one.")
+    def _call(self, function: Callable[..., object], *arguments: object) -> None:
+        """Call a function in the connection's thread, unless that has ended."""
+        if self._loop is None:  # It has not begun.
+            function(*arguments)
+            return
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(function, *arguments)
 
     def _post(self, message: ClientMessage) -> None:
-        self._require_own()
-        self._inbox.check()
-        if self._loop is None or self._connection is None:
-            raise LinkError("The connection is not open yet.")
-        try:
-            self._loop.call_soon_threadsafe(self._connection.post, message)
-        except RuntimeError:  # The loop has ended meanwhile.
-            self._inbox.check()
-            raise LinkError("The link to the robot is lost.") from None
+        self.check()
+        self._call(self._enqueue, message)
 
     def _ask_disk(
         self,
@@ -493,33 +430,67 @@ class RobotClient:
         timeout_s: float | None = None,
         accepts: Callable[[_Answer], bool] = lambda _: True,
     ) -> _Answer:
-        answer = self._inbox.expect(kind, accepts)
-        try:
+        with self.request(kind, accepts) as request:
             self._post(message)
-            return answer.result(self._limit(timeout_s))
-        except TimeoutError:
-            asked = type(message).__name__
-            raise LinkError(f"The robot did not answer {asked!r} in time.") from None
-        finally:
-            answer.cancel()
+            return self.answered(request, timeout_s)
 
     # In the connection's thread.
 
+    def _enqueue(self, message: ClientMessage) -> None:
+        """Queue a message, replacing a waiting message of the same type.
+
+        After a blocked connection the robot so gets the newest command, and no older ones.
+        """
+        self._pending = [m for m in self._pending if type(m) is not type(message)]
+        self._pending.append(message)
+        self._posted.set()
+
     def _run(self) -> None:
+        failure: LinkError | None = None
         try:
             asyncio.run(self._exchange())
         except LinkError as error:
-            self._inbox.fail(error)
+            failure = error
         except BaseException as error:
-            # Waiting callers must not block indefinitely.
-            self._inbox.fail(LinkError(f"The link to the robot failed: {error!r}."))
+            failure = LinkError(f"The link to the robot failed: {error!r}.")
             raise
-        else:
-            self._inbox.fail(LinkError("The connection was closed: make a new one."))
+        finally:
+            # Waiting callers must not block indefinitely.
+            self.fail(failure or LinkError("The connection was closed: make a new one."))
 
     async def _exchange(self) -> None:
+        """Connect, receive and send until `_stop` is set."""
         self._loop = asyncio.get_running_loop()
-        async with open_connection(self._access) as connection:
-            self._connection = connection
-            self._inbox.put(connection.welcome)
-            await connection.run(self._inbox.put, self._stop)
+        async with open_connection(*self._settings) as (websocket, welcome):
+            self.put(welcome)
+            work = (self._receive(websocket), self._send(websocket), self._stop.wait())
+            tasks = [asyncio.ensure_future(each) for each in work]
+            done, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in others:
+                task.cancel()
+            await asyncio.wait(tasks)
+            for task in done:
+                task.result()
+            # Should this fail, the robot notices the end of the connection anyway.
+            with contextlib.suppress(LinkError, TimeoutError):
+                async with asyncio.timeout(CLOSE_S):
+                    await self._send_pending(websocket)
+                    await websocket.close()
+
+    async def _receive(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
+        while True:
+            self.put(await receive(websocket, self._settings[2]))
+
+    async def _send(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
+        while True:
+            await self._posted.wait()
+            self._posted.clear()
+            await self._send_pending(websocket)
+
+    async def _send_pending(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
+        while self._pending:
+            message = self._pending.pop(0)
+            try:
+                await websocket.send_bytes(messages.encode(message))
+            except (ConnectionError, aiohttp.ClientError) as error:
+                raise lost(str(error) or "the connection broke") from None

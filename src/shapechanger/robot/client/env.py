@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.drive import DriveReward
-from shapechanger.errors import LinkError, RenderError, RobotRefused, UnknownName
+from shapechanger.errors import LinkError, RenderError, RobotRefused, StaleObservation, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received
@@ -349,8 +350,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             found = robot.observation(found.message.seq, left_s + self._patience_s)
         while (left_s := self._schedule.left_s) > 0.0:
             robot.acknowledge()
-            newer = robot.newer(found.message.seq, left_s)
-            found = newer or found
+            with contextlib.suppress(StaleObservation):
+                found = robot.observation(found.message.seq, left_s)
         return found
 
     def _cut(self, last: Received, because: str) -> tuple[Any, float, bool, bool, dict[str, Any]]:
