@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from shapechanger.errors import CorruptStudy, OutputError, UnknownName
+from shapechanger.errors import CorruptStudy, OutputError, UnknownName, translate_errors
 
 _T = TypeVar("_T")
 
@@ -82,23 +82,51 @@ def write_atomic(path: Path, content: bytes) -> None:
     """Write a file completely and flush it to disk, or leave the old one in place.
 
     Args:
-        path: The file.
+        path: The file; an existing one keeps its permissions.
         content: Its new content.
 
     Raises:
         OutputError: If it cannot be written, for instance because the disk is full.
     """
+    with translate_errors(OSError, to=lambda error: cannot_write(path, error)):
+        _write(path, content, path.stat().st_mode & 0o7777 if path.exists() else None)
+
+
+def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
+    """Write a new file completely or not at all; a missing folder is made.
+
+    Args:
+        path: The file.
+        content: Its content.
+        mode: Its permissions from the start; None for the default of the process.
+
+    Raises:
+        FileExistsError: If the file exists.
+        OSError: If it cannot be written; no partial file is left.
+    """
+    if os.path.lexists(path):
+        raise FileExistsError(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _write(path, content, mode)
+
+
+def _write(path: Path, content: bytes, mode: int | None) -> None:
     # Two processes may write the same file.
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part.unlink(missing_ok=True)
     try:
-        with part.open("wb") as file:
+        # The mode from the start keeps other users from reading it meanwhile.
+        fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666 if mode is None else mode)
+        with os.fdopen(fd, "wb") as file:
+            if mode is not None:
+                part.chmod(mode)  # The umask does not apply.
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            os.fsync(fd)
         part.replace(path)
-    except OSError as error:
+    except OSError:
         part.unlink(missing_ok=True)
-        raise cannot_write(path, error) from error
+        raise
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -11,7 +11,7 @@ import pytest
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import ProfileError
 from shapechanger.robot.profile import load_profile, shipped_profiles, write_profile
-from shapechanger.robot.profile.edit import rewrite
+from shapechanger.robot.profile.load import rewrite
 from tests.robot.profile.texts import changed, read
 
 _TEXT = shipped_profiles()["finger"].read_text()

@@ -70,7 +70,7 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
     """Missing files, folders, binary, oversized and unreadable files raise clear errors."""
     with pytest.raises(ProfileError, match=r"There is no file .*gone\.toml\."):
         load_profile(tmp_path / "gone.toml")
-    with pytest.raises(ProfileError, match="is a folder, not a profile"):
+    with pytest.raises(ProfileError, match="cannot be read: Is a directory"):
         load_profile(tmp_path)
     path = tmp_path / "x.toml"
     path.write_bytes(b"# One.\n\xff")

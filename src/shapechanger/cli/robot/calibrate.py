@@ -24,7 +24,7 @@ from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.client.teleop import STOPS, Terminal
 from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.profile.load import load_profile
+from shapechanger.robot.profile.load import load_profile, rewrite
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (
     JogResult,
@@ -279,7 +279,6 @@ class Calibration:
     @contextmanager
     def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
         """Serve the robot with other settings, armed for a person."""
-        from shapechanger.robot.profile.edit import rewrite
         from shapechanger.robot.twin.robot import run_robot
 
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:

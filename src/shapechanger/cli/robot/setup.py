@@ -29,9 +29,10 @@ from shapechanger.robot.profile.load import (
     find_profile,
     load_profile,
     profile_text,
+    rewrite,
     shipped_profiles,
     starter_text,
-    write_text,
+    write_profile,
 )
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import robot_at
@@ -118,28 +119,24 @@ class Init:
             say("")
             Install(str(made)).run()
 
-    def _checked(self) -> tuple[str, Path, str]:
-        """Return name, file and text of the profile, after all checks."""
+    def _checked(self) -> tuple[str, Path]:
+        """Return name and file of the profile, after all checks."""
         name = self.name or self.kind
         check_name(name)
         out = self.out or Path(f"{name}.toml")
-        text = starter_text(self.kind, out, name)
-        if self.camera or self.arming:
-            from shapechanger.robot.profile.edit import adapted
-
-            text = adapted(text, out, self.camera, self.arming)
-        return name, out, text
+        starter_text(self.kind, out, name, self.camera, self.arming)
+        return name, out
 
     def _write(self, *, installs: bool = False) -> Path:
         """Write the files, print the next steps, and return the profile."""
-        name, out, text = self._checked()  # Check everything before creating anything.
+        name, out = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
         # Lets this machine drive it, especially on a twin.
         remember(robot_at("127.0.0.1", name, credentials))
         unit, is_new = write_unit(name, out, self.credentials)
         # Last, because an existing profile is refused: after a failure, such as a full disk, the
         # command can be repeated.
-        profile = write_text(out, text)
+        profile = write_profile(self.kind, out, name, self.camera, self.arming)
         say(
             f"wrote {profile}: check its pins before anything moves\n"
             f"{'wrote' if is_new else 'kept'} {unit}: its systemd unit\n"
@@ -217,8 +214,6 @@ def own_profile(name: str) -> Path:
 
 def change_profile(path: Path, changes: dict[str, Any]) -> None:
     """Write changes into a profile, and print them."""
-    from shapechanger.robot.profile.edit import rewrite
-
     rewrite(path, changes)
     for name, value in changes.items():
         say(f"{name} = {value}")

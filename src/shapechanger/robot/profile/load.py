@@ -1,16 +1,15 @@
-"""Find, read and create profile files."""
+"""Find, read, create and change profile files."""
 
 from __future__ import annotations
 
 import difflib
-import json
 import os
-import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from shapechanger.errors import OutputError, ProfileError, UnknownName
-from shapechanger.robot.new_file import write_new
+from shapechanger.errors import OutputError, ProfileError, UnknownName, translate_errors
+from shapechanger.files import cannot_write, write_atomic, write_new
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.profile.read import read_profile
 
@@ -18,6 +17,9 @@ _SHIPPED: Final = Path(__file__).parent / "shipped"
 _SUFFIX: Final = ".toml"
 _LARGEST: Final = 1024 * 1024  # Size of the largest profile, bytes.
 _MOST_LISTED: Final = 10
+
+CAMERAS: Final = {"ribbon": "picamera2", "usb": "v4l2", "none": ""}
+"""Driver of each kind of camera that a new profile can have."""
 
 
 def shipped_profiles() -> dict[str, Path]:
@@ -64,24 +66,23 @@ def profile_text(path: str | os.PathLike[str]) -> str:
     Raises:
         ProfileError: If the file is missing, unreadable or not UTF-8.
     """
+    path = Path(path)
     try:
-        with Path(path).open("rb") as file:
+        with path.open("rb") as file:
             data = file.read(_LARGEST + 1)
+        # Like tomllib for files; Windows editors may prepend a byte-order mark.
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError:
-        raise ProfileError(f"There is no file {os.fspath(path)}{_nearest(Path(path))}") from None
-    except IsADirectoryError:
-        raise ProfileError(f"{os.fspath(path)} is a folder, not a profile.") from None
+        raise ProfileError(f"There is no file {path}{_nearest(path)}") from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from None
     except (OSError, ValueError) as error:  # ValueError: NUL in the path.
         reason = getattr(error, "strerror", None) or error
-        raise ProfileError(f"{os.fspath(path)} cannot be read: {reason}.") from error
+        raise ProfileError(f"{path} cannot be read: {reason}.") from error
     if len(data) > _LARGEST:
-        raise ProfileError(f"{os.fspath(path)} is longer than a profile can be, 1 MiB.")
-    try:
-        # Like tomllib for files; Windows editors may prepend a byte-order mark.
-        return data.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise ProfileError(f"{os.fspath(path)}, line {line}: this is not UTF-8 text.") from None
+        raise ProfileError(f"{path} is longer than a profile can be, 1 MiB.")
+    return text
 
 
 def _nearest(path: Path) -> str:
@@ -95,48 +96,102 @@ def _nearest(path: Path) -> str:
     return f"; its folder has {listed}." if there else "."
 
 
-_NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)
-
-
-def starter_text(kind: str, path: str | os.PathLike[str], robot_name: str) -> str:
+def starter_text(
+    kind: str, path: str | os.PathLike[str], robot_name: str, camera: str = "", arming: str = ""
+) -> str:
     """Return the text of a new profile, with the checks of `write_profile`, without writing it."""
+    import tomlkit  # Nothing that drives a robot needs it.
+
     shipped = shipped_profiles()
     if kind not in shipped:
         raise UnknownName("kind of robot", kind, shipped)
-    # JSON strings are TOML strings.
-    name_line = f"name = {json.dumps(robot_name, ensure_ascii=False)}"
-    text = _NAME_LINE.sub(lambda _: name_line, profile_text(shipped[kind]), count=1)
-    target = Path(path)
-    read_profile(text, target)
-    if os.path.lexists(target):
-        raise OutputError(f"Cannot write {target}: it exists.")
+    if camera and camera not in CAMERAS:
+        raise UnknownName("camera", camera, CAMERAS)
+    document: Any = tomlkit.parse(profile_text(shipped[kind]))
+    document["robot"]["name"] = robot_name
+    before: Any = document.get("camera", {})
+    driver = CAMERAS.get(camera, before.get("driver", ""))
+    if not driver:
+        document.pop("camera", None)
+        document.get("limits", {}).pop("camera_stale_ms", None)
+    elif driver != before.get("driver"):
+        table: Any = tomlkit.table()
+        table["driver"] = driver
+        # Other settings belong to the other camera.
+        table.update({key: before[key] for key in ("size", "fps") if key in before})
+        table.add(tomlkit.nl())
+        document["camera"] = table
+    if arming:
+        document.setdefault("limits", tomlkit.table())["arming"] = arming
+    text = tomlkit.dumps(document)
+    read_profile(text, Path(path))
+    if os.path.lexists(path):
+        raise OutputError(f"Cannot write {path}: it exists.")
     return text
 
 
-def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> Path:
+def write_profile(
+    kind: str, path: str | os.PathLike[str], robot_name: str, camera: str = "", arming: str = ""
+) -> Path:
     """Copy a shipped profile under a new name, creating missing folders, and return its file.
 
     Args:
         kind: Name of a shipped profile, such as "car".
         path: The new file, which must not exist.
         robot_name: Name of the new robot.
+        camera: A key of `CAMERAS`; "" for the camera of the shipped profile.
+        arming: "person" or "anyone"; "" for the rule of the shipped profile.
 
     Raises:
-        UnknownName: If no shipped profile has this name.
+        UnknownName: If there is no shipped profile or no camera of this name.
         ProfileError: If the robot's name is invalid.
         OutputError: If the file exists or cannot be written; no partial file is left.
     """
-    return write_text(Path(path), starter_text(kind, path, robot_name))
+    path = Path(path)
+    text = starter_text(kind, path, robot_name, camera, arming)
+    with translate_errors(OSError, to=lambda error: cannot_write(path, error)):
+        write_new(path, text.encode())
+    return path
 
 
-def write_text(path: Path, text: str) -> Path:
-    """Write a new profile, creating missing folders, and return its file.
+def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile:
+    """Change values, or add keys to existing tables, atomically.
+
+    Comments, order and blank lines stay.
+
+    Args:
+        path: The file; a symbolic link is followed.
+        changes: New values by dotted name, such as `output.steering.centre_us`.
+
+    Returns:
+        The profile after the change.
 
     Raises:
-        OutputError: If the file exists or cannot be written; no partial file is left.
+        ProfileError: If the file is not a valid profile, before or after the change.
+        UnknownName: If a table is not in the file.
+        OutputError: If the file cannot be written; it is then unchanged.
     """
-    try:
-        write_new(path, text.encode())
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
-    return path
+    import tomlkit  # Nothing that drives a robot needs it.
+
+    target = Path(path).resolve()
+    before = profile_text(target)
+    read_profile(before, target)
+    document: Any = tomlkit.parse(before)
+    for dotted, value in changes.items():
+        *tables, key = dotted.split(".")
+        table: Any = document
+        for name in tables:
+            known = [k for k, v in table.items() if isinstance(v, dict)]
+            if name not in known:
+                raise UnknownName(f"table of {target.name}", name, known)
+            table = table[name]
+        if isinstance(value, dict):
+            entries = tomlkit.inline_table()
+            entries.update(value)
+            table[key] = entries
+        else:
+            table[key] = value
+    text = tomlkit.dumps(document)
+    profile = read_profile(text, target)
+    write_atomic(target, text.encode())
+    return profile

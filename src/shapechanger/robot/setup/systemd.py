@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import OutputError
-from shapechanger.robot.new_file import write_new
+from shapechanger.files import write_new
 
 _TEMPLATE: Final = Path(__file__).parent / "robot.service"
 _NOT_IN_UNITS: Final = re.compile(r"[^A-Za-z0-9_.-]")
