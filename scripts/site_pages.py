@@ -408,6 +408,7 @@ MODULES: Final = (
     "shapechanger.robot.link.messages",
     "shapechanger.transfer.study",
     "shapechanger.transfer.learners.policy_file",
+    "shapechanger.robot.twin.operator",
     "shapechanger.robot.twin.robot",
 )
 """Modules of the reference besides the packages: they hold public names that no package exports."""

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.twin.robot import Whereabouts, run_robot
+from shapechanger.robot.twin.operator import Whereabouts
+from shapechanger.robot.twin.robot import run_robot
 from tests.robots import CAR, IN_A_ROOM, SWAPPED_ROLES, SWAPPED_WAYS, write_profile
 from tests.served import driving
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.robot import Whereabouts, run_robot
+from shapechanger.robot.twin.operator import Whereabouts
+from shapechanger.robot.twin.robot import run_robot
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
 from shapechanger.vehicles.envs import VehicleEnv
 from shapechanger.vehicles.world import MujocoWorld

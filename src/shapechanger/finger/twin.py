@@ -16,7 +16,7 @@ from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.tensions import drive_of
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.rig import Rig
-from shapechanger.robot.twin.place import Place
+from shapechanger.robot.twin.start import Place
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
 _CABLE_STIFFNESS: Final = 20e3

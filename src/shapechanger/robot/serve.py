@@ -36,8 +36,7 @@ from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.place import Place
-from shapechanger.robot.twin.start import BoardAt, find_board, start_board
+from shapechanger.robot.twin.start import BoardAt, Place, find_board, start_board
 
 _HERE: Final = "127.0.0.1"
 _LOOK_EVERY_S: Final = 0.1
@@ -108,7 +107,7 @@ class Service:
                 place=place(),
             )
             undo.enter_context(started)
-            started.outlive_exec()
+            started.owner.set_inheritable(True)  # The board outlives this process's `exec`.
             return started
         board, clock = found
         if clock != self.clock:

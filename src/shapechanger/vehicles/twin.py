@@ -10,7 +10,7 @@ from shapechanger.contract.world import World
 from shapechanger.errors import MissingExtra
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.twin.place import Place
+from shapechanger.robot.twin.start import Place
 
 if TYPE_CHECKING:
     from shapechanger.vehicles.envs.drive import SimulatedRobot

@@ -15,9 +15,8 @@ from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import finger_place
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.place import Place
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.start import Place, start_board
 from shapechanger.vehicles.twin import course_place
 from tests.robots import CAR, changed, write_profile
 

@@ -310,8 +310,8 @@ def test_without_the_supply_off_no_output_is_touched(car: Profile) -> None:
 def test_pressed_switches(car: Profile) -> None:
     """A switch that is pressed now, or whose wire touches ground, is reported."""
     board = _board(car)
-    board.pins.sensors.press_stop(down=True)
-    for bumper in board.pins.sensors.of_kind(SimulatedSwitch):
+    board.pins.stop_held = True
+    for bumper in board.pins.of_kind(SimulatedSwitch):
         bumper.held = True
     board.pass_ns(100_000_000)
     found = _wired(car, board.hardware)
@@ -352,7 +352,7 @@ def test_dead_sensors_do_not_hide_others(car: Profile) -> None:
     """Each is reported by its own driver's error."""
     board = _board(car)
     board.pins.dead_chips.add((1, 0x40))
-    for sensor in board.pins.sensors.of_kind(SimulatedHcsr04):
+    for sensor in board.pins.of_kind(SimulatedHcsr04):
         sensor.dead = True
     found = _wired(car, board.hardware)["sensor"]
     assert [level for level, _ in found] == ["unknown", "good", "bad", "bad"]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Sequence
+from inspect import signature
 from typing import Any, Final, cast
 
 import numpy as np
@@ -22,13 +23,12 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import NumberedFrame, StateReader, build_observation
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.process import Guard
-from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.link.messages import Observation, Welcome
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.hardware import BoardClient, TwinHardware
+from shapechanger.robot.twin.board import START_NS
+from shapechanger.robot.twin.hardware import BoardClient, SteadyClock, TwinHardware
 from shapechanger.robot.twin.pin_board import PinBoard
-from shapechanger.robot.twin.server import START_NS
 from shapechanger.robot.twin.wiring import TwinWiring
 
 _log = logging.getLogger(__name__)
@@ -47,12 +47,11 @@ class LocalBoard(BoardClient):
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
         self._now_ns = START_NS
         self.pid = os.getpid()
-        self.pins = PinBoard(wiring, world, None, seed, START_NS)
-        self._functions = {one.__name__: one for one in self.pins.functions}
+        self.pins = PinBoard(wiring, world, None, seed, lambda: self._now_ns)
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
         self._closed = False
-        self.hardware = TwinHardware(self, cast("Clock", _Clock(self)))
+        self.hardware = TwinHardware(self, cast("SteadyClock", _Clock(self)))
 
     @property
     def closed(self) -> bool:
@@ -76,13 +75,20 @@ class LocalBoard(BoardClient):
         """Advance time by some nanoseconds."""
         self.advance(self._now_ns + ns)
 
+    @property
+    def t(self) -> int:
+        """Time of a call."""
+        return self._now_ns
+
     def post(self, function: str, *arguments: Any) -> None:
         """Call a function of the board."""
-        self._functions[function](self, self._now_ns, *arguments)
+        self.ask(None, function, *arguments)
 
     def ask(self, kind: Any, function: str, *arguments: Any) -> Any:
         """Call a function of the board and return its result."""
-        return self._functions[function](self, self._now_ns, *arguments)
+        called = getattr(self.pins, function)
+        takes_caller = "caller" in signature(called).parameters
+        return called(self, *arguments) if takes_caller else called(*arguments)
 
     def drain(self) -> None:
         """Do nothing: edges arrive with `advance`."""

@@ -11,9 +11,9 @@ import msgspec
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.twin import board_client
+from shapechanger.robot.twin import rpc
 from shapechanger.robot.twin.hardware import BoardClient, GrantedClock, SteadyClock
-from shapechanger.robot.twin.messages import MAX_MESSAGE, Greeting, Reply, encode
+from shapechanger.robot.twin.rpc import MAX_MESSAGE, Greeting, Reply, encode
 
 
 def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
@@ -82,7 +82,7 @@ def test_a_board_that_never_replies_ends_the_heartbeats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After that the supervisor finds the guard silent."""
-    monkeypatch.setattr(board_client, "_HELD_UP_S", 0.0)
+    monkeypatch.setattr(rpc, "_HELD_UP_S", 0.0)
     client, board = _connected(tmp_path)
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")
     ending = threading.Timer(0.05, board.close)

@@ -6,6 +6,7 @@ import os
 import re
 import select
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -116,8 +117,8 @@ def test_without_a_barcode_the_comment_still_has_the_time(tmp_path: Path) -> Non
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
     plain, striped = (
         FrontCameraPipe(
-            str(tmp_path / "none"), 20.0, 95, latest_only=True, start_ns=0, seed=0, barcode=barcode
-        ).draw(world, 77)
+            tmp_path, replace(_CAMERA, jpeg_quality=95), world, 0, latest_only=True, barcode=barcode
+        ).draw(77)
         for barcode in (False, True)
     )
     assert b"captured_ns=77" in plain
@@ -130,9 +131,8 @@ def test_without_a_barcode_the_comment_still_has_the_time(tmp_path: Path) -> Non
 def test_frames_are_small(tmp_path: Path) -> None:
     """A JPEG of 160 by 120 takes less than 8 kB on average."""
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
-    path = str(tmp_path / "none")
-    camera = FrontCameraPipe(path, 20.0, 80, latest_only=True, start_ns=0, seed=0)
-    sizes = [len(camera.draw(world, i)) for i in range(50)]
+    camera = FrontCameraPipe(tmp_path, _CAMERA, world, 0, latest_only=True)
+    sizes = [len(camera.draw(i)) for i in range(50)]
     assert np.mean(sizes) < 8000
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.board import START_NS
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.server import START_NS
 from shapechanger.robot.twin.start import start_board
 from tests.robot.twin.robots import CAR, granted, process, steady
 

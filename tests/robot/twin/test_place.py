@@ -10,11 +10,10 @@ import pytest
 
 from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.twin.place import Place, open_world
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
-from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.start import Place, open_world, start_board
 from shapechanger.vehicles.twin import course_place
 from shapechanger.vehicles.world import MujocoWorld
 from tests.robot.twin.robots import CAR
@@ -39,7 +38,7 @@ def test_the_room_does_not_import_mujoco() -> None:
         "import sys\n"
         "sys.modules['mujoco'] = None\n"
         "from shapechanger.errors import MissingExtra\n"
-        "from shapechanger.robot.twin.place import Place, open_world\n"
+        "from shapechanger.robot.twin.start import Place, open_world\n"
         "from shapechanger.vehicles.twin import course_place\n"
         "open_world(Place(), {'wheels'}, None, 1)\n"
         "try:\n"

@@ -10,7 +10,7 @@ from gpiozero import DigitalOutputDevice
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.hardware import connect
-from shapechanger.robot.twin.robot import Operator, Whereabouts
+from shapechanger.robot.twin.operator import Operator, Whereabouts
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board

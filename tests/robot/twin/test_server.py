@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.robot.drivers.simulation import Edge
-from shapechanger.robot.twin.messages import (
+from shapechanger.robot.twin.rpc import (
     MAX_MESSAGE,
+    BoardConnection,
     Event,
     Grant,
     InputEdges,
     Reply,
     decode_event,
 )
-from shapechanger.robot.twin.server import BoardConnection
 
 pytestmark = pytest.mark.realtime  # It opens sockets.
 
@@ -60,7 +60,7 @@ def test_only_edges_are_dropped(kinds: list[str]) -> None:
                     board.send_edges(new)
                     edges += new
         events = list(received(theirs, board))
-        board.close()
+        own.close()
     assert [event for event in events if not isinstance(event, InputEdges)] == sent
     got = [edge for event in events if isinstance(event, InputEdges) for edge in event.edges]
     assert got == sorted(got)
@@ -77,4 +77,4 @@ def test_merged_edges_do_not_pile_up() -> None:
         for t in range(2000):
             board.send_edges([Edge(t, 4 + t % 2, t % 2)])
         assert len(list(received(theirs, board))) < 1000
-        board.close()
+        own.close()

@@ -90,7 +90,7 @@ def test_negated_outputs_reverse_the_vehicle(kind: str) -> None:
 
 
 def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
-    """At a wall the car stops, decelerates hard, draws current, and can reverse away."""
+    """At a wall the car stops, decelerates hard, and can reverse away."""
     world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=2)
     hardest = 0.0
     for _ in range(600):
@@ -101,7 +101,6 @@ def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
     assert seen.speed == 0.0
     assert _clearance(seen.pose) == pytest.approx(RADIUS, abs=0.005)
     assert hardest < -20.0
-    assert seen.battery_v < 7.0
     travelled = seen.travelled_m
     _run(world, {"wheels": 1.0}, 1.0)
     assert world.inputs().travelled_m == pytest.approx(travelled, abs=1e-3)

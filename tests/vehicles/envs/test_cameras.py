@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.robot.twin.place import Place, open_world
+from shapechanger.robot.twin.start import Place, open_world
 from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
 from shapechanger.vehicles.twin import course_place

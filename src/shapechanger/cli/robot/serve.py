@@ -31,7 +31,7 @@ from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
-from shapechanger.robot.twin.place import Place
+from shapechanger.robot.twin.start import Place
 from shapechanger.vehicles.courses.course import HOME, require_element
 
 _ROOM: Final = "room"

@@ -1,7 +1,7 @@
 """Simulated hardware: a board with pins, chips, servos and a world, below the real drivers.
 
-`robot` serves a robot on its twin and operates it. `start` runs a board as a separate process:
-`board` joins a `server` with a `pin_board`, which has `sensors`, `servos` and a world of `place`.
-A robot's processes reach it through `hardware`, in `messages`. `signals` has the ledger of all
-outputs, and `wiring` and `judge` judge from it what the robot did.
+`robot` serves a robot on its twin, and `operator` moves and breaks it. `start` runs a `board` as a
+separate process: a `pin_board` with its world, which a robot's processes reach through `hardware`,
+by calls of `rpc`. `signals` has the ledger of all outputs, and `wiring` and `judge` judge from it
+what the robot did.
 """

@@ -13,6 +13,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Final, NamedTuple
@@ -20,224 +21,98 @@ from typing import Final, NamedTuple
 import msgspec
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.contract.world import RESTING_V
-from shapechanger.errors import RobotError, WorldError
-from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
-from shapechanger.robot.drivers.simulation import Levels
-from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
-from shapechanger.robot.twin.messages import Grant, Slept, Whereabouts
+from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.pin_board import PinBoard
-from shapechanger.robot.twin.place import open_world
-from shapechanger.robot.twin.server import (
+from shapechanger.robot.twin.rpc import (
     LATER,
-    START_NS,
     BoardConnection,
     BoardServer,
+    Grant,
     OwnerGone,
-    functions_of,
+    Slept,
 )
 from shapechanger.robot.twin.signals import LedgerWriter
-from shapechanger.robot.twin.start import BoardAt, BoardSettings
+from shapechanger.robot.twin.start import BoardAt, BoardSettings, open_world
 from shapechanger.robot.twin.wiring import TwinWiring
+
+START_NS: Final = 1_000_000_000
+"""First time of the twin's clock; not 0, which could be taken for "never"."""
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
 """Interval of looking for a reader of the pictures while time stands still."""
 
-_log = logging.getLogger(__name__)
 
-
-class Board:
-    """Pins, chips, sensors and world, with a server for clients.
-
-    Attributes:
-        world: World of the robot.
-        camera: Front camera; None without one.
-        server: Server of the clients.
-    """
-
-    def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
-        plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
-        is_real = settings.clock == "real"
-        parts = {output.part for output in plan.outputs if output.part}
-        self.world = open_world(settings.place, parts, camera, seed)
-        # Let the world prepare what takes a while, before a guard in real time waits for it.
-        self.world.put_back()
-        self.world.place(seed)
+def run_board(settings: BoardSettings, owner_fd: int) -> None:
+    """Run a board until its owner is gone; write a byte to the owner once it listens."""
+    plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
+    is_real = settings.clock == "real"
+    parts = {output.part for output in plan.outputs if output.part}
+    world = open_world(settings.place, parts, camera, seed)
+    # Let the world prepare what takes a while, before a guard in real time waits for it.
+    world.put_back()
+    world.place(seed)
+    if camera is not None:
+        world.picture()
+    if is_real:
+        run_early()  # Hardware is never late because the machine is busy.
+    clock = RealTime() if is_real else TwinTime(plan.tick_hz)
+    at = BoardAt(Path(settings.folder))
+    with ExitStack() as stack:
+        pipe = None
         if camera is not None:
-            self.world.picture()
-        if is_real:
-            run_early()  # Hardware is never late because the machine is busy.
-        clock = RealTime() if is_real else TwinTime(plan.tick_hz)
-        self._time = clock
-        files = BoardAt(Path(settings.folder))
-        self.camera: FrontCameraPipe | None = None
-        if camera is not None:
-            self.camera = FrontCameraPipe(
-                str(files.fifo_path),
-                camera.fps,
-                camera.jpeg_quality,
-                latest_only=is_real,
-                start_ns=clock.now_ns(),
-                seed=seed,
-                barcode=not settings.place.opener,
+            barcode = not settings.place.opener
+            pipe = FrontCameraPipe(
+                at.fifo_path, camera, world, clock.now_ns(), latest_only=is_real, barcode=barcode
             )
-        listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        listening.bind(files.socket_path)
-        self._ledger = LedgerWriter(files.ledger_path)
+            stack.callback(pipe.close)
+        ledger = stack.enter_context(closing(LedgerWriter(at.ledger_path)))
         wiring = TwinWiring(plan, settings.one_shot_ms)
-        self._pins = PinBoard(wiring, self.world, self._ledger, seed, clock.now_ns())
-        functions = functions_of("time", (clock.wait, clock.sleep))
-        operator = _OperatorFunctions(self, self._pins, clock.now_ns)
-        functions |= functions_of("operator", operator.all())
-        self.server = BoardServer(
-            listening, owner_fd, self._pins, settings.clock, clock.now_ns, functions
+        board = PinBoard(wiring, world, ledger, seed, clock.now_ns, pipe)
+        functions = [*clock.functions, *board.functions, *operator_functions(board)]
+        listening = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+        listening.bind(at.socket_path)
+        server = BoardServer(
+            listening, owner_fd, settings.clock, clock.now_ns, functions, board.free
         )
+        stack.callback(server.close)
         listening.listen()
-
-    def run(self) -> None:
-        """Run until the owner is gone."""
-        try:
-            self._time.run(self)
-        except OwnerGone:
-            _log.debug("the owner is gone, so this board ends")
-        finally:
-            self.server.close()
-            self._ledger.close()
-            if self.camera is not None:
-                self.camera.close()
-
-    def advance(self, now_ns: int) -> None:
-        """Advance the world to a time, and send the edges of inputs on the way."""
-        edges = self._pins.advance(now_ns)
-        for edge in edges:
-            self._ledger.write(edge.t, "input", pin=edge.pin, level=edge.level)
-        self.server.send_edges(edges)
-
-    def record(self, kind: str, **fields: object) -> None:
-        """Write a line of the ledger."""
-        self._ledger.write(self._time.now_ns(), kind, **fields)
+        os.write(owner_fd, b"r")  # Ready.
+        with suppress(OwnerGone):
+            clock.run(board, server)
 
 
-class _OperatorFunctions:
-    """What a person next to the robot does, and the truth; see `Operator`."""
-
-    def __init__(self, board: Board, pins: PinBoard, now_ns: Callable[[], int]) -> None:
-        self._board = board
-        self._world = board.world
-        self._pins = pins
-        self._now_ns = now_ns
-
-    def all(self) -> list[Callable[..., object]]:
-        names = [name for name in vars(type(self)) if not name.startswith("_") and name != "all"]
-        return [getattr(self, name) for name in names]
-
-    def tensions(self) -> dict[str, float]:
-        return self._pins.require_rig().tensions()
-
-    def levels(self) -> Levels:
-        return self._pins.levels
-
-    def where(self) -> Whereabouts:
-        seen = self._world.inputs()
-        return Whereabouts(
-            x=seen.pose.x,
-            y=seen.pose.y,
-            heading=seen.pose.heading,
-            speed=seen.speed,
-            travelled_m=seen.travelled_m,
-            bumped=seen.bumped,
-            distance_m=self._world.distance_m(),
-            truth=self._world.truth(),
-            t=self._now_ns(),
-        )
-
-    def place(self, seed: int) -> None:
-        self._world.place(seed)
-        self._board.record("place", seed=seed)
-
-    def put_back(self) -> None:
-        try:
-            self._world.put_back()
-        except WorldError as error:
-            raise RobotError(f"The vehicle cannot be put back: {error}") from error
-        self._board.record("put_back")
-
-    def lay_out(self, seed: int) -> None:
-        self._world.lay_out(seed)
-        self._board.record("course", seed=seed)
-
-    def break_camera(self, fault: str) -> None:
-        if self._board.camera is None:
-            raise RobotError("This twin has no camera.")
-        self._board.camera.break_down(fault)
-        self._broke(f"camera {fault or 'well'}")
-
-    def press_bumper(self, down: bool) -> None:
-        for bumper in self._pins.sensors.of_kind(SimulatedSwitch):
-            bumper.held = down
-        self._broke(f"bumper {'down' if down else 'up'}")
-
-    def press_stop(self, down: bool) -> None:
-        self._pins.sensors.press_stop(down)
-        self._broke(f"stop {'down' if down else 'up'}")
-
-    def set_battery(self, volts: float | None) -> None:
-        self._world.resting_v = RESTING_V if volts is None else volts
-        self._broke(f"battery {volts}")
-
-    def set_distance(self, metres: float | None, dead: bool) -> None:
-        for sensor in self._pins.sensors.of_kind(SimulatedHcsr04):
-            sensor.override_m, sensor.dead = metres, dead
-        self._broke(f"distance {'dead' if dead else metres}")
-
-    def break_chip(self, bus: int, address: int, dead: bool) -> None:
-        chips = self._pins.dead_chips
-        (chips.add if dead else chips.discard)((bus, address))
-        self._broke(f"chip {bus} {address} {'dead' if dead else 'well'}")
-
-    def break_servo(self, tendon: str, fault: str) -> None:
-        self._pins.require_rig().break_servo(tendon, fault)
-        self._broke(f"servo {tendon} {fault or 'well'}")
-
-    def break_magnet(self, joint: str, state: str) -> None:
-        self._pins.encoder(joint).set_magnet(state)
-        self._broke(f"magnet {joint} {state or 'well'}")
-
-    def _broke(self, action: str) -> None:
-        self._board.record("fault", what=action)
+def _advance(board: PinBoard, server: BoardServer, now_ns: int) -> None:
+    """Advance the world to a time, and take the picture that is due."""
+    edges = board.advance(now_ns)
+    for connection in [*server.connections.values()] if edges else ():
+        if own := [edge for edge in edges if board.reader(edge.pin) is connection]:
+            connection.send_edges(own)
+    if board.camera is not None and now_ns >= board.camera.next_ns:
+        board.camera.take(now_ns)
 
 
 class RealTime:
-    """CLOCK_MONOTONIC; the world advances in steps of 10 ms."""
+    """CLOCK_MONOTONIC; the world advances in steps of 10 ms, and for a picture."""
 
-    def wait(self, connection: BoardConnection, call_id: int, until_ns: int) -> object:
-        """Refuse: real time cannot be advanced."""
-        raise RobotError("This board runs in real time, which cannot be advanced.")
-
-    def sleep(self, connection: BoardConnection, call_id: int, ns: int) -> object:
-        """Refuse: real time cannot be advanced."""
-        raise RobotError("This board runs in real time, which cannot be advanced.")
+    functions: Sequence[Callable[..., object]] = ()
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return time.monotonic_ns()
 
-    def run(self, board: Board) -> None:
+    def run(self, board: PinBoard, server: BoardServer) -> None:
         """Run a board until its owner is gone."""
-        camera = board.camera
         step_ns = self.now_ns()
         while True:
-            due_ns = step_ns if camera is None else min(step_ns, camera.next_ns)
-            board.server.serve(max(0, due_ns - self.now_ns()) / 1e9)
+            due_ns = step_ns if board.camera is None else min(step_ns, board.camera.next_ns)
+            server.serve(max(0, due_ns - self.now_ns()) / 1e9)
             now_ns = self.now_ns()
             if now_ns >= due_ns:
-                board.advance(now_ns)
+                _advance(board, server, now_ns)
                 step_ns = now_ns + _WORLD_STEP_NS if now_ns >= step_ns else step_ns
-                if camera is not None and now_ns >= camera.next_ns:
-                    camera.take(board.world, now_ns)
 
 
 class _Sleeper(NamedTuple):
@@ -246,7 +121,7 @@ class _Sleeper(NamedTuple):
     until_ns: int
     number: int
     connection: BoardConnection
-    call_id: int
+    call_id: int | None
 
 
 class TwinTime:
@@ -262,27 +137,30 @@ class TwinTime:
         self._ticks = 0
         self._sleepers: list[_Sleeper] = []
         self._sleeps = 0
+        self._wanted_ns: dict[BoardConnection, int] = {}  # Next grant of each that takes part.
+        self._works: set[BoardConnection] = set()
+        self.functions: Sequence[Callable[..., object]] = (self.sleep, self.wait)
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return self._now_ns
 
-    def sleep(self, connection: BoardConnection, call_id: int, ns: int) -> object:
+    def sleep(self, caller: BoardConnection, ns: int) -> object:
         """Let a client sleep for `ns` nanoseconds, which ends with a `Slept`."""
         self._sleeps += 1
-        self._sleepers.append(_Sleeper(self._now_ns + ns, self._sleeps, connection, call_id))
+        until_ns = self._now_ns + ns
+        self._sleepers.append(_Sleeper(until_ns, self._sleeps, caller, caller.call_id))
         return LATER
 
-    def wait(self, connection: BoardConnection, call_id: int, until_ns: int) -> object:
+    def wait(self, caller: BoardConnection, until_ns: int) -> object:
         """Finish the grant of a client, which takes part from now on, until its next is due."""
-        connection.takes_part = True
-        connection.works = False
-        connection.until_ns = until_ns
+        self._wanted_ns[caller] = until_ns
+        self._works.discard(caller)
         return LATER
 
-    def run(self, board: Board) -> None:
+    def run(self, board: PinBoard, server: BoardServer) -> None:
         """Run a board until its owner is gone."""
-        server, camera = board.server, board.camera
+        camera = board.camera
         while True:
             if self._sleepers:
                 server.serve(0.0)
@@ -290,35 +168,33 @@ class TwinTime:
                 found = camera is None or camera.find_reader()
                 server.serve(None if found else _LOOK_FOR_READER_S)
             # Clients that are gone no longer sleep.
-            self._sleepers = [one for one in self._sleepers if one.connection.fileno() >= 0]
+            self._sleepers = [one for one in self._sleepers if not one.connection.closed]
             if not self._sleepers:
                 continue
             first = min(self._sleepers)
             if first.until_ns > self._now_ns:
-                self._step(board, first.until_ns)
+                self._step(board, server, first.until_ns)
             if first.until_ns <= self._now_ns:
                 self._sleepers.remove(first)
                 newest_ns = None if camera is None else camera.newest_ns
-                result = Slept(self._now_ns, newest_ns)
-                server.reply(first.connection, first.call_id, result)
+                first.connection.reply(first.call_id, Slept(self._now_ns, newest_ns))
 
-    def _step(self, board: Board, end_ns: int) -> None:
+    def _step(self, board: PinBoard, server: BoardServer, end_ns: int) -> None:
         """Advance to the next time at which anything happens."""
-        server, camera = board.server, board.camera
-        participants = [one for one in server.connections if one.takes_part]
-        wanted = [one.until_ns for one in participants if one.until_ns > self._now_ns]
-        grant_ns = min(end_ns, self._next_tick_ns(), *wanted)
-        picture_ns = grant_ns if camera is None else max(camera.next_ns, self._now_ns)
+        now_ns = self._now_ns
+        wanted = {one: ns for one, ns in self._wanted_ns.items() if not one.closed}
+        self._wanted_ns = wanted
+        grant_ns = min(end_ns, self._next_tick_ns(), *(ns for ns in wanted.values() if ns > now_ns))
+        camera = board.camera
+        picture_ns = grant_ns if camera is None else max(camera.next_ns, now_ns)
         self._now_ns = min(grant_ns, picture_ns)
-        board.advance(self._now_ns)
-        if camera is not None and camera.next_ns <= self._now_ns:
-            camera.take(board.world, self._now_ns)
+        _advance(board, server, self._now_ns)
         if self._now_ns < grant_ns:
             return
-        for connection in participants:
-            connection.works = True
-            server.send(connection, Grant(self._now_ns))
-        while any(one.works and one.fileno() >= 0 for one in participants):
+        self._works = set(wanted)
+        for connection in wanted:
+            connection.send(Grant(self._now_ns))
+        while any(not one.closed for one in self._works):
             server.serve(None)
 
     def _next_tick_ns(self) -> int:
@@ -332,16 +208,12 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a board; the arguments are the descriptors of its `BoardSettings` and of its owner."""
-    settings_fd, owner_fd = map(int, sys.argv[1:] if arguments is None else arguments)
+    """Run a board of the `BoardSettings` on stdin; the argument is its owner's descriptor."""
+    (owner_fd,) = map(int, sys.argv[1:] if arguments is None else arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
-    with os.fdopen(settings_fd, "rb") as file:
-        settings = msgspec.json.decode(file.read(), type=BoardSettings)
-    board = Board(settings, owner_fd)
-    os.write(owner_fd, b"r")  # Ready.
-    board.run()
+    run_board(msgspec.json.decode(sys.stdin.buffer.read(), type=BoardSettings), owner_fd)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import errno
 import fcntl
 import os
 import random
+from pathlib import Path
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -13,6 +14,7 @@ import simplejpeg
 
 from shapechanger.contract.world import World
 from shapechanger.errors import UnknownName
+from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.cameras.pattern import draw_barcode
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
@@ -41,12 +43,11 @@ class FrontCameraPipe:
 
     Args:
         path: Path of the FIFO.
-        fps: Pictures per second.
-        quality: Quality of the JPEG, 1 to 100.
+        plan: The camera.
+        world: World to take pictures of.
+        start_ns: Time of the first picture.
         latest_only: Whether to drop a picture while the one before is unread. Otherwise pictures
             are dropped only if the pipe is full or has no reader.
-        start_ns: Time of the first picture.
-        seed: Seed of the noise of a broken camera.
         barcode: Whether the first rows of a picture show its capture time.
 
     Attributes:
@@ -56,55 +57,48 @@ class FrontCameraPipe:
 
     def __init__(
         self,
-        path: str,
-        fps: float,
-        quality: int,
+        path: Path,
+        plan: CameraPlan,
+        world: World,
+        start_ns: int,
         *,
         latest_only: bool,
-        start_ns: int,
-        seed: int,
         barcode: bool = True,
     ) -> None:
         self._path = path
-        self._quality = quality
+        self._plan = plan
+        self._world = world
         self._latest_only = latest_only
         self._barcode = barcode
         self._start_ns = start_ns
-        self._period_ns = 1e9 / fps
         self._taken = 0
         self._fd: int | None = None
         self._rest = b""
         self._rest_ns: int | None = None
         self._last = b""
         self._last_ns: int | None = None
-        self._noise = random.Random(f"camera {seed}")
+        self._noise = random.Random("camera")
         self._fault = ""
         self.next_ns = start_ns
         self.newest_ns: int | None = None
 
-    def take(self, world: World, now_ns: int) -> None:
-        """Take the picture that is due, and skip those whose time has passed.
-
-        Args:
-            world: World to take it of.
-            now_ns: Time, ns.
-        """
+    def take(self, now_ns: int) -> None:
+        """Take the picture that is due, and skip those whose time has passed."""
         while self.next_ns <= now_ns:
             self._taken += 1
-            self.next_ns = self._start_ns + round(self._taken * self._period_ns)
+            self.next_ns = self._start_ns + round(self._taken * 1e9 / self._plan.fps)
         if self._fault == "off" or not self._ready():
             return
-        if self._fault == "freeze" and self._last:
-            self._write(self._last, self._last_ns)
-            return
-        jpeg = self.draw(world, now_ns)
-        self._last, self._last_ns = jpeg, now_ns
-        if self._fault == "garbage":
-            self._write(self._noise.randbytes(len(jpeg)), None)
-        elif self._fault == "short":
-            self._write(jpeg[: len(jpeg) // 2], None)
-        else:
-            self._write(jpeg, now_ns)
+        if self._fault != "freeze" or not self._last:
+            self._last, self._last_ns = self.draw(now_ns), now_ns
+        jpeg = self._last
+        match self._fault:
+            case "garbage":
+                self._write(self._noise.randbytes(len(jpeg)), None)
+            case "short":
+                self._write(jpeg[: len(jpeg) // 2], None)
+            case _:
+                self._write(jpeg, self._last_ns)
 
     def break_down(self, fault: CameraFault | str) -> None:
         """Make the camera fail; "" repairs it."""
@@ -112,17 +106,12 @@ class FrontCameraPipe:
             raise UnknownName("fault of a camera", fault, faults)
         self._fault = fault
 
-    def draw(self, world: World, now_ns: int) -> bytes:
-        """Return the current picture as JPEG, with its time in a comment and maybe a barcode.
-
-        Args:
-            world: World to draw.
-            now_ns: Time, ns.
-        """
-        picture = np.ascontiguousarray(world.picture())
+    def draw(self, now_ns: int) -> bytes:
+        """Return the current picture as JPEG, with its time in a comment and maybe a barcode."""
+        picture = np.ascontiguousarray(self._world.picture())
         if self._barcode:
             draw_barcode(picture, now_ns)
-        jpeg = simplejpeg.encode_jpeg(picture, self._quality, "RGB", "444")
+        jpeg = simplejpeg.encode_jpeg(picture, self._plan.jpeg_quality, "RGB", "444")
         return with_capture_time(jpeg, now_ns)
 
     def close(self) -> None:
@@ -130,6 +119,7 @@ class FrontCameraPipe:
         if self._fd is not None:
             os.close(self._fd)
             self._fd = None
+            self._rest = b""
 
     def find_reader(self) -> bool:
         """Open the pipe if it has a reader, which waits for that; return whether it is open."""
@@ -141,7 +131,6 @@ class FrontCameraPipe:
                     return False
                 raise
             fcntl.fcntl(self._fd, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
-            self._rest = b""
         return True
 
     def _ready(self) -> bool:
@@ -152,12 +141,9 @@ class FrontCameraPipe:
             self._write(self._rest, self._rest_ns)
         return not self._rest and not (self._latest_only and self._unread())
 
-    def _unread(self) -> int:
-        """Return the number of bytes in the pipe."""
-        if self._fd is None:
-            return 0
-        waiting = fcntl.ioctl(self._fd, _FIONREAD, b"\0\0\0\0")
-        return int.from_bytes(waiting, "little")
+    def _unread(self) -> bool:
+        """Return whether bytes wait in the pipe."""
+        return self._fd is not None and any(fcntl.ioctl(self._fd, _FIONREAD, bytes(4)))
 
     def _write(self, data: bytes, captured_ns: int | None) -> None:
         """Write what fits; the rest of a picture is written first the next time."""
@@ -168,9 +154,7 @@ class FrontCameraPipe:
         except BlockingIOError:
             return  # A picture that does not fit at all is dropped; a rest keeps waiting.
         except BrokenPipeError:
-            os.close(self._fd)
-            self._fd = None
-            self._rest = b""
+            self.close()
             return
         self._rest, self._rest_ns = data[written:], captured_ns
         if not self._rest and captured_ns is not None:

@@ -9,7 +9,7 @@ from gpiozero.pins.pi import PiFactory, PiPin
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
-from shapechanger.robot.twin.board_client import BoardClient
+from shapechanger.robot.twin.rpc import BoardClient
 
 _REVISION: Final = 0xC03115
 """A Raspberry Pi 4B with 4 GB; its header has the pins of all newer ones."""

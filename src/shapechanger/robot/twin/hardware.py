@@ -8,15 +8,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import msgspec
-
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
-from shapechanger.robot.hardware import Clock
-from shapechanger.robot.twin.board_client import BoardClient
-from shapechanger.robot.twin.messages import (
+from shapechanger.robot.twin.rpc import (
+    GONE,
     MAX_MESSAGE,
+    BoardClient,
     Reply,
     Slept,
     decode_event,
@@ -55,24 +53,23 @@ class SteadyClock:
         """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
         self._client.while_held_up = beat
 
-    async def sleep(self, seconds: float) -> None:
+    async def sleep(self, seconds: float) -> int | None:
         """Sleep in real time."""
         import asyncio  # Only the daemon sleeps; the guard stays light.
 
         await asyncio.sleep(seconds)
 
 
-class GrantedClock:
+class GrantedClock(SteadyClock):
     """The twin's own clock, which the board advances.
 
     A process that calls `wait` takes part: time advances only while all participants wait.
     """
 
     def __init__(self, client: BoardClient, path: str) -> None:
-        self._client = client
+        super().__init__(client)
         self._path = path
         self._waiting = False
-        self._idle: list[socket.socket] = []
 
     def now_ns(self) -> int:
         """Return the newest twin time that this process has received."""
@@ -85,53 +82,29 @@ class GrantedClock:
         """
         if not self._waiting:
             self._client.post("wait", until_ns)
-            self._waiting = True
-        if not self._client.await_grant(at_most_s):
-            return False
-        self._waiting = False
-        return True
-
-    def keep_alive(self, beat: Callable[[], object]) -> None:
-        """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
-        self._client.while_held_up = beat
+        self._waiting = not self._client.await_grant(at_most_s)
+        return not self._waiting
 
     async def sleep(self, seconds: float) -> int | None:
         """Let twin time advance, and return when the newest picture was taken."""
         import asyncio  # Only the daemon sleeps; the guard stays light.
 
         loop = asyncio.get_running_loop()
-        connected = bool(self._idle)
-        if connected:
-            connection = self._idle.pop()
-        else:
-            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with (
+            translate_errors(OSError, to=lambda _: RobotError(GONE)),
+            socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as connection,
+        ):
             connection.setblocking(False)
-        try:
-            if not connected:
-                await loop.sock_connect(connection, self._path)
+            await loop.sock_connect(connection, self._path)
             call = encode_call("sleep", max(0, round(seconds * 1e9)), id=0)
             await loop.sock_sendall(connection, call)
             data = await loop.sock_recv(connection, MAX_MESSAGE)
-            if not data:
-                raise RobotError("The twin's board is gone.")
-        except BaseException as error:
-            # Also when cancelled: a reply that is still due would answer the next sleep.
-            connection.close()
-            if isinstance(error, OSError):
-                raise RobotError("The twin's board is gone.") from error
-            raise
-        self._idle.append(connection)
-        reply = decode_event(data)
-        if not isinstance(reply, Reply) or reply.error:
-            raise RobotError(getattr(reply, "error", "") or "The twin's board does not sleep.")
-        slept = msgspec.msgpack.decode(reply.result, type=Slept)
+        reply = decode_event(data) if data else None
+        if not isinstance(reply, Reply):
+            raise RobotError(GONE)
+        slept = reply.decode(Slept)
         self._client.now_ns = max(self._client.now_ns, slept.t)
         return slept.captured_ns
-
-    def close(self) -> None:
-        """Close the connections of `sleep`."""
-        while self._idle:
-            self._idle.pop().close()
 
 
 class TwinBus:
@@ -219,10 +192,10 @@ class TwinServoPort:
 class TwinHardware:
     """Pins, buses and time of a board; see `shapechanger.robot.hardware.Hardware`."""
 
-    def __init__(self, board: BoardClient, clock: Clock) -> None:
+    def __init__(self, board: BoardClient, clock: SteadyClock) -> None:
         self.board = board
-        self._pin_factory: Any = None
         self.clock = clock
+        self._pin_factory: Any = None
 
     def pin_factory(self) -> Any:
         """Return the `pin_factory` of gpiozero's devices."""
@@ -249,8 +222,6 @@ class TwinHardware:
         if self._pin_factory is not None:
             self._pin_factory.close()
             self._pin_factory = None
-        if isinstance(self.clock, GrantedClock):
-            self.clock.close()
         self.board.close()
 
 

@@ -1,89 +1,154 @@
-"""Pins, chips and servos of the board: their owners, and the levels that outlive a process."""
+"""Pins, chips, sensors and servos of the board, with the world that moves them.
+
+Levels of outputs outlive the process that has set them.
+"""
 
 from __future__ import annotations
 
 import errno
+import heapq
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Final, Literal, TypeVar
 
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
-from shapechanger.robot.drivers.chip import PULSES
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.rig import Rig
+from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.drivers.simulation import (
     Edge,
     Levels,
     Pulse,
     PwmChannel,
     SimulatedChip,
+    SimulatedSensor,
 )
-from shapechanger.robot.twin.sensors import Surroundings
+from shapechanger.robot.twin.camera import FrontCameraPipe
+from shapechanger.robot.twin.rpc import BoardConnection
 from shapechanger.robot.twin.signals import LedgerWriter
 from shapechanger.robot.twin.wiring import TwinWiring
 
+# Servos do not count longer times for which a busy machine kept the board waiting: their watchdogs
+# would take its silence for the guard's and let go.
+_MAX_SERVO_STEP_NS: Final = 40_000_000
 
-class Owner(Protocol):
-    """Connection of a process that holds pins; two connections of one process are two owners."""
-
-    pid: int
+_Sensor = TypeVar("_Sensor", bound=SimulatedSensor)
 
 
 @dataclass(slots=True)
 class _Claim:
     """A pin that a process holds, or held until it ended."""
 
-    owner: Owner | None = None
+    owner: BoardConnection | None = None
     mode: Literal["input", "output"] = "input"
     hz: float = 0
     phase_ns: int = 0  # Start of a period of its PWM or pulses.
 
 
 class PinBoard:
-    """Pins, pulses, chips and servos, with the world that moves their sensors.
+    """Everything that a robot's processes and its operator reach.
 
     Args:
         wiring: What is attached; it gives undriven pins their level.
         world: World of the robot.
         ledger: Record of the changes of outputs; None to keep none.
         seed: Seed of the phase of software PWM.
-        now_ns: Time, ns.
+        clock: Returns the time, ns.
+        camera: Front camera; None without one.
 
     Attributes:
+        clock: Returns the time, ns.
+        world: World of the robot.
+        camera: Front camera; None without one.
         levels: State of all outputs.
-        sensors: The sensors.
+        stop_held: Whether the stop button is pressed; its level follows at the next `advance`.
         rig: Servos on a bus; None without any.
         dead_chips: Bus and address of the chips that do not answer.
     """
 
     def __init__(
-        self, wiring: TwinWiring, world: World, ledger: LedgerWriter | None, seed: int, now_ns: int
+        self,
+        wiring: TwinWiring,
+        world: World,
+        ledger: LedgerWriter | None,
+        seed: int,
+        clock: Callable[[], int],
+        camera: FrontCameraPipe | None = None,
     ) -> None:
+        self.clock = clock
+        self.world = world
+        self.camera = camera
+        self.levels = Levels()
+        self.stop_held = False
+        self.dead_chips: set[tuple[int, int]] = set()
         self._wiring = wiring
         self._ledger = ledger
         self._random = random.Random(f"phase {seed}")
         self._claims: dict[int, _Claim] = {}
-        self.levels = Levels()
-        self._surroundings = Surroundings(wiring, world, now_ns)
-        self.sensors = self._surroundings.sensors
-        self.rig = self._surroundings.rig
-        self.dead_chips: set[tuple[int, int]] = set()
+        self._now_ns = clock()
+        plan = wiring.plan
+        self._sensors = [
+            simulate(one, world)
+            for one in plan.sensors
+            if (simulate := SENSORS[one.driver].simulate) is not None
+        ]
+        self._due: list[Edge] = []  # Edges that follow from outputs.
+        self._inputs = {pin: level for one in self._sensors for pin, level in one.levels.items()}
+        if plan.stop_pin is not None:
+            self._inputs[plan.stop_pin] = 1  # A button to ground, with a pull-up.
+        has_bus = any(output.driver == DRIVER for output in plan.outputs)
+        self.rig = Rig(plan.outputs, world) if has_bus else None
+        self._obeys = {
+            one.name: obeys(one)
+            for one in plan.outputs
+            if (obeys := OUTPUTS[one.driver].obeys) is not None
+        }
         self._chips: dict[tuple[int, int], SimulatedChip] = {}
-        for output in wiring.plan.outputs:
+        for output in plan.outputs:
             if over := output.settings.get("over"):
                 # Channels of one board share it.
                 self._chips = {**PULSES[over].chips(output.settings), **self._chips}
-        for sensor in self.sensors.sensors.values():
+        for sensor in self._sensors:
             self._chips.update(sensor.chips)
-        for address, chip in self._chips.items():
-            self._update_channels(address, chip)
+        for at, chip in self._chips.items():
+            self._update_channels(at, chip)
+
+    def record(self, kind: str, t: int | None = None, **fields: Any) -> None:
+        """Write a line of the ledger, of the time `t`, or of now."""
+        if self._ledger is not None:
+            self._ledger.write(self.clock() if t is None else t, kind, **fields)
 
     def advance(self, now_ns: int) -> list[Edge]:
-        """Advance the world to a time and return the edges of inputs on the way."""
-        return self._surroundings.advance(now_ns, self.levels)
+        """Advance the world to a time, and return and record the edges of inputs on the way."""
+        start_ns = self._now_ns
+        if now_ns > start_ns:
+            if self.rig is not None:
+                if self.rig.is_switched:
+                    ends_ns = self._wiring.power_ends_ns(self.levels)
+                    self.rig.bus.set_power(on=ends_ns is None or now_ns < ends_ns)
+                self.rig.bus.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
+            self.world.advance((now_ns - start_ns) / 1e9, self._parts())
+            self._now_ns = now_ns
+        seen = self.world.inputs()
+        edges = [e for one in self._sensors for e in one.edges(start_ns, self._now_ns, seen)]
+        while self._due and self._due[0].t <= self._now_ns:
+            edges.append(heapq.heappop(self._due))
+        stop_pin, stop_level = self._wiring.plan.stop_pin, int(not self.stop_held)
+        if stop_pin is not None and self._inputs[stop_pin] != stop_level:
+            edges.append(Edge(self._now_ns, stop_pin, stop_level))
+        edges.sort()
+        for edge in edges:
+            self._inputs[edge.pin] = edge.level
+            self.record("input", t=edge.t, pin=edge.pin, level=edge.level)
+        return edges
+
+    def of_kind(self, kind: type[_Sensor]) -> list[_Sensor]:
+        """Return the sensors of one kind."""
+        return [one for one in self._sensors if isinstance(one, kind)]
 
     def require_rig(self) -> Rig:
         """Return the servos; raise RobotError without servos."""
@@ -91,37 +156,32 @@ class PinBoard:
             raise RobotError("This twin has no servo bus.")
         return self.rig
 
-    def owner(self, pin: int) -> Owner | None:
-        """Return the owner of a pin; None for a free one."""
-        claim = self._claims.get(pin)
-        return None if claim is None else claim.owner
+    def encoder(self, joint: str) -> SimulatedAs5600:
+        """Return the encoder of a joint."""
+        joints = self.of_kind(SimulatedJoints)
+        encoders = {name: one for some in joints for name, one in some.encoders.items()}
+        if joint not in encoders:
+            raise UnknownName("joint with an encoder", joint, encoders)
+        return encoders[joint]
 
-    def reader(self, pin: int) -> Owner | None:
+    def reader(self, pin: int) -> BoardConnection | None:
         """Return the owner of an input; None for other pins."""
         claim = self._claims.get(pin)
         return claim.owner if claim is not None and claim.mode == "input" else None
 
     @property
     def functions(self) -> tuple[Callable[..., object], ...]:
-        """Functions of a robot's processes; each takes the process and the time, ns, first.
+        """Functions of a robot's processes.
 
         They raise RobotError if another process holds the pin, or this one has not claimed it, and
         OSError with the `errno` of the kernel's driver if no chip answers.
         """
-        return (
-            self.claim,
-            self.drive,
-            self.pulse,
-            self.read_chip,
-            self.write_chip,
-            self.read_servos,
-            self.write_servos,
-        )
+        pins = (self.claim, self.drive, self.pulse)
+        return (*pins, self.read_chip, self.write_chip, self.read_servos, self.write_servos)
 
     def claim(
         self,
-        owner: Owner,
-        t: int,
+        caller: BoardConnection,
         pin: int,
         mode: Literal["input", "output"],
         pull: str,
@@ -129,78 +189,70 @@ class PinBoard:
     ) -> int:
         """Claim a pin, and return its level: for an input its sensor's, pull's or resistors'."""
         claim = self._claims.setdefault(pin, _Claim())
-        if claim.owner is not None and claim.owner is not owner:
+        if claim.owner is not None and claim.owner is not caller:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
-        claim.owner, claim.mode, claim.hz = owner, mode, 0
+        claim.owner, claim.mode, claim.hz = caller, mode, 0
         if mode == "output":
-            self._drive(owner.pid, pin, float(level), 0, t)
+            self._drive(caller, pin, float(level), 0)
             return level
         idle = self._wiring.idle_level(pin)
         if pin in self.levels.duties:
             self.levels.release(pin)
-            self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
-            self.sensors.output_changed(t, pin, float(idle))
+            self._drove(caller, pin, float(idle), 0, released=True)
         if pull != "floating" and not self._wiring.has_resistor(pin):
             idle = int(pull == "up")
-        return self.sensors.levels.get(pin, idle)
+        return self._inputs.get(pin, idle)
 
-    def drive(self, owner: Owner, t: int, pin: int, duty: float, hz: int) -> None:
+    def drive(self, caller: BoardConnection, pin: int, duty: float, hz: int) -> None:
         """Set the level of an output (`hz` 0), or the duty of its software PWM."""
-        self._start_pulses(self._output(owner, pin), hz, t)
-        self._drive(owner.pid, pin, duty, hz, t)
+        self._start_pulses(caller, pin, hz)
+        self._drive(caller, pin, duty, hz)
 
-    def pulse(self, owner: Owner, t: int, pin: int, us: int, hz: int) -> None:
+    def pulse(self, caller: BoardConnection, pin: int, us: int, hz: int) -> None:
         """Send servo pulses on an output; a width of 0 us ends them."""
-        self._start_pulses(self._output(owner, pin), hz if us else 0, t)
+        self._start_pulses(caller, pin, hz if us else 0)
         pulse = Pulse(us, hz)
         if self.levels.pulses.get(pin) != pulse:
             self.levels.pulse(pin, pulse)
-            self._record(t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+            self.record("pulse", t=caller.t, pin=pin, us=us, hz=hz, pid=caller.pid)
 
-    def read_chip(
-        self, owner: Owner, t: int, bus: int, address: int, register: int, length: int
-    ) -> list[int]:
+    def read_chip(self, bus: int, address: int, register: int, length: int) -> list[int]:
         """Read registers of an I2C chip."""
         return self._chip(bus, address).read(register, length)
 
     def write_chip(
-        self, owner: Owner, t: int, bus: int, address: int, register: int, data: list[int]
+        self, caller: BoardConnection, bus: int, address: int, register: int, data: list[int]
     ) -> None:
         """Write registers of an I2C chip."""
         chip = self._chip(bus, address)
         chip.write(register, data)
         if not chip.is_logged:
             return
-        at = {"bus": bus, "address": address}
-        self._record(t, "i2c", **at, register=register, data=data, pid=owner.pid)
+        at: dict[str, Any] = {"t": caller.t, "bus": bus, "address": address}
+        self.record("i2c", **at, register=register, data=data, pid=caller.pid)
         for channel, pulse in self._update_channels((bus, address), chip):
             us, hz = round(pulse.us, 3), round(pulse.hz, 3)
-            self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=owner.pid)
+            self.record("i2c", **at, channel=channel, us=us, hz=hz, pid=caller.pid)
 
-    def read_servos(
-        self, owner: Owner, t: int, device: str, ids: list[int], at: int, size: int
-    ) -> dict[int, ServoReply]:
+    def read_servos(self, device: str, ids: list[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of servos, and return their replies by id."""
         return self._rig_at(device).bus.read(ids, at, size)
 
-    def write_servos(
-        self, owner: Owner, t: int, device: str, data: dict[int, bytes], at: int
-    ) -> dict[int, ServoReply]:
+    def write_servos(self, device: str, data: dict[int, bytes], at: int) -> dict[int, ServoReply]:
         """Write bytes of servos, and return their replies by id."""
         return self._rig_at(device).bus.write(data, at)
 
-    def leave(self, owner: Owner, t: int, *, died: bool) -> None:
+    def free(self, caller: BoardConnection, died: bool) -> None:
         """Free the pins of a process that has ended; outputs keep their level of that moment.
 
         Args:
-            owner: The process.
-            t: Time, ns.
+            caller: The process.
             died: Whether it ended without closing its pins.
         """
         if died:
-            self._record(t, "gone", pid=owner.pid)
+            self.record("gone", t=caller.t, pid=caller.pid)
         for pin, claim in sorted(self._claims.items()):
-            if claim.owner is not owner:
+            if claim.owner is not caller:
                 continue
             claim.owner = None
             if claim.mode != "output" or not (died or claim.hz):
@@ -208,21 +260,20 @@ class PinBoard:
             duty = self.levels.duties.get(pin, 0.0)
             if claim.hz and 0.0 < duty < 1.0:
                 period_ns = 1e9 / claim.hz
-                duty = float((t - claim.phase_ns) % period_ns < duty * period_ns)
+                duty = float((caller.t - claim.phase_ns) % period_ns < duty * period_ns)
             claim.hz = 0
-            self._drive(owner.pid, pin, duty, 0, t)
+            self._drive(caller, pin, duty, 0)
 
-    def encoder(self, joint: str) -> SimulatedAs5600:
-        """Return the encoder of a joint."""
-        joints = self.sensors.of_kind(SimulatedJoints)
-        encoders = {name: one for some in joints for name, one in some.encoders.items()}
-        if joint not in encoders:
-            raise UnknownName("joint with an encoder", joint, encoders)
-        return encoders[joint]
-
-    def _record(self, t: int, kind: str, **fields: Any) -> None:
-        if self._ledger is not None:
-            self._ledger.write(t, kind, **fields)
+    def _parts(self) -> dict[str, float | None]:
+        """Return the value of each part of the vehicle; the mean of outputs that share a part."""
+        values: dict[str, list[float]] = {}
+        for name, (value, _) in self._wiring.read(self.levels, self._now_ns).items():
+            shares = values.setdefault(self._wiring.outputs[name].part, [])
+            if name in self._obeys:
+                value = self._obeys[name](value, self._now_ns)
+            if value is not None:
+                shares.append(value)
+        return {part: sum(got) / len(got) if got else None for part, got in values.items()}
 
     def _rig_at(self, device: str) -> Rig:
         rig = self.require_rig()
@@ -240,21 +291,26 @@ class PinBoard:
                 self.levels.channels[channel] = pulse
         return changed
 
-    def _output(self, owner: Owner, pin: int) -> _Claim:
+    def _start_pulses(self, caller: BoardConnection, pin: int, hz: float) -> None:
         claim = self._claims.get(pin)
-        if claim is None or claim.owner is not owner or claim.mode != "output":
-            raise RobotError(f"Process {owner.pid} does not hold GPIO{pin} as an output.")
-        return claim
-
-    def _start_pulses(self, claim: _Claim, hz: float, t: int) -> None:
+        if claim is None or claim.owner is not caller or claim.mode != "output":
+            raise RobotError(f"Process {caller.pid} does not hold GPIO{pin} as an output.")
         if hz and hz != claim.hz:
-            claim.phase_ns = t - int(self._random.random() * 1e9 / hz)
+            claim.phase_ns = caller.t - int(self._random.random() * 1e9 / hz)
         claim.hz = hz
 
-    def _drive(self, pid: int, pin: int, duty: float, hz: float, t: int) -> None:
-        self.levels.drive(pin, duty, t)
-        self._record(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
-        self.sensors.output_changed(t, pin, duty)
+    def _drive(self, caller: BoardConnection, pin: int, duty: float, hz: float) -> None:
+        self.levels.drive(pin, duty, caller.t)
+        self._drove(caller, pin, duty, hz)
+
+    def _drove(
+        self, caller: BoardConnection, pin: int, duty: float, hz: float, **released: bool
+    ) -> None:
+        t = caller.t
+        self.record("pin", t=t, pin=pin, duty=duty, hz=hz, pid=caller.pid, **released)
+        for sensor in self._sensors:
+            for edge in sensor.output_changed(t, pin, duty):
+                heapq.heappush(self._due, edge)
 
     def _chip(self, bus: int, address: int) -> SimulatedChip:
         chip = self._chips.get((bus, address))

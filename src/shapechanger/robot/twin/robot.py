@@ -1,4 +1,4 @@
-"""A robot that is served on its twin, and its operator."""
+"""A robot that is served by processes on this machine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Final, Literal, Self
 
@@ -19,149 +18,18 @@ from shapechanger.errors import LinkError, RobotError
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
-from shapechanger.robot.drivers.as5600 import Magnet
-from shapechanger.robot.drivers.servos.rig import ServoFault
-from shapechanger.robot.drivers.simulation import Levels
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.board_client import BoardClient
-from shapechanger.robot.twin.camera import CameraFault
-from shapechanger.robot.twin.messages import Slept, Whereabouts
-from shapechanger.robot.twin.start import BoardAt
-
-
-class Operator:
-    """A person next to the robot, who moves the vehicle and breaks and presses things.
-
-    Each request takes effect after everything that the robot's processes sent before it.
-
-    Args:
-        path: Socket on which the board listens.
-
-    Raises:
-        RobotError: If no board listens there.
-    """
-
-    def __init__(self, path: str) -> None:
-        self._client = BoardClient(path, "operator")
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def place(self, seed: int) -> None:
-        """Place the vehicle at the start that follows from a seed."""
-        self._client.ask(None, "place", seed)
-
-    def put_back(self) -> None:
-        """Put a vehicle that has collided back on its lane, at rest, to continue from there.
-
-        In the plain room, which has no lane, it returns to its start. Its truth counts on.
-        """
-        self._client.ask(None, "put_back")
-
-    def lay_out(self, seed: int) -> None:
-        """Replace the surroundings, and place the vehicle at a start in them.
-
-        On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
-        for the first `put_back` on it. A twin that is started with another seed has no such wait.
-        """
-        self._client.ask(None, "lay_out", seed)
-
-    def advance(self, seconds: float) -> int:
-        """Advance the twin's clock and return its time in nanoseconds.
-
-        Raises:
-            RobotError: If the board runs in real time.
-        """
-        return self._client.ask(Slept, "sleep", round(seconds * 1e9)).t
-
-    def break_camera(self, fault: CameraFault) -> None:
-        """Make the camera fail; "" repairs it."""
-        self._client.ask(None, "break_camera", fault)
-
-    def press_bumper(self, down: bool = True) -> None:
-        """Press or release all bumpers."""
-        self._client.ask(None, "press_bumper", down)
-
-    def press_stop(self, down: bool = True) -> None:
-        """Press or release the emergency stop button."""
-        self._client.ask(None, "press_stop", down)
-
-    def set_battery(self, volts: float | None) -> None:
-        """Set the battery's voltage without load, V; None for a full one."""
-        self._client.ask(None, "set_battery", None if volts is None else float(volts))
-
-    def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
-        """Override what distance sensors measure.
-
-        Args:
-            metres: Distance, m; None for the truth.
-            dead: Whether they do not answer at all.
-        """
-        self._client.ask(None, "set_distance", None if metres is None else float(metres), dead)
-
-    def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
-        """Make an I2C chip stop answering, or answer again.
-
-        Args:
-            bus: Number of the bus.
-            address: Address on the bus.
-            dead: Whether it stops answering.
-        """
-        self._client.ask(None, "break_chip", bus, address, dead)
-
-    def break_servo(self, tendon: str, fault: ServoFault) -> None:
-        """Make the servo of a tendon fail.
-
-        Args:
-            tendon: Name of the tendon.
-            fault: The fault; "" repairs what can be repaired.
-        """
-        self._client.ask(None, "break_servo", tendon, fault)
-
-    def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
-        """Change the magnet of a joint's encoder.
-
-        Args:
-            joint: Name of the joint.
-            state: State of the magnet; "" repairs it.
-        """
-        self._client.ask(None, "break_magnet", joint, state)
-
-    def tensions(self) -> dict[str, float]:
-        """Return the tension of each tendon on the servo bus, N."""
-        return self._client.ask(dict[str, float], "tensions")
-
-    def levels(self) -> Levels:
-        """Return the state of all outputs."""
-        return self._client.ask(Levels, "levels")
-
-    def where(self) -> Whereabouts:
-        """Return the true state of the vehicle."""
-        return self._client.ask(Whereabouts, "where")
-
-    def close(self) -> None:
-        """Leave the board."""
-        self._client.close()
-
+from shapechanger.robot.twin.operator import Operator
+from shapechanger.robot.twin.start import BoardAt, end
 
 _READY: Final = "ready.json"
+"""File that the daemon writes when it can be reached."""
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
 _POLL_S: Final = 0.02
 _LOG: Final = 2000  # Of the end of a log, characters.
-
-
-@dataclass(frozen=True, slots=True)
-class _Ready:
-    """Content of the file that the daemon writes when it can be reached."""
-
-    port: int
-    fingerprint: str
 
 
 class RunningRobot:
@@ -203,7 +71,7 @@ class RunningRobot:
         """Port on 127.0.0.1; while the daemon restarts, wait for its new one."""
         if self.supervisor.poll() is None:
             self._ready = self._await_ready()
-        return self._ready.port
+        return int(self._ready["port"])
 
     @property
     def ledger_path(self) -> Path:
@@ -218,7 +86,7 @@ class RunningRobot:
     def known_at(self, address: str) -> KnownRobot:
         """Return the credentials with another address, such as a proxy's."""
         key = (self.folder / "credentials" / "key").read_text().strip()
-        return KnownRobot("robot", address, key, self._ready.fingerprint or "insecure")
+        return KnownRobot("robot", address, key, str(self._ready["fingerprint"]) or "insecure")
 
     def client(self, **options: Any) -> RobotClient:
         """Connect to it; the options are `RobotClient.connect`'s."""
@@ -270,13 +138,9 @@ class RunningRobot:
         if self.supervisor.poll() is None:
             self.supervisor.send_signal(signal.SIGCONT)
             self.supervisor.terminate()
-        try:
-            self.supervisor.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self.supervisor.kill()
-            self.supervisor.wait()
+        end(self.supervisor, _END_S)
 
-    def _await_ready(self, timeout_s: float = _READY_S) -> _Ready:
+    def _await_ready(self, timeout_s: float = _READY_S) -> dict[str, Any]:
         path = self.folder / _READY
         until_s = time.monotonic() + timeout_s
         while not path.exists():
@@ -286,7 +150,7 @@ class RunningRobot:
                 self.close()
                 raise RobotError(f"The robot did not start: {text}")
             time.sleep(_POLL_S)
-        return _Ready(**json.loads(path.read_text()))
+        return json.loads(path.read_text())
 
 
 def run_robot(
@@ -321,7 +185,7 @@ def run_robot(
     command = [sys.executable, "-m", "shapechanger", "robot", "serve", str(profile.path)]
     command += ["--port", "0", "--no-announce"]
     command += ["--credentials", str(folder / "credentials")]
-    command += ["--host", "127.0.0.1", "--ready-file", str(folder / "ready.json")]
+    command += ["--host", "127.0.0.1", "--ready-file", str(folder / _READY)]
     command += ["--recordings", str(folder / "recordings"), *arguments]
     if twin:
         command += ["--twin", "--clock", clock, "--seed", str(seed)]

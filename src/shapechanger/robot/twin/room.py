@@ -35,14 +35,16 @@ _STEERING_LAG_S: Final = 0.08
 _CONTACT: Final = 0.004  # m: something this near presses the bumper
 _BUMPER_SPREAD: Final = math.radians(75.0)  # Reach of the front bumper to each side.
 _LONGEST_STEP_S: Final = 0.01
-_IMPACT_S: Final = 0.03  # Time for which the accelerometer shows a collision.
-_SPEED_OF_IMPACT: Final = 0.15  # m/s: the accelerometer shows only faster collisions.
-_IMPACT_STOP_S: Final = 0.01  # Time in which a collision takes all the speed.
+_SAG_V: Final = 0.36  # Loss of the battery with a motor at full value.
 
-_INNER_OHM: Final = 0.12  # Resistance of the battery and its leads.
-_IDLE_A: Final = 0.6  # Current of the computer.
-_MOTOR_A: Final = 3.0  # Current of a free-running motor at a value of 1, and
-_STALL_FACTOR: Final = 3.0  # its factor when the motor is blocked.
+_FIELD_OF_VIEW: Final = math.radians(90.0)  # From left to right, if no profile states another.
+_CAMERA_HEIGHT: Final = 0.12  # m above the floor
+_WALL_HEIGHT: Final = 0.4  # m
+_STRIPE: Final = 0.25  # m: width of the stripes on walls
+_FADE: Final = 4.0  # m at which a wall has lost 63 % of its light
+_CEILING: Final = np.array((185, 189, 194), np.uint8)
+_FLOOR: Final = np.array((90, 71, 52), np.uint8)
+_WALLS: Final = np.array(((220, 70, 60), (70, 150, 220), (235, 190, 60), (90, 180, 90)), np.float32)
 
 
 class _Drive(NamedTuple):
@@ -81,33 +83,6 @@ _DRIVES: Final = (
 )
 
 
-def _drive_of(parts: Collection[str]) -> _Drive:
-    """Return the kind of vehicle with these parts; one that does not move for others."""
-    kinds = [one for one in _DRIVES if {*one.ahead, one.rudder} & set(parts)]
-    if len(kinds) > 1:
-        raise RobotError(f"No vehicle has all of these parts: {', '.join(sorted(parts))}.")
-    return kinds[0] if kinds else _Drive({})
-
-
-def _cast(
-    x: float, y: float, angles: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
-    """Return where rays from a point hit the walls.
-
-    Returns:
-        Distance, m, number of the wall, 0 to 3, and place along it, m, of each ray.
-    """
-    cos, sin = np.cos(angles), np.sin(angles)
-    with np.errstate(divide="ignore"):
-        to_end = np.where(cos > 0.0, ROOM_LENGTH - x, x) / np.abs(cos)
-        to_side = np.where(sin > 0.0, ROOM_WIDTH - y, y) / np.abs(sin)
-    is_end = to_end < to_side
-    distance = np.minimum(to_end, to_side)
-    wall = np.where(is_end, cos > 0.0, 2 + (sin > 0.0)).astype(np.intp)
-    along = np.where(is_end, y + distance * sin, x + distance * cos)
-    return distance, wall, along
-
-
 class DrivingWorld(World):
     """A vehicle in the room; see `World`.
 
@@ -131,9 +106,12 @@ class DrivingWorld(World):
         pitch_deg: float | None = None,
         fovy_deg: float | None = None,
     ) -> None:
-        self._drive = _drive_of(parts)
-        first_stripe = random.Random(f"room {seed}").uniform(0.0, 2.0 * _STRIPE)
-        self._camera = _FrontCamera(size, first_stripe, pitch_deg, fovy_deg)
+        kinds = [one for one in _DRIVES if {*one.ahead, one.rudder} & set(parts)]
+        if len(kinds) > 1:
+            raise RobotError(f"No vehicle has all of these parts: {', '.join(sorted(parts))}.")
+        self._drive = kinds[0] if kinds else _Drive({})  # Other parts do not move.
+        self._first_stripe = random.Random(f"room {seed}").uniform(0.0, 2.0 * _STRIPE)
+        self._bearings, self._slopes = _lines_of_sight(size, pitch_deg or 0.0, fovy_deg)
         self.resting_v = RESTING_V
         self._travelled = 0.0
         self.place(seed)
@@ -151,11 +129,9 @@ class DrivingWorld(World):
             self._x = rng.uniform(_START_CLEARANCE, ROOM_LENGTH - _START_CLEARANCE)
             self._y = rng.uniform(_START_CLEARANCE, ROOM_WIDTH - _START_CLEARANCE)
             self._heading = rng.uniform(-math.pi, math.pi)
-            free = float(_cast(self._x, self._y, self._heading + _LOOK_AHEAD)[0].min())
+            free = float(self._cast(_LOOK_AHEAD)[0].min())
         self._speed = self._yaw_rate = self._side_turn = self._steering = 0.0
-        self._acceleration = self._impact = self._impact_left_s = 0.0
-        self._current_a = _IDLE_A
-        self._bumped = False
+        self._acceleration = self._load = 0.0
 
     def put_back(self) -> None:
         """Return the vehicle to its start, as the room has no lane."""
@@ -174,21 +150,45 @@ class DrivingWorld(World):
             pose=Pose(self._x, self._y, self._heading),
             speed=self._speed,
             travelled_m=self._travelled,
-            acceleration_x=self._impact if self._impact_left_s > 0.0 else self._acceleration,
+            acceleration_x=self._acceleration,
             acceleration_y=self._speed * self._yaw_rate,
             yaw_rate=self._yaw_rate,
-            bumped=self._bumped,
-            battery_v=self.resting_v - _INNER_OHM * self._current_a,
-            current_a=self._current_a,
+            bumped=self._touches_ahead(),
+            battery_v=self.resting_v - _SAG_V * self._load,
         )
 
     def distance_m(self) -> float:
         """Return the shortest of three rays from the nose."""
-        return max(0.0, float(_cast(self._x, self._y, self._heading + _CONE)[0].min()) - RADIUS)
+        return max(0.0, float(self._cast(_CONE)[0].min()) - RADIUS)
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the frame of the front camera, which is in the middle of the vehicle."""
-        return self._camera.draw(self._x, self._y, self._heading)
+        distance, wall, along = self._cast(self._bearings)
+        light = 0.25 + 0.75 * np.exp(-distance / _FADE)
+        light *= np.where(((along + self._first_stripe) // _STRIPE) % 2 == 0, 1.0, 0.72)
+        colours = (_WALLS[wall] * light[:, np.newaxis]).astype(np.uint8)
+        # Below the camera where the line of sight meets the wall, m.
+        below = (self._slopes * distance)[..., np.newaxis]
+        picture = np.where(below < _CAMERA_HEIGHT, colours, _FLOOR)
+        return np.where(below < _CAMERA_HEIGHT - _WALL_HEIGHT, _CEILING, picture)
+
+    def _cast(
+        self, bearings: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
+        """Return where rays from the vehicle hit the walls.
+
+        Returns:
+            Distance, m, number of the wall, 0 to 3, and place along it, m, of each ray.
+        """
+        cos, sin = np.cos(self._heading + bearings), np.sin(self._heading + bearings)
+        with np.errstate(divide="ignore"):
+            to_end = np.where(cos > 0.0, ROOM_LENGTH - self._x, self._x) / np.abs(cos)
+            to_side = np.where(sin > 0.0, ROOM_WIDTH - self._y, self._y) / np.abs(sin)
+        is_end = to_end < to_side
+        distance = np.minimum(to_end, to_side)
+        wall = np.where(is_end, cos > 0.0, 2 + (sin > 0.0)).astype(np.intp)
+        along = np.where(is_end, self._y + distance * sin, self._x + distance * cos)
+        return distance, wall, along
 
     def _step(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
         drive, before = self._drive, self._speed
@@ -203,37 +203,24 @@ class DrivingWorld(World):
             self._steering = _lagged(self._steering, steering, _STEERING_LAG_S, dt_s)
         self._yaw_rate = self._side_turn - drive.curvature * self._steering * self._speed
         middle = self._heading + self._yaw_rate * dt_s / 2
-        move = self._speed * dt_s
-        share = min(
-            _free_share(self._x, move * math.cos(middle), ROOM_LENGTH),
-            _free_share(self._y, move * math.sin(middle), ROOM_WIDTH),
-        )
-        self._x += share * move * math.cos(middle)
-        self._y += share * move * math.sin(middle)
+        x, y = self._speed * dt_s * math.cos(middle), self._speed * dt_s * math.sin(middle)
+        share = min(_free_share(self._x, x, ROOM_LENGTH), _free_share(self._y, y, ROOM_WIDTH))
+        self._x += share * x
+        self._y += share * y
         self._heading = math.remainder(self._heading + self._yaw_rate * dt_s, math.tau)
-        self._travelled += share * move
-        self._impact_left_s -= dt_s
-        self._acceleration = (self._speed - before) / dt_s
-        load = sum(map(abs, values.values()))
+        self._travelled += share * self._speed * dt_s
         if share < 1.0:
-            if abs(before) > _SPEED_OF_IMPACT:
-                self._impact, self._impact_left_s = -before / _IMPACT_STOP_S, _IMPACT_S
-            self._speed = self._acceleration = 0.0
-            load *= _STALL_FACTOR
-        self._current_a = _IDLE_A + _MOTOR_A * load
-        self._bumped = self._touches_ahead()
+            self._speed = 0.0
+        self._acceleration = (self._speed - before) / dt_s
+        self._load = sum(map(abs, values.values()))
 
     def _touches_ahead(self) -> bool:
-        gaps = (
-            (ROOM_LENGTH - self._x, 0.0),
-            (ROOM_WIDTH - self._y, math.pi / 2),
-            (self._x, math.pi),
-            (self._y, -math.pi / 2),
-        )
+        walls = (0.0, math.pi / 2, math.pi, -math.pi / 2)
+        gaps = (ROOM_LENGTH - self._x, ROOM_WIDTH - self._y, self._x, self._y)
         return any(
             gap <= RADIUS + _CONTACT
             and abs(math.remainder(bearing - self._heading, math.tau)) <= _BUMPER_SPREAD
-            for gap, bearing in gaps
+            for gap, bearing in zip(gaps, walls, strict=True)
         )
 
 
@@ -248,63 +235,21 @@ def _free_share(place: float, move: float, length: float) -> float:
     return 1.0 if move == 0.0 else min(1.0, max(0.0, (limit - place) / move))
 
 
-_FIELD_OF_VIEW: Final = math.radians(90.0)  # From left to right, if no profile states another.
-_CAMERA_HEIGHT: Final = 0.12  # m above the floor
-_WALL_HEIGHT: Final = 0.4  # m
-_STRIPE: Final = 0.25  # m: width of the stripes on walls
-_FADE: Final = 4.0  # m at which a wall has lost 63 % of its light
-_STEEP: Final = 0.75  # Slope of a line of sight at which floor and ceiling are lightest.
-_CEILING: Final = np.array((205.0, 210.0, 215.0), np.float32)
-_FLOOR: Final = np.array((120.0, 95.0, 70.0), np.float32)
-_WALLS: Final = np.array(((220, 70, 60), (70, 150, 220), (235, 190, 60), (90, 180, 90)), np.float32)
+def _lines_of_sight(
+    size: tuple[int, int], pitch_deg: float, fovy_deg: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the bearing of each column, rad, and the downward slope of each pixel's line.
 
-
-class _FrontCamera:
-    """Draws the room, whose stripes begin at `first_stripe`, m; see `DrivingWorld`."""
-
-    def __init__(
-        self,
-        size: tuple[int, int],
-        first_stripe: float,
-        pitch_deg: float | None,
-        fovy_deg: float | None,
-    ) -> None:
-        self._first_stripe = first_stripe
-        width, height = size
-        if fovy_deg is None:
-            focal = (width / 2) / math.tan(_FIELD_OF_VIEW / 2)  # In pixels.
-        else:
-            focal = (height / 2) / math.tan(math.radians(fovy_deg) / 2)
-        pitch = math.radians(pitch_deg or 0.0)
-        right = (np.arange(width) + 0.5 - width / 2) / focal
-        below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
-        ahead = math.cos(pitch) - math.sin(pitch) * below
-        down = math.sin(pitch) + math.cos(pitch) * below
-        # One ray along the floor serves all pixels of a bearing; two for each column.
-        bearings = -np.arctan2(right, ahead)
-        first, last = float(bearings.min()), float(bearings.max())
-        self._angles: NDArray[np.float64] = np.linspace(first, last, 2 * width)
-        step = (last - first) / (2 * width - 1)
-        self._rays = np.rint((bearings - first) / step).astype(np.intp)
-        # How far a pixel looks down for each metre along the floor.
-        self._slopes = (down / np.hypot(right, ahead)).astype(np.float32)
-        # Light falls off towards the horizon, on the floor and on the ceiling.
-        near = np.minimum(np.abs(self._slopes) / _STEEP, 1.0)[..., np.newaxis]
-        self._background = np.where(
-            self._slopes[..., np.newaxis] > 0.0,
-            _FLOOR * (0.55 + 0.45 * near),
-            _CEILING * (0.8 + 0.2 * near),
-        ).astype(np.uint8)
-
-    def draw(self, x: float, y: float, heading: float) -> NDArray[np.uint8]:
-        """Draw a frame from a pose, RGB, shape (height, width, 3)."""
-        distance, wall, along = _cast(x, y, heading + self._angles)
-        light = 0.25 + 0.75 * np.exp(-distance / _FADE)
-        light *= np.where(((along + self._first_stripe) // _STRIPE) % 2 == 0, 1.0, 0.72)
-        colours = (_WALLS[wall] * light[:, np.newaxis]).astype(np.uint8)
-        # Below the camera where the line of sight meets the wall, m.
-        rise = self._slopes * distance.astype(np.float32)[self._rays]
-        is_wall = (rise >= _CAMERA_HEIGHT - _WALL_HEIGHT) & (rise < _CAMERA_HEIGHT)
-        picture = self._background.copy()
-        picture[is_wall] = colours[self._rays[is_wall]]
-        return picture
+    All lines of a column have the bearing of its middle one, also in a pitched camera.
+    """
+    width, height = size
+    if fovy_deg is None:
+        focal = (width / 2) / math.tan(_FIELD_OF_VIEW / 2)  # In pixels.
+    else:
+        focal = (height / 2) / math.tan(math.radians(fovy_deg) / 2)
+    pitch = math.radians(pitch_deg)
+    right = (np.arange(width) + 0.5 - width / 2) / focal
+    below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
+    down = math.sin(pitch) + math.cos(pitch) * below
+    ahead = math.cos(pitch) - math.sin(pitch) * below
+    return -np.arctan2(right, math.cos(pitch)), down / np.hypot(right, ahead)

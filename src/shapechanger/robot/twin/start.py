@@ -1,23 +1,28 @@
-"""Start a board in its own process, or find one that runs."""
+"""Start a board in its own process, at its place, or find one that runs."""
 
 from __future__ import annotations
 
+import importlib
 import os
+import select
 import socket
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.errors import RobotError, check_seed
+from shapechanger.contract.world import World
+from shapechanger.errors import RobotError, UnknownName, check_seed, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.twin.board_client import BoardClient
-from shapechanger.robot.twin.place import Place
+from shapechanger.robot.twin.room import DrivingWorld
+from shapechanger.robot.twin.rpc import BoardClient
 from shapechanger.robot.twin.wiring import ONE_SHOT_MS, TwinWiring
 
 _HARDWARE: Final = "shapechanger.robot.twin.hardware:connect"
@@ -26,6 +31,55 @@ _HARDWARE: Final = "shapechanger.robot.twin.hardware:connect"
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
 _MAX_SOCKET_PATH: Final = 100  # Bytes; Linux takes 107.
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A world and the body in it.
+
+    Attributes:
+        opener: Function that opens the world, as "module:function"; "" for the plain room, which
+            needs no simulator. It is called as `open_world`, without the place.
+        arguments: Keyword arguments of the opener, as JSON holds them.
+    """
+
+    opener: str = ""
+    arguments: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, seed: int) -> World:
+    """Open the world of a place.
+
+    Args:
+        place: The place.
+        parts: Parts that the robot's outputs move.
+        camera: Camera of the profile, as which the world is shown; None without one.
+        seed: Seed of the surroundings and of the start.
+
+    Raises:
+        UnknownName: If the module of the opener has no such function.
+        RobotError: If there is no such module.
+        ShapechangerError: If the opener refuses its arguments or the robot, or needs an extra.
+    """
+    if not place.opener:
+        plan = camera or CameraPlan("")
+        angles = {"pitch_deg": plan.pitch_deg, "fovy_deg": plan.fovy_deg}
+        return DrivingWorld(parts, plan.size, seed, **angles)
+    module, _, name = place.opener.partition(":")
+    with translate_errors(ModuleNotFoundError, to=lambda error: _no_module(place, error)):
+        found = importlib.import_module(module)
+    if not hasattr(found, name):
+        known = [other for other in vars(found) if other.startswith("open_")]
+        raise UnknownName(f"function of {module} that opens a world", name, known)
+    world: World = getattr(found, name)(parts, camera, seed, **place.arguments)
+    return world
+
+
+def _no_module(place: Place, error: ModuleNotFoundError) -> RobotError:
+    return RobotError(
+        f"The world of this twin is opened by {place.opener}, and there is no "
+        f"{error.name}: install the package that names it."
+    )
 
 
 class BoardSettings(msgspec.Struct, frozen=True):
@@ -100,25 +154,24 @@ class RunningBoard(BoardAt):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def outlive_exec(self) -> None:
-        """Keep the board running when this process executes another program."""
-        self.owner.set_inheritable(True)
-
     def close(self) -> None:
         """End the board."""
         self.owner.close()
-        try:
-            self.process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        end(self.process, _END_S)
+
+
+def end(process: subprocess.Popen[bytes], within_s: float) -> None:
+    """Wait for the end of a process, and kill it if it takes longer."""
+    try:
+        process.wait(within_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
     """Return the board that runs in a folder, and its clock; None without one."""
     board = BoardAt(Path(folder).absolute())
-    if not Path(board.socket_path).is_socket():
-        return None
     try:
         client = BoardClient(board.socket_path, "operator")
     except RobotError:
@@ -164,34 +217,23 @@ def start_board(
     if camera is not None:
         os.mkfifo(at.fifo_path)
     settings = BoardSettings(
-        plan=wiring.to_json(),
-        folder=str(at.folder),
-        clock=clock,
-        seed=seed,
-        one_shot_ms=one_shot_ms,
-        place=place or Place(),
-        camera=camera,
+        wiring.to_json(), str(at.folder), clock, seed, one_shot_ms, place or Place(), camera
     )
     ours, theirs = socket.socketpair()
-    with theirs, tempfile.TemporaryFile() as file:
-        file.write(msgspec.json.encode(settings))
-        file.seek(0)
-        fds = file.fileno(), theirs.fileno()
-        process = subprocess.Popen(
-            [sys.executable, "-m", "shapechanger.robot.twin.board", *map(str, fds)],
-            stdin=subprocess.DEVNULL,
-            pass_fds=fds,
-            start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
-        )
-    board = RunningBoard(at.folder, process, ours)
-    ours.settimeout(_READY_S)
-    try:
-        ready = ours.recv(1)
-    except TimeoutError:
-        ready = b""
-    if not ready:
-        process.kill()
-        board.close()
-        raise RobotError("The twin's board did not start; its output above gives the reason.")
-    ours.settimeout(None)
-    return board
+    with ExitStack() as undo:
+        undo.enter_context(ours)
+        with theirs, tempfile.TemporaryFile() as file:
+            file.write(msgspec.json.encode(settings))
+            file.seek(0)
+            process = subprocess.Popen(
+                [sys.executable, "-m", "shapechanger.robot.twin.board", str(theirs.fileno())],
+                stdin=file,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
+            )
+        undo.callback(end, process, 0)
+        ready, _, _ = select.select([ours], [], [], _READY_S)
+        if not ready or not ours.recv(1):
+            raise RobotError("The twin's board did not start; its output above gives the reason.")
+        undo.pop_all()
+    return RunningBoard(at.folder, process, ours)

@@ -1,0 +1,242 @@
+"""Operator of a twin: moves the vehicle, breaks and presses things, and knows the truth."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Concatenate, NamedTuple, ParamSpec, Self, TypeVar, get_type_hints
+
+from shapechanger.contract.world import RESTING_V
+from shapechanger.errors import RobotError, WorldError, translate_errors
+from shapechanger.robot.drivers.as5600 import Magnet
+from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
+from shapechanger.robot.drivers.servos.rig import ServoFault
+from shapechanger.robot.drivers.simulation import Levels
+from shapechanger.robot.drivers.switch import SimulatedSwitch
+from shapechanger.robot.twin.camera import CameraFault
+from shapechanger.robot.twin.pin_board import PinBoard
+from shapechanger.robot.twin.rpc import BoardClient, Slept
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+class Whereabouts(NamedTuple):
+    """True state of the vehicle.
+
+    Attributes:
+        x: Position, m.
+        y: Position, m.
+        heading: Angle from the x axis, rad, counter-clockwise seen from above.
+        speed: Speed along the heading, m/s.
+        travelled_m: Distance rolled by the wheels, m; driving backward counts down.
+        bumped: Whether something presses the bumper.
+        distance_m: Free distance ahead of the nose, m.
+        truth: Quantities that no sensor measures, such as the progress along a course, keyed by
+            name.
+        t: Time, ns.
+    """
+
+    x: float
+    y: float
+    heading: float
+    speed: float
+    travelled_m: float
+    bumped: bool
+    distance_m: float
+    truth: dict[str, float]
+    t: int
+
+
+def _at_board(
+    function: Callable[Concatenate[Operator, _P], _R],
+) -> Callable[Concatenate[Operator, _P], _R]:
+    """Let a method ask the board, in whose process its body runs with `_board`."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def ask(self: Operator, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        given = signature.bind(self, *args, **kwargs)
+        given.apply_defaults()
+        arguments = [*given.arguments.values()][1:]
+        kind = get_type_hints(function)["return"]
+        client = self._client  # pyright: ignore[reportPrivateUsage]
+        return client.ask(kind, function.__name__, *arguments)
+
+    return ask
+
+
+class Operator:
+    """A person next to the robot, who moves the vehicle and breaks and presses things.
+
+    Each request takes effect after everything that the robot's processes sent before it.
+
+    Args:
+        path: Socket on which the board listens.
+
+    Raises:
+        RobotError: If no board listens there.
+    """
+
+    _client: BoardClient
+    _board: PinBoard  # In the board's process.
+
+    def __init__(self, path: str) -> None:
+        self._client = BoardClient(path, "operator")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def advance(self, seconds: float) -> int:
+        """Advance the twin's clock and return its time in nanoseconds.
+
+        Raises:
+            RobotError: If the board runs in real time.
+        """
+        if self._client.clock == "real":
+            raise RobotError("This board runs in real time, which cannot be advanced.")
+        return self._client.ask(Slept, "sleep", round(seconds * 1e9)).t
+
+    @_at_board
+    def place(self, seed: int) -> None:
+        """Place the vehicle at the start that follows from a seed."""
+        self._board.world.place(seed)
+        self._board.record("place", seed=seed)
+
+    @_at_board
+    def put_back(self) -> None:
+        """Put a vehicle that has collided back on its lane, at rest, to continue from there.
+
+        In the plain room, which has no lane, it returns to its start. Its truth counts on.
+        """
+        with translate_errors(
+            WorldError, to=lambda error: RobotError(f"The vehicle cannot be put back: {error}")
+        ):
+            self._board.world.put_back()
+        self._board.record("put_back")
+
+    @_at_board
+    def lay_out(self, seed: int) -> None:
+        """Replace the surroundings, and place the vehicle at a start in them.
+
+        On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
+        for the first `put_back` on it. A twin that is started with another seed has no such wait.
+        """
+        self._board.world.lay_out(seed)
+        self._board.record("course", seed=seed)
+
+    @_at_board
+    def break_camera(self, fault: CameraFault) -> None:
+        """Make the camera fail; "" repairs it."""
+        if self._board.camera is None:
+            raise RobotError("This twin has no camera.")
+        self._board.camera.break_down(fault)
+        self._board.record("fault", what=f"camera {fault or 'well'}")
+
+    @_at_board
+    def press_bumper(self, down: bool = True) -> None:
+        """Press or release all bumpers."""
+        for bumper in self._board.of_kind(SimulatedSwitch):
+            bumper.held = down
+        self._board.record("fault", what=f"bumper {'down' if down else 'up'}")
+
+    @_at_board
+    def press_stop(self, down: bool = True) -> None:
+        """Press or release the emergency stop button."""
+        self._board.stop_held = down
+        self._board.record("fault", what=f"stop {'down' if down else 'up'}")
+
+    @_at_board
+    def set_battery(self, volts: float | None) -> None:
+        """Set the battery's voltage without load, V; None for a full one."""
+        self._board.world.resting_v = RESTING_V if volts is None else volts
+        self._board.record("fault", what=f"battery {volts}")
+
+    @_at_board
+    def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
+        """Override what distance sensors measure.
+
+        Args:
+            metres: Distance, m; None for the truth.
+            dead: Whether they do not answer at all.
+        """
+        for sensor in self._board.of_kind(SimulatedHcsr04):
+            sensor.override_m, sensor.dead = metres, dead
+        self._board.record("fault", what=f"distance {'dead' if dead else metres}")
+
+    @_at_board
+    def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
+        """Make an I2C chip stop answering, or answer again.
+
+        Args:
+            bus: Number of the bus.
+            address: Address on the bus.
+            dead: Whether it stops answering.
+        """
+        chips = self._board.dead_chips
+        (chips.add if dead else chips.discard)((bus, address))
+        self._board.record("fault", what=f"chip {bus} {address} {'dead' if dead else 'well'}")
+
+    @_at_board
+    def break_servo(self, tendon: str, fault: ServoFault) -> None:
+        """Make the servo of a tendon fail.
+
+        Args:
+            tendon: Name of the tendon.
+            fault: The fault; "" repairs what can be repaired.
+        """
+        self._board.require_rig().break_servo(tendon, fault)
+        self._board.record("fault", what=f"servo {tendon} {fault or 'well'}")
+
+    @_at_board
+    def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
+        """Change the magnet of a joint's encoder.
+
+        Args:
+            joint: Name of the joint.
+            state: State of the magnet; "" repairs it.
+        """
+        self._board.encoder(joint).set_magnet(state)
+        self._board.record("fault", what=f"magnet {joint} {state or 'well'}")
+
+    @_at_board
+    def tensions(self) -> dict[str, float]:
+        """Return the tension of each tendon on the servo bus, N."""
+        return self._board.require_rig().tensions()
+
+    @_at_board
+    def levels(self) -> Levels:
+        """Return the state of all outputs."""
+        return self._board.levels
+
+    @_at_board
+    def where(self) -> Whereabouts:
+        """Return the true state of the vehicle."""
+        world, seen = self._board.world, self._board.world.inputs()
+        return Whereabouts(
+            x=seen.pose.x,
+            y=seen.pose.y,
+            heading=seen.pose.heading,
+            speed=seen.speed,
+            travelled_m=seen.travelled_m,
+            bumped=seen.bumped,
+            distance_m=world.distance_m(),
+            truth=world.truth(),
+            t=self._board.clock(),
+        )
+
+    def close(self) -> None:
+        """Leave the board."""
+        self._client.close()
+
+
+def operator_functions(board: PinBoard) -> list[Callable[..., object]]:
+    """Return the functions of an operator as they run at a board."""
+    operator = Operator.__new__(Operator)
+    operator._board = board  # pyright: ignore[reportPrivateUsage]
+    bodies = (getattr(one, "__wrapped__", None) for one in vars(Operator).values())
+    return [body.__get__(operator) for body in bodies if body is not None]

@@ -1,0 +1,463 @@
+"""Calls from processes to the board: messages, the client's end and the server.
+
+A message is one MessagePack object per datagram, over a Unix socket of type `SOCK_SEQPACKET`, which
+keeps datagrams separate and in order. Arguments are decoded by the types of the called function.
+Times are nanoseconds of the run's clock.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import select
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, suppress
+from typing import Any, Final, Literal, NamedTuple, get_origin, get_type_hints
+
+import msgspec
+
+from shapechanger.errors import RobotError, ShapechangerError, translate_errors
+from shapechanger.robot.drivers.simulation import Edge
+
+MAX_MESSAGE: Final = 64 * 1024
+"""Size of the largest message in bytes."""
+
+LATER: Final = object()
+"""Result of a function that the board answers later, or never."""
+
+Role = Literal["hardware", "operator", "clock"]
+"""A robot's process, a person next to the robot, or a connection that only sleeps."""
+
+GONE: Final = "The twin's board is gone."
+_HELD_UP_MS: Final = 10  # Between two calls while the board does not reply.
+_HELD_UP_S: Final = 10.0  # A board that does not reply for longer is broken.
+_MAX_OUTBOX: Final = 256  # Messages kept for a client that does not read, before edges are merged.
+_MAX_EDGES: Final = 500  # Most edges in one message, so that it stays below `MAX_MESSAGE`.
+
+_log = logging.getLogger(__name__)
+
+
+class Call(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A call of a function of the board.
+
+    Attributes:
+        function: Its name.
+        arguments: Its encoded arguments.
+        id: Id of the `Reply`; None if the client waits for none, and the board only logs failures.
+        t: Time of the call, ns; a board with a twin's clock uses its own.
+    """
+
+    function: str
+    arguments: msgspec.Raw
+    id: int | None = None
+    t: int = 0
+
+
+class Greeting(msgspec.Struct, frozen=True):
+    """Result of the first call: the kind of clock, and its time."""
+
+    clock: Literal["real", "twin"]
+    t: int
+
+
+class Slept(msgspec.Struct, frozen=True):
+    """Result of a sleep: the time, and when the newest frame was taken, if any was."""
+
+    t: int
+    captured_ns: int | None
+
+
+class Reply(msgspec.Struct, tag=True, frozen=True, omit_defaults=True):
+    """End of a call: an encoded result, or an error message or `errno`."""
+
+    id: int
+    result: msgspec.Raw = msgspec.Raw(b"\xc0")  # None.
+    error: str | int = ""
+
+    def decode(self, kind: Any) -> Any:
+        """Return the result, of a type, or raise the error of the call."""
+        if isinstance(self.error, int):
+            raise OSError(self.error, os.strerror(self.error))
+        if self.error:
+            raise RobotError(self.error)
+        return msgspec.msgpack.decode(self.result, type=kind)
+
+
+class InputEdges(msgspec.Struct, tag=True, frozen=True):
+    """Edges of the inputs that the client has claimed, in order of time."""
+
+    edges: list[Edge]
+
+
+class Grant(msgspec.Struct, tag=True, frozen=True):
+    """Twin time until which the client may work; then it waits again."""
+
+    t: int
+
+
+Event = Reply | InputEdges | Grant
+
+encode = msgspec.msgpack.encode
+decode_event: Callable[[bytes], Event] = msgspec.msgpack.Decoder(Event).decode
+_decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
+
+
+def encode_call(function: str, *arguments: object, id: int | None = None) -> bytes:
+    """Return an encoded `Call` of this moment."""
+    return encode(Call(function, msgspec.Raw(encode(arguments)), id, time.monotonic_ns()))
+
+
+class BoardClient:
+    """A connection to the board, to be used by one thread.
+
+    Attributes:
+        clock: Kind of clock, "real" or "twin".
+        now_ns: Newest twin time that the board has sent; with the clock "real", the time of the
+            connection.
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Called by `dispatch` with pin, level and time of each edge.
+        while_held_up: Called every 10 ms while the board is held up and neither takes a request nor
+            replies to it, for 10 s at most.
+    """
+
+    def __init__(self, path: str, role: Role) -> None:
+        self._last_id = 0
+        self._edges: deque[Edge] = deque()
+        self._grants: deque[int] = deque()
+        self._reply: Reply | None = None
+        self.levels: dict[int, int] = {}
+        self.on_edge: Callable[[int, int, int], None] | None = None
+        self.while_held_up: Callable[[], object] = lambda: None
+        with ExitStack() as undo:
+            self._socket = undo.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+            with translate_errors(OSError, to=lambda error: _unanswered(path, error)):
+                self._socket.connect(path)
+            greeting = self.ask(Greeting, "greet", role, os.getpid())
+            undo.pop_all()
+        self.clock: Literal["real", "twin"] = greeting.clock
+        self.now_ns = greeting.t
+
+    @property
+    def closed(self) -> bool:
+        """True if `close` was called."""
+        return self._socket.fileno() < 0
+
+    def fileno(self) -> int:
+        """Return the descriptor of the connection."""
+        return self._socket.fileno()
+
+    def post(self, function: str, *arguments: object) -> None:
+        """Call a function of the board without waiting for its end."""
+        self._send(encode_call(function, *arguments))
+
+    def ask(self, kind: Any, function: str, *arguments: object) -> Any:
+        """Call a function of the board and return its result."""
+        self._last_id += 1
+        self._send(encode_call(function, *arguments, id=self._last_id))
+        until_s = time.monotonic() + _HELD_UP_S
+        while self._reply is None or self._reply.id != self._last_id:
+            self._await(select.POLLIN, until_s)
+            self._receive()
+        return self._reply.decode(kind)
+
+    def drain(self) -> None:
+        """Receive everything that has arrived, without waiting."""
+        while self._receive():
+            pass
+
+    def dispatch(self) -> None:
+        """Call `on_edge` for all edges that have arrived."""
+        while self._edges:
+            edge = self._edges.popleft()
+            if self.on_edge is not None:
+                self.on_edge(edge.pin, edge.level, edge.t)
+
+    def await_grant(self, at_most_s: float) -> bool:
+        """Wait for a grant, which sets `now_ns`, and dispatch the edges before it."""
+        while not self._grants and self._is_ready(select.POLLIN, max(0.0, at_most_s * 1e3)):
+            self.drain()
+        granted = bool(self._grants)
+        if granted:
+            self.now_ns = self._grants.popleft()
+        self.dispatch()
+        return granted
+
+    def close(self) -> None:
+        """Leave the board in order."""
+        if not self.closed:
+            with suppress(OSError), self._socket:  # The board may have ended first.
+                self._socket.send(encode_call("leave"))
+
+    def _is_ready(self, event: int, at_most_ms: float) -> bool:
+        poll = select.poll()
+        poll.register(self._socket, event)
+        return bool(poll.poll(at_most_ms))
+
+    def _await(self, event: int, until_s: float) -> None:
+        """Wait for the board, which a busy machine or a new world may hold up."""
+        while not self._is_ready(event, _HELD_UP_MS):
+            if time.monotonic() < until_s:
+                self.while_held_up()
+
+    def _send(self, data: bytes) -> None:
+        until_s = time.monotonic() + _HELD_UP_S
+        while True:
+            try:
+                self._socket.send(data, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                self._await(select.POLLOUT, until_s)
+            except OSError as error:
+                raise RobotError(GONE) from error
+            else:
+                return
+
+    def _receive(self) -> bool:
+        """Receive one message; False without one."""
+        data = _received(self._socket)
+        if data is None:
+            return False
+        if not data:
+            raise RobotError(GONE)
+        match decode_event(data):
+            case Grant(t=t):
+                self._grants.append(t)
+            case InputEdges(edges=edges):
+                self.levels |= {edge.pin: edge.level for edge in edges}
+                self._edges.extend(edges)
+            case Reply() as reply:
+                self._reply = reply
+        return True
+
+
+def _unanswered(path: str, error: OSError) -> RobotError:
+    return RobotError(f"No twin's board answers at {path}: {error.strerror}.")
+
+
+def _received(connected: socket.socket) -> bytes | None:
+    """Return the next message without waiting; b"" from an ended process, None without one."""
+    try:
+        return connected.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
+    except BlockingIOError:
+        return None
+    except OSError:
+        return b""
+
+
+class OwnerGone(Exception):
+    """The process at the other end of the owner's descriptor has ended."""
+
+
+class BoardConnection:
+    """The board's end of the connection to a client, which never blocks.
+
+    Two connections of one process are two callers.
+
+    Attributes:
+        socket: Its socket.
+        outbox: Messages that wait for the client to read.
+        role: Kind of client.
+        pid: Process at the other end.
+        call_id: Id of the call that is executed; None if it waits for no reply.
+        t: Time of that call, ns.
+        executes: Whether its calls are being executed.
+        has_left: Whether it ends in order.
+    """
+
+    def __init__(self, connected: socket.socket) -> None:
+        connected.setblocking(False)
+        self.socket = connected
+        self.outbox: deque[Event] = deque()
+        self.role: Role = "clock"
+        self.pid = 0
+        self.call_id: int | None = None
+        self.t = 0
+        self.executes = self.has_left = False
+
+    @property
+    def closed(self) -> bool:
+        """True once the client is gone."""
+        return self.socket.fileno() < 0
+
+    def send(self, event: Event) -> None:
+        """Send a message, now or when the client reads."""
+        self.outbox.append(event)
+        self.flush()
+
+    def reply(self, call_id: int | None, result: object) -> None:
+        """Send the result of a call, which msgspec can encode."""
+        if call_id is not None:
+            self.send(Reply(call_id, msgspec.Raw(encode(result))))
+
+    def send_edges(self, edges: Sequence[Edge]) -> None:
+        """Send edges of the client's inputs, in order of time.
+
+        A client that does not read loses edges, as in the kernel, but never a reply or a grant:
+        beyond 256 messages, only the last of the waiting edges of each input is kept.
+        """
+        if len(self.outbox) >= _MAX_OUTBOX:
+            waiting = [one for one in self.outbox if isinstance(one, InputEdges)]
+            self.outbox = deque(one for one in self.outbox if not isinstance(one, InputEdges))
+            edges = [*(edge for one in waiting for edge in one.edges), *edges]
+            edges = sorted({edge.pin: edge for edge in edges}.values())
+        for start in range(0, len(edges), _MAX_EDGES):
+            self.send(InputEdges([*edges[start : start + _MAX_EDGES]]))
+
+    def flush(self) -> None:
+        """Send waiting messages as far as the client reads."""
+        while self.outbox:
+            try:
+                self.socket.send(encode(self.outbox[0]))
+            except BlockingIOError:
+                return
+            except OSError:
+                self.outbox.clear()  # The client is gone, which the next call of it reports.
+                return
+            self.outbox.popleft()
+
+
+class _Function(NamedTuple):
+    run: Callable[..., object]
+    names: tuple[str, ...]
+    decode: Callable[[bytes], tuple[Any, ...]]
+    takes_caller: bool
+
+
+def _served(function: Callable[..., object]) -> _Function:
+    hints = get_type_hints(function)
+    hints.pop("return", None)
+    takes_caller = hints.pop("caller", None) is not None
+    # The function itself refuses other words than those of a `Literal`, with the nearest one.
+    kinds = [str if get_origin(hint) is Literal else hint for hint in hints.values()]
+    decode = msgspec.msgpack.Decoder(tuple[*kinds] if kinds else tuple[()]).decode
+    return _Function(function, tuple(hints), decode, takes_caller)
+
+
+class BoardServer:
+    """Accepts clients and executes their calls.
+
+    Args:
+        listening: Socket to accept them at.
+        owner_fd: Descriptor that is readable once the board's owner has ended.
+        clock: Kind of clock.
+        now_ns: Its time, ns.
+        functions: Functions that clients call by name. A parameter `caller` gets the connection.
+            They may raise a `ShapechangerError`, or an `OSError` with its `errno`.
+        ended: Called when a process of the robot has ended, with whether it died.
+
+    Attributes:
+        connections: Connected clients by descriptor, in the order in which they connected.
+    """
+
+    def __init__(
+        self,
+        listening: socket.socket,
+        owner_fd: int,
+        clock: Literal["real", "twin"],
+        now_ns: Callable[[], int],
+        functions: Iterable[Callable[..., object]],
+        ended: Callable[[BoardConnection, bool], object],
+    ) -> None:
+        listening.setblocking(False)
+        self._listening = listening
+        self._owner_fd = owner_fd
+        self._clock: Literal["real", "twin"] = clock
+        self._now_ns = now_ns
+        all_functions = (*functions, self.greet, self.leave)
+        self._functions = {one.__name__: _served(one) for one in all_functions}
+        self._ended = ended
+        self.connections: dict[int, BoardConnection] = {}
+
+    def serve(self, timeout_s: float | None) -> None:
+        """Wait for calls and execute them."""
+        poll = select.poll()
+        poll.register(self._listening, select.POLLIN)
+        poll.register(self._owner_fd, select.POLLIN)
+        for fd, connection in self.connections.items():
+            writing = select.POLLOUT if connection.outbox else 0
+            poll.register(fd, select.POLLIN | writing)
+        ready = dict(poll.poll(None if timeout_s is None else timeout_s * 1e3))
+        if self._owner_fd in ready:
+            raise OwnerGone
+        for fd, events in ready.items():
+            if (connection := self.connections.get(fd)) is not None:
+                if events & select.POLLOUT:
+                    connection.flush()
+                if events & ~select.POLLOUT:
+                    self._execute_all(connection)
+        # Last, so that the successor of a process that died follows its end.
+        if self._listening.fileno() in ready:
+            connected = self._listening.accept()[0]
+            self.connections[connected.fileno()] = BoardConnection(connected)
+
+    def greet(self, caller: BoardConnection, role: Role, pid: int) -> Greeting:
+        """Introduce a client as a process with a role."""
+        caller.role, caller.pid = role, pid
+        return Greeting(self._clock, self._now_ns())
+
+    def leave(self, caller: BoardConnection) -> None:
+        """Announce that a process ends in order."""
+        caller.has_left = True
+
+    def close(self) -> None:
+        """Close all sockets."""
+        for connection in self.connections.values():
+            connection.socket.close()
+        self._listening.close()
+
+    def _execute_all(self, connection: BoardConnection) -> None:
+        """Execute all calls that have arrived from a client."""
+        if connection.executes:
+            return
+        connection.executes = True
+        try:
+            while data := _received(connection.socket):
+                self._execute(connection, _decode_call(data))
+        except msgspec.MsgspecError as error:
+            _log.warning("process %d sends a malformed request: %s", connection.pid, error)
+            data = b""
+        connection.executes = False
+        if data is not None:
+            self._forget(connection)
+
+    def _execute(self, connection: BoardConnection, call: Call) -> None:
+        try:
+            result = self._result(connection, call)
+        except (ShapechangerError, OSError) as refusal:  # The board runs on.
+            error = (refusal.errno if isinstance(refusal, OSError) else None) or str(refusal)
+            if call.id is None:
+                _log.warning("process %d: %s", connection.pid, refusal)
+            else:
+                connection.send(Reply(call.id, error=error))
+        else:
+            if result is not LATER:
+                connection.reply(call.id, result)
+
+    def _result(self, connection: BoardConnection, call: Call) -> object:
+        function = self._functions.get(call.function)
+        if function is None:
+            raise RobotError(f"The board has no function {call.function!r}.")
+        with translate_errors(
+            msgspec.MsgspecError,
+            to=lambda error: RobotError(f"The board's {call.function} takes others: {error}."),
+        ):
+            arguments = function.decode(call.arguments)
+        # An operator acts after everything that processes have sent until now, and the owner of a
+        # pin may have ended before another process claims it.
+        if connection.role == "operator" or call.function == "claim":
+            for other in list(self.connections.values()):
+                if other.role == "hardware":
+                    self._execute_all(other)
+        connection.call_id = call.id
+        connection.t = self._now_ns() if self._clock == "twin" else call.t
+        given = dict(zip(function.names, arguments, strict=True))
+        return function.run(**given, **({"caller": connection} if function.takes_caller else {}))
+
+    def _forget(self, connection: BoardConnection) -> None:
+        del self.connections[connection.socket.fileno()]
+        if connection.role == "hardware":
+            connection.t = self._now_ns()
+            self._ended(connection, not connection.has_left)
+        connection.socket.close()
