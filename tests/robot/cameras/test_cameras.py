@@ -21,8 +21,8 @@ import simplejpeg
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras import v4l2 as api
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
-from shapechanger.robot.cameras.pattern import read_barcode
 from shapechanger.robot.cameras.v4l2 import V4l2
+from tests.robot.cameras.barcode import read_barcode
 from tests.robot.guard.waiting import until
 
 pytestmark = pytest.mark.realtime

@@ -14,14 +14,13 @@ from hypothesis import strategies as st
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import (
-    FreezeDetector,
     JpegSplitter,
     captured_ns_of,
-    check_jpeg,
     checked_frame,
 )
-from shapechanger.robot.cameras.pattern import barcode_rows, draw_barcode, read_barcode
+from shapechanger.robot.cameras.sources import barcode_rows, draw_barcode
 from shapechanger.robot.daemon.camera import FrameChecks
+from tests.robot.cameras.barcode import read_barcode
 
 _RNG = np.random.default_rng(20171121)
 
@@ -78,17 +77,15 @@ def test_barcode_that_does_not_fit_is_refused() -> None:
 
 
 def test_a_frame_of_the_wrong_size_is_refused() -> None:
-    """The error gives the actual and the expected size."""
-    check_jpeg(_jpeg(), (32, 24))
     with pytest.raises(RobotError, match="32 by 24 pixels; the profile sets 160 by 120"):
-        check_jpeg(_jpeg(), (160, 120))
+        checked_frame(_jpeg(), 0, CameraPlan("file"))
 
 
 @pytest.mark.parametrize("data", [b"", b"no picture", _jpeg()[:-2], b"\xff\xd8 and \xff\xd9"])
 def test_invalid_jpeg_is_refused(data: bytes) -> None:
     """Includes data with the markers of a JPEG at its ends."""
     with pytest.raises(RobotError, match=r"(incomplete|invalid) JPEG"):
-        check_jpeg(data, (32, 24))
+        checked_frame(data, 0, CameraPlan("file", size=(32, 24)))
 
 
 def test_a_truncated_frame_is_not_rotated() -> None:
@@ -116,12 +113,6 @@ def test_a_frame_is_decoded_once(flip: bool, monkeypatch: pytest.MonkeyPatch) ->
     assert FrameChecks().refusal(frame) == ""
     assert decoded == [jpeg]
     assert frame.encoded_here is flip
-
-
-def test_repeated_bytes_are_not_a_new_frame() -> None:
-    """A frozen camera repeats its last frame."""
-    detector = FreezeDetector()
-    assert [detector.is_new(_jpeg(v)) for v in (1, 1, 2, 2, 1)] == [True, False, True, False, True]
 
 
 def _turned(jpeg: bytes, quality: int) -> bytes:

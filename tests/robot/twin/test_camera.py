@@ -16,11 +16,11 @@ import simplejpeg
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.cameras.pattern import read_barcode
 from shapechanger.robot.twin.camera import CameraFault, FrontCameraPipe
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.start import RunningBoard, start_board
+from tests.robot.cameras.barcode import read_barcode
 from tests.robot.twin.robots import CAR, until
 
 pytestmark = pytest.mark.realtime

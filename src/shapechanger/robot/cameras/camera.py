@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-import threading
 import time
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, Protocol
@@ -17,9 +16,9 @@ from shapechanger.robot.hardware import load
 CAMERA_DRIVERS: Final = {
     "picamera2": "shapechanger.robot.cameras.picamera2:PiCamera",
     "v4l2": "shapechanger.robot.cameras.v4l2:V4l2",
-    "file": "shapechanger.robot.cameras.file:Folder",
-    "pipe": "shapechanger.robot.cameras.pipe:Pipe",
-    "pattern": "shapechanger.robot.cameras.pattern:Pattern",
+    "file": "shapechanger.robot.cameras.sources:Folder",
+    "pipe": "shapechanger.robot.cameras.sources:Pipe",
+    "pattern": "shapechanger.robot.cameras.sources:Pattern",
 }
 """MODULE:NAME of each camera driver, keyed by its name in a profile; called with the plan."""
 
@@ -91,63 +90,51 @@ def open_camera(plan: CameraPlan) -> Camera:
     return load(CAMERA_DRIVERS[plan.driver])(plan)
 
 
-class Interruption:
-    """Wait for a file descriptor, interruptible from any thread."""
+class WaitingCamera(Camera):
+    """Camera whose waits end with `close`, from any thread.
 
-    def __init__(self) -> None:
-        self._read, self._write = os.pipe()
-        self._is_set = False
+    Args:
+        plan: The camera.
+    """
 
-    def wait(self, fd: int, at_most_s: float | None = None) -> bool:
+    def __init__(self, plan: CameraPlan) -> None:
+        self.plan = plan
+        self._woken, self._wake = os.pipe()
+        self._closed = False
+        self._next_ns = time.monotonic_ns()
+
+    def wait(self, fd: int | None = None, at_most_s: float | None = None) -> bool:
         """Wait until a descriptor is readable.
 
         Returns:
             Whether it is; False after `at_most_s` seconds.
         """
         poll = select.poll()
-        poll.register(fd, select.POLLIN)
-        poll.register(self._read, select.POLLIN)
+        for one in (self._woken,) if fd is None else (self._woken, fd):
+            poll.register(one, select.POLLIN)
         ready = poll.poll(None if at_most_s is None else at_most_s * 1e3)
-        if self._is_set:
+        if self._closed:
             raise RobotError("The camera is closed.")
         return bool(ready)
 
-    def set(self) -> None:
-        """Interrupt all waits, now and in the future."""
-        if not self._is_set:
-            self._is_set = True
-            os.write(self._write, b"\0")
-
-    def __del__(self) -> None:
-        # Not in `set`: another thread may still be waiting on them.
-        os.close(self._read)
-        os.close(self._write)
-
-
-class Pace:
-    """Pacing at a fixed rate.
-
-    Args:
-        fps: Frames per second.
-    """
-
-    def __init__(self, fps: float) -> None:
-        self._period_ns = round(1e9 / fps)
-        self._next_ns = time.monotonic_ns()
-        self._closed = threading.Event()
-
-    def wait(self) -> int:
-        """Wait until the next frame is due, and return that time: monotonic, ns.
+    def pace(self) -> int:
+        """Wait until the next frame is due at the plan's rate; return that time: monotonic, ns.
 
         A late frame is due at once, and the rate continues from there.
         """
-        left_ns = self._next_ns - time.monotonic_ns()
-        if self._closed.wait(max(0.0, left_ns / 1e9)):
-            raise RobotError("The camera is closed.")
+        period_ns = round(1e9 / self.plan.fps)
+        self.wait(at_most_s=max(0, self._next_ns - time.monotonic_ns()) / 1e9)
         now_ns = time.monotonic_ns()
-        self._next_ns = max(self._next_ns, now_ns - self._period_ns) + self._period_ns
+        self._next_ns = max(self._next_ns, now_ns - period_ns) + period_ns
         return now_ns
 
     def close(self) -> None:
         """Interrupt all waits, now and in the future."""
-        self._closed.set()
+        if not self._closed:
+            self._closed = True
+            os.write(self._wake, b"\0")
+
+    def __del__(self) -> None:
+        # Not in `close`: another thread may still be waiting on them.
+        os.close(self._woken)
+        os.close(self._wake)

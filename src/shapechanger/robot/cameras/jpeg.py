@@ -1,14 +1,15 @@
-"""JPEG frames: validation, freeze detection, rotation and splitting of streams."""
+"""JPEG frames: validation, rotation and splitting of streams."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 import simplejpeg
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
 _MAX_JPEG: Final = 4 * 1024 * 1024
@@ -18,65 +19,45 @@ _MAX_SKIPPED: Final = 1 << 20
 """Bytes without a frame after which a stream is taken to have none; several lost frames fit."""
 
 
-def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
-    """Check that a frame is a complete JPEG of the expected size, from its header and its end."""
+def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
+    """Return a frame of the camera's size, rotated by 180 degrees if the camera is upside down.
+
+    Header and end of the data are checked; it is decoded only in order to rotate it.
+    """
+    jpeg = _without_padding(jpeg)
     if len(jpeg) > _MAX_JPEG:
         raise RobotError(f"The camera returned {len(jpeg)} bytes; a frame has at most {_MAX_JPEG}.")
     if not simplejpeg.is_jpeg(jpeg):
         raise RobotError("The camera returned an incomplete JPEG.")
-    try:
+    with translate_errors(ValueError, to=_not_decoded):
         height, width, _, _ = simplejpeg.decode_jpeg_header(jpeg)
-    except ValueError as error:
-        raise RobotError(f"The camera returned invalid JPEG data: {error}.") from error
-    if (int(width), int(height)) != size:
+    if (int(width), int(height)) != plan.size:
         raise RobotError(
             f"The camera returned a frame of {width} by {height} pixels; "
-            f"the profile sets {size[0]} by {size[1]}."
+            f"the profile sets {plan.size[0]} by {plan.size[1]}."
         )
-
-
-class FreezeDetector:
-    """Detect a camera that repeats its last frame.
-
-    Sensor noise makes frames differ, so a frame with the same bytes is not new, whatever its time
-    of capture.
-    """
-
-    def __init__(self) -> None:
-        self._last = b""
-
-    def is_new(self, jpeg: bytes) -> bool:
-        """Return whether the frame differs from the previous one."""
-        new = jpeg != self._last
-        self._last = jpeg
-        return new
-
-
-def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
-    """Return a frame of the camera's size, rotated by 180 degrees if the camera is upside down.
-
-    The data is decoded only in order to rotate it.
-    """
-    jpeg = _without_padding(jpeg)
-    check_jpeg(jpeg, plan.size)
     if not plan.flip:
         return Frame(jpeg, captured_ns)
-    try:
+    with translate_errors(ValueError, to=_not_decoded):
         # Strict: without it, missing blocks would become grey, and the new JPEG would hide that.
         image = simplejpeg.decode_jpeg(jpeg, strict=True)
-    except ValueError as error:
-        raise RobotError(f"The camera sent a JPEG that cannot be decoded: {error}.") from error
     upright = np.ascontiguousarray(image[::-1, ::-1])
     encoded = simplejpeg.encode_jpeg(upright, plan.jpeg_quality, colorsubsampling="420")
     return Frame(encoded, captured_ns, encoded_here=True)
 
 
+def _not_decoded(error: ValueError) -> RobotError:
+    return RobotError(f"The camera sent an invalid JPEG that cannot be decoded: {error}.")
+
+
 _START: Final = b"\xff\xd8"
 _END: Final = 0xD9
 _SCAN: Final = 0xDA
+_NOT_IN_FRAME: Final = (0x00, _START[1])
 _WITHOUT_LENGTH: Final = frozenset({0x01, *range(0xD0, 0xD8)})
 # End of coded data: FF not followed by a stuffed zero, a restart marker or another FF.
 _AFTER_SCAN: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+_ANOTHER: Final = re.compile(rb"\xff\xd8(?=\xff)")
 _CAPTURED: Final = re.compile(rb"captured_ns=([0-9]{1,20})")
 _COMMENT: Final = 0xFE
 # Lengths of segments (ITU-T T.81, B.2): a scan has at most four components; eight Huffman tables of
@@ -99,9 +80,7 @@ class JpegSplitter:
     def __init__(self) -> None:
         self.skipped = 0
         self._data = bytearray()
-        self._at = 0  # Position up to which the first frame has been scanned.
-        self._in_scan = False
-        self._has_scan = False
+        self._scan: Iterator[int | None] | None = None  # Of the first frame.
         self._since_frame = 0  # Bytes skipped since the last frame.
 
     def feed(self, data: bytes) -> None:
@@ -115,70 +94,34 @@ class JpegSplitter:
             RobotError: If there is more than 1 MiB without a frame; the next call continues after
                 it.
         """
-        while True:
-            if not self._at:
-                start = self._data.find(_START)
-                # Without a start, its first byte may be the last one here.
-                self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
-            if (part := self._scan()) is not None:
-                count, is_frame = part
-                if not is_frame:
-                    self._skip(count)
-                    continue
-                jpeg = bytes(self._data[:count])
-                if whole := _start_of_another(jpeg):
-                    self._skip(whole)
-                    continue
-                self._drop(count)
-                self._since_frame = 0
-                return jpeg
-            if len(self._data) > _MAX_JPEG:
-                self._skip(len(self._data))
-            if self._since_frame > _MAX_SKIPPED:
-                without, self._since_frame = self._since_frame, 0
-                raise RobotError(
-                    f"The stream has {without} bytes without a complete JPEG of at most "
-                    f"{_MAX_JPEG} bytes: send MJPEG."
-                )
-            return None
-
-    def _scan(self) -> tuple[int, bool] | None:
-        """Return the length of the first frame and True, or how many bytes to skip and False.
-
-        None if more bytes are needed.
-        """
-        data = self._data
-        self._at = self._at or (len(_START) if len(data) >= len(_START) else 0)
-        while self._at and self._at + 2 <= len(data):
-            if self._in_scan:
-                found = _AFTER_SCAN.search(data, self._at)
-                if found is None:
-                    self._at = len(data) - 1
-                    return None
-                self._at, self._in_scan, self._has_scan = found.start(), False, True
-                if data[self._at + 1] == _START[1]:
-                    return self._at, False  # A frame that is cut off, and the next one.
-            marker = data[self._at + 1]
-            if data[self._at] != 0xFF or (marker == _END and not self._has_scan):
-                return len(_START), False
-            if marker == _END:
-                return self._at + 2, True
-            if marker == 0xFF:
-                self._at += 1
-            elif marker in _WITHOUT_LENGTH:
-                self._at += 2
-            elif self._at + 4 > len(data):
-                return None
-            else:
-                length = int.from_bytes(data[self._at + 2 : self._at + 4], "big")
-                longest = _LONGEST.get(marker, _LONGEST_TABLE)
-                if not 2 <= length <= longest or marker in (0x00, _START[1]):
-                    return len(_START), False
-                if self._at + 2 + length > len(data):
-                    return None
-                self._at += 2 + length
-                self._in_scan = marker == _SCAN
+        while (length := self._scanned()) is not None:
+            jpeg = bytes(self._data[: max(length, 0)])
+            if skipped := max(-length, 0) or _start_of_another(jpeg):
+                self._skip(skipped)
+                continue
+            self._drop(length)
+            self._since_frame = 0
+            return jpeg
+        if len(self._data) > _MAX_JPEG:
+            self._skip(len(self._data))
+        if self._since_frame > _MAX_SKIPPED:
+            without, self._since_frame = self._since_frame, 0
+            raise RobotError(
+                f"The stream has {without} bytes without a complete JPEG of at most "
+                f"{_MAX_JPEG} bytes: send MJPEG."
+            )
         return None
+
+    def _scanned(self) -> int | None:
+        """Continue the scan of the first frame; see `_scan`."""
+        if self._scan is None:
+            start = self._data.find(_START)
+            # Without a start, its first byte may be the last one here.
+            self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
+            if start < 0:
+                return None
+            self._scan = _scan(self._data)
+        return next(self._scan)
 
     def _skip(self, count: int) -> None:
         self.skipped += count
@@ -187,7 +130,43 @@ class JpegSplitter:
 
     def _drop(self, count: int) -> None:
         del self._data[:count]
-        self._at, self._in_scan, self._has_scan = 0, False, False
+        self._scan = None
+
+
+def _scan(data: bytes | bytearray) -> Iterator[int | None]:
+    """Scan data that begins with the start of a frame, and grows meanwhile.
+
+    Yields:
+        None while more bytes are needed; then the length of the frame, or, negative, the number of
+        bytes that are part of no frame.
+    """
+    at, has_scan = len(_START), False
+    while True:
+        while len(data) < at + 2:
+            yield None
+        marker = data[at + 1]
+        if data[at] != 0xFF or marker in _NOT_IN_FRAME or (marker == _END and not has_scan):
+            yield -len(_START)
+        elif marker == _END:
+            yield at + 2
+        elif marker == 0xFF:
+            at += 1
+        elif marker in _WITHOUT_LENGTH:
+            at += 2
+        else:
+            while len(data) < at + 4:
+                yield None
+            length = int.from_bytes(data[at + 2 : at + 4], "big")
+            if not 2 <= length <= _LONGEST.get(marker, _LONGEST_TABLE):
+                yield -len(_START)
+            at += 2 + length
+            if marker == _SCAN:
+                while (found := _AFTER_SCAN.search(data, at)) is None:
+                    at = max(at, len(data) - 1)
+                    yield None
+                at, has_scan = found.start(), True
+                if data[at + 1] == _START[1]:
+                    yield -at  # A frame that is cut off, and the next one.
 
 
 def _start_of_another(jpeg: bytes) -> int:
@@ -196,14 +175,8 @@ def _start_of_another(jpeg: bytes) -> int:
     A segment of a frame that is cut off claims bytes of the next frame, and may end at a marker of
     it. A thumbnail ends before its frame.
     """
-    start = jpeg.find(_START + b"\xff", len(_START))
-    while start > 0:
-        splitter = JpegSplitter()
-        splitter.feed(jpeg[start:])
-        if splitter._scan() == (len(jpeg) - start, True):  # pyright: ignore[reportPrivateUsage]
-            return start
-        start = jpeg.find(_START + b"\xff", start + 1)
-    return 0
+    starts = (found.start() for found in _ANOTHER.finditer(jpeg, len(_START)))
+    return next((at for at in starts if next(_scan(jpeg[at:])) == len(jpeg) - at), 0)
 
 
 def _without_padding(data: bytes) -> bytes:

@@ -7,12 +7,13 @@ Picamera2 Library, sections 4 and 6).
 from __future__ import annotations
 
 import threading
+from contextlib import ExitStack
 from typing import Any, Final
 
 import numpy as np
 import simplejpeg
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 
 _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
@@ -29,58 +30,44 @@ class PiCamera:
     """
 
     def __init__(self, plan: CameraPlan) -> None:
-        try:
+        with translate_errors(ImportError, to=_not_installed):
             from libcamera import Transform  # pyright: ignore[reportMissingModuleSource]
             from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
-        except ImportError as error:
-            raise RobotError(
-                "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a "
-                "virtual environment made with `python3 -m venv --system-site-packages` by the "
-                "system's Python."
-            ) from error
         self._plan = plan
         self._lock = threading.Lock()  # `close` waits for a `read` in progress.
         self._closed = False
-        try:
+        with translate_errors(RuntimeError, IndexError, to=self._missing):
             self._camera: Any = Picamera2(plan.settings["number"])
-        except (RuntimeError, IndexError) as error:
-            raise RobotError(
-                f"There is no camera {plan.settings['number']}: {error}. "
-                "`rpicam-hello --list-cameras` lists what the system sees."
-            ) from error
         period_us = round(1e6 / plan.fps)
-        try:
-            self._camera.configure(
-                self._camera.create_video_configuration(
-                    main={"size": plan.size, "format": _FORMAT},
-                    transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
-                    # Never a frame from before the call (picamera2#787).
-                    queue=False,
-                    controls={"FrameDurationLimits": (period_us, period_us)},
+        with ExitStack() as undo:
+            undo.callback(self._camera.close)
+            with translate_errors(
+                RuntimeError,
+                to=lambda error: RobotError(f"The Pi's camera does not start: {error}."),
+            ):
+                self._camera.configure(
+                    self._camera.create_video_configuration(
+                        main={"size": plan.size, "format": _FORMAT},
+                        transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
+                        # Never a frame from before the call (picamera2#787).
+                        queue=False,
+                        controls={"FrameDurationLimits": (period_us, period_us)},
+                    )
                 )
-            )
-            self._camera.start()
-        except RuntimeError as error:
-            self._camera.close()
-            raise RobotError(f"The Pi's camera does not start: {error}.") from error
+                self._camera.start()
+            undo.pop_all()
 
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""
-        with self._lock:
+        with self._lock, ExitStack() as stack:
             if self._closed:
                 raise RobotError("The camera is closed.")
-            try:
+            with translate_errors(TimeoutError, RuntimeError, to=_silent):
                 request = self._camera.capture_request(wait=_SILENT_S)
-            except (TimeoutError, RuntimeError) as error:
-                raise RobotError(
-                    f"The Pi's camera has sent no frame for {_SILENT_S:g} s: check its cable."
-                ) from error
-            try:
-                image = np.ascontiguousarray(request.make_array("main"))
-                # SensorTimestamp: nanoseconds of the monotonic clock at the first line's exposure.
-                captured_ns = int(request.get_metadata()["SensorTimestamp"])
-            finally:
-                request.release()
+            stack.callback(request.release)
+            image = np.ascontiguousarray(request.make_array("main"))
+            # SensorTimestamp: nanoseconds of the monotonic clock at the first line's exposure.
+            captured_ns = int(request.get_metadata()["SensorTimestamp"])
         width, height = self._plan.size
         if image.shape != (height, width, 3):
             raise RobotError(
@@ -91,6 +78,12 @@ class PiCamera:
         jpeg = simplejpeg.encode_jpeg(image, quality, colorsubsampling="420")
         return Frame(jpeg, captured_ns, encoded_here=True)
 
+    def _missing(self, error: Exception) -> RobotError:
+        return RobotError(
+            f"There is no camera {self._plan.settings['number']}: {error}. "
+            "`rpicam-hello --list-cameras` lists what the system sees."
+        )
+
     def close(self) -> None:
         """Stop the camera after a `read` in progress."""
         with self._lock:
@@ -98,3 +91,15 @@ class PiCamera:
                 self._closed = True
                 self._camera.stop()
                 self._camera.close()
+
+
+def _not_installed(_: ImportError) -> RobotError:
+    return RobotError(
+        "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a "
+        "virtual environment made with `python3 -m venv --system-site-packages` by the "
+        "system's Python."
+    )
+
+
+def _silent(_: Exception) -> RobotError:
+    return RobotError(f"The Pi's camera has sent no frame for {_SILENT_S:g} s: check its cable.")

@@ -14,8 +14,8 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
-from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.camera import CameraPlan, Frame, Interruption
+from shapechanger.errors import RobotError, translate_errors
+from shapechanger.robot.cameras.camera import CameraPlan, Frame, WaitingCamera
 from shapechanger.robot.cameras.jpeg import checked_frame
 
 SET_FORMAT: Final = 0xC0D05605  # VIDIOC_S_FMT
@@ -81,7 +81,7 @@ class BufferRequest(ctypes.Structure):
     _fields_ = _words("count", "type", "memory", "caps", "rest")
 
 
-class V4l2:
+class V4l2(WaitingCamera):
     """Webcam; see `Camera`. Of several ready frames the newest is returned.
 
     Args:
@@ -92,43 +92,38 @@ class V4l2:
     def __init__(
         self, plan: CameraPlan, ioctl: Callable[[int, int, Any], int] = fcntl.ioctl
     ) -> None:
+        super().__init__(plan)
         if ctypes.sizeof(ctypes.c_void_p) != 8:
             raise RobotError("The v4l2 camera needs a 64-bit system; take `pipe` with ffmpeg.")
-        self._plan = plan
         self._ioctl = ioctl
         self._device: str = plan.settings["device"]
-        self._interruption = Interruption()
         self._buffers: list[mmap.mmap] = []
         self._fd = -1
-        try:
+        with translate_errors(OSError, to=self._dead):
             self._fd = os.open(self._device, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
             self._start()
-        except OSError as error:
-            raise RobotError(f"The camera {self._device} does not answer: {error}.") from error
 
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""
-        if not self._interruption.wait(self._fd, _SILENT_S):
+        if not self.wait(self._fd, _SILENT_S):
             raise RobotError(f"The camera {self._device} has sent no frame for {_SILENT_S:g} s.")
-        try:
+        with translate_errors(OSError, to=self._dead):
             jpeg, captured_ns = self._newest()
-        except OSError as error:
-            raise RobotError(f"The camera {self._device} does not answer: {error}.") from error
-        return checked_frame(jpeg, captured_ns, self._plan)
+        return checked_frame(jpeg, captured_ns, self.plan)
 
-    def close(self) -> None:
-        """Interrupt a waiting `read`."""
-        self._interruption.set()
+    def _dead(self, error: OSError) -> RobotError:
+        return RobotError(f"The camera {self._device} does not answer: {error}.")
 
     def __del__(self) -> None:
         # Not in `close`: a `read` in another thread may still use a buffer.
+        super().__del__()
         for buffer in self._buffers:
             buffer.close()
         if self._fd >= 0:
             os.close(self._fd)  # This stops the camera.
 
     def _start(self) -> None:
-        width, height = self._plan.size
+        width, height = self.plan.size
         wanted = PixelFormat(
             type=_CAPTURE, width=width, height=height, kind=MJPEG, field=_FIELD_NONE
         )
@@ -138,7 +133,7 @@ class V4l2:
                 f"The camera {self._device} offers no JPEG frames of {width} by {height} pixels; "
                 "`v4l2-ctl --list-formats-ext` lists what it offers."
             )
-        rate = Parameters(type=_CAPTURE, numerator=1000, denominator=round(1000 * self._plan.fps))
+        rate = Parameters(type=_CAPTURE, numerator=1000, denominator=round(1000 * self.plan.fps))
         self._ioctl(self._fd, SET_PARAMETERS, rate)
         asked = BufferRequest(count=_BUFFERS, type=_CAPTURE, memory=_MEMORY_MMAP)
         self._ioctl(self._fd, REQUEST_BUFFERS, asked)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import closing
 from typing import Final
 
 import simplejpeg
 
-from shapechanger.errors import RobotError, ShapechangerError
+from shapechanger.errors import ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
-from shapechanger.robot.cameras.jpeg import FreezeDetector
 
 _FUTURE_NS: Final = 50_000_000  # Two readings of one clock may be seen in the other order.
 _FIRST_PAUSE_S: Final = 0.1
@@ -27,7 +27,7 @@ class FrameChecks:
 
     def __init__(self, now_ns: Callable[[], int] | None = None) -> None:
         self._now_ns = now_ns
-        self._freeze = FreezeDetector()
+        self._last = b""
         self._newest_ns = -1
 
     def refusal(self, frame: Frame) -> str:
@@ -39,8 +39,10 @@ class FrameChecks:
                 simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
             except ValueError as error:
                 return f"The camera sent a JPEG that cannot be decoded: {error}."
-        if not self._freeze.is_new(frame.jpeg):
+        # Sensor noise makes frames differ, so the same bytes are not a new frame at any time.
+        if frame.jpeg == self._last:
             return "The camera repeats the same frame."
+        self._last = frame.jpeg
         if frame.captured_ns <= self._newest_ns:
             return "The camera sent a frame that is older than the one before."
         if self._now_ns is not None and frame.captured_ns > self._now_ns() + _FUTURE_NS:
@@ -88,52 +90,42 @@ class FrameReader:
     def _run(self) -> None:
         pause_s = _FIRST_PAUSE_S
         while not self._end.is_set():
-            before = self.errors
-            try:
-                camera = self._open(self._plan)
-            except (ShapechangerError, OSError, ImportError) as error:
-                self._fail(str(error))
-            else:
-                self._camera = camera
-                try:
-                    if self._read(camera):
-                        pause_s, before = _FIRST_PAUSE_S, self.errors
-                finally:
-                    self._camera = None
-                    camera.close()
-            if self.errors > before:
-                pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
+            works = self._read()
+            pause_s = _FIRST_PAUSE_S if works else min(2 * pause_s, _LONGEST_PAUSE_S)
             self._end.wait(pause_s)
 
-    def _read(self, camera: Camera) -> bool:
-        """Read until the camera fails. Return True if there was a valid frame."""
+    def _read(self) -> bool:
+        """Open the camera and read it until it fails. Return True if there was a valid frame."""
         good, bad = False, 0
-        while not self._end.is_set() and bad < _BAD_UNTIL_REOPENED:
-            try:
-                frame = camera.read()
-            except (RobotError, OSError, ValueError) as error:
-                if not self._end.is_set():
-                    self._fail(str(error))
-                return good
-            refusal = self._checks.refusal(frame)
-            if refusal:
-                bad += 1
-                self._fail(refusal)
-                # A broken driver may return without waiting for the next frame.
-                self._end.wait(0.5 / self._plan.fps)
-                continue
-            good, bad = True, 0
-            self._deliver(frame)
-            if frame.skipped and not self._skips:
-                self._skips = True  # Some streams have bytes between all frames.
-                self._report(
-                    f"The camera's stream has bytes between its frames that are no JPEG, "
-                    f"{frame.skipped} before this one: they are skipped."
-                )
-            if self._trouble:
-                self._trouble = ""
-                self._report("The camera works again.")
+        try:
+            with closing(self._open(self._plan)) as camera:
+                self._camera = camera
+                while not self._end.is_set() and bad < _BAD_UNTIL_REOPENED:
+                    frame = camera.read()
+                    if refusal := self._checks.refusal(frame):
+                        bad += 1
+                        self._fail(refusal)
+                        # A broken driver may return without waiting for the next frame.
+                        self._end.wait(0.5 / self._plan.fps)
+                    else:
+                        good, bad = True, 0
+                        self._accept(frame)
+        except (ShapechangerError, OSError, ImportError, ValueError) as error:
+            if not self._end.is_set():
+                self._fail(str(error))
         return good
+
+    def _accept(self, frame: Frame) -> None:
+        self._deliver(frame)
+        if frame.skipped and not self._skips:
+            self._skips = True  # Some streams have bytes between all frames.
+            self._report(
+                f"The camera's stream has bytes between its frames that are no JPEG, "
+                f"{frame.skipped} before this one: they are skipped."
+            )
+        if self._trouble:
+            self._trouble = ""
+            self._report("The camera works again.")
 
     def _fail(self, trouble: str) -> None:
         self.errors += 1

@@ -15,7 +15,7 @@ import simplejpeg
 from shapechanger.contract.world import World
 from shapechanger.errors import UnknownName
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.cameras.pattern import draw_barcode
+from shapechanger.robot.cameras.sources import draw_barcode
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
 """Faults of a camera: no pictures, the same one again, noise, or half a picture; "" for none."""

@@ -1,0 +1,23 @@
+"""Reader of the barcode that the test pattern and a twin's frames carry."""
+
+from __future__ import annotations
+
+import binascii
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.robot.cameras.sources import barcode_rows
+
+
+def read_barcode(image: NDArray[np.uint8]) -> int | None:
+    """Return the number in the first rows of an image of shape (height, width, 3), or None."""
+    height, width = image.shape[:2]
+    rows = barcode_rows(width)
+    if width < 96 or height < rows:
+        return None
+    cells = image[:rows, : 32 * (width // 32)].reshape(2, rows // 2, 32, width // 32, -1)
+    data = np.packbits(cells.mean(axis=(1, 3, 4)) > 127.5).tobytes()
+    if binascii.crc_hqx(data[:6], 0xFFFF) != int.from_bytes(data[6:], "big"):
+        return None
+    return int.from_bytes(data[:6], "big")
