@@ -22,9 +22,8 @@ import shapechanger
 from benchmarks.row import Row, asked
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
-from shapechanger.robot.twin.check.bench import Bench
 from shapechanger.robot.twin.check.faults import FAULTS, Fault
-from shapechanger.robot.twin.check.trial import run_trial
+from shapechanger.robot.twin.check.trial import Bench, run_trial
 from tests.robots import CAR
 
 TRIALS: Final = 100
@@ -95,7 +94,7 @@ def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) 
         while sum(one.drove for one in found) < trials and len(found) < 2 * trials:
             if bench is None:
                 bench = Bench(load_profile(profile), one_shot=one_shot, pilot=PILOT)
-                opened.enter_context(bench)
+                opened.callback(bench.close)
             try:
                 tried = _as_tried(bench, fault)
             except RobotError:  # The driver lost the link or never drove: start another robot.

@@ -12,9 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.twin.check.bench import Bench
 from shapechanger.robot.twin.check.faults import FAULTS
-from shapechanger.robot.twin.check.trial import run_trial
+from shapechanger.robot.twin.check.trial import Bench, run_trial
 from shapechanger.robot.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
@@ -88,7 +87,8 @@ def witness() -> Iterator[Witness]:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     """A robot for all faults, replaced when a fault ends it."""
-    with Bench(write_profile(tmp_path_factory.mktemp("faults")), pilot=PILOT) as made:
+    profile = write_profile(tmp_path_factory.mktemp("faults"))
+    with contextlib.closing(Bench(profile, pilot=PILOT)) as made:
         yield made
 
 
@@ -130,7 +130,7 @@ def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
     """The documented weakness: without processes and hardware protection, power stays on."""
     # Keep the robot after the trial, to inspect it.
     fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
-    with Bench(write_profile(tmp_path), one_shot=False) as bench:
+    with contextlib.closing(Bench(write_profile(tmp_path), one_shot=False)) as bench:
         result = run_trial(bench, fault)
         levels = frozen(read_ledger(bench.board().ledger_path), (22, 27))
     assert result.drove

@@ -12,12 +12,12 @@ from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.pins import (
     check_jumper,
-    lamp_checks,
+    check_lamps,
     lamps_of,
     plan_of_pins,
     probed_pin,
 )
-from shapechanger.robot.check.report import Finding, run_checks
+from shapechanger.robot.check.report import Finding
 from shapechanger.robot.raspberry_pi import RealHardware
 from tests.robot.check.held_pins import HeldPins, shipped
 
@@ -91,8 +91,8 @@ def pins() -> Iterator[HeldPins]:
 
 
 def _lit(kind: str, pins: HeldPins, ask: Callable[[str], bool | None]) -> dict[str, Finding]:
-    checks = lamp_checks(shipped(kind), lambda: pins, ask, lambda _: None, shown_s=0.0)
-    return {one.check: one for one in run_checks(checks)}
+    checks = check_lamps(shipped(kind), lambda: pins, ask, lambda _: None, shown_s=0.0)
+    return {one.check: one for one in checks}
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,7 @@ class CheckRobot:
             f"{'twin' if on_twin else 'hardware'}, Python {platform.python_version()}, "
             f"{platform.platform()}"
         )
-        from shapechanger.robot.twin.check.bench import Bench
-        from shapechanger.robot.twin.check.trial import check_robot, require_level
+        from shapechanger.robot.twin.check.trial import Bench, check_robot, require_level
 
         asks = sys.stdin.isatty() and not (self.yes or on_twin)
         bench = Bench(

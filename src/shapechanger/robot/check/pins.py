@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.report import Checks, Results, judged
+from shapechanger.robot.check.report import Finding, judged
 from shapechanger.robot.drivers.chip import open_output
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
@@ -23,9 +23,9 @@ _TOGGLES: Final = 50
 _SETTLES_S: Final = 0.002
 
 
-def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
+def require_pins(plan: GuardPlan) -> None:
     """Refuse a machine without GPIO pins."""
-    if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
+    if needs_pins(plan) and not any(Path("/dev").glob("gpiochip*")):
         raise RobotError(
             f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
             "`shapechanger robot serve --twin` runs it on simulated ones."
@@ -155,62 +155,46 @@ class BenchLamp(NamedTuple):
     pin: int | None
 
 
+_ENABLE: Final = ("enable", " enable", 1.0)
+_LIT: Final = {
+    "hbridge": (("forward", " forward", 1.0), ("backward", " backward", -1.0), _ENABLE),
+    "phase_enable": (_ENABLE, ("phase", " backward", -1.0)),
+    "servo": (("pin", ", dimly", 1.0),),
+    "esc": (("pin", ", dimly", 1.0),),
+}
+"""Setting with the pin, words and value of each LED, keyed by the driver of its output."""
+
+
 def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
     """Return the LEDs of a bench, in the order of the outputs."""
     found: list[BenchLamp] = []
-
-    def add(name: str, pin: int | None, output: OutputPlan | None, value: float = 1.0) -> None:
-        if pin is not None and pin >= 0:
-            found.append(BenchLamp(name, f"GPIO{pin}", output, value, pin))
-
     for output in plan.outputs:
-        settings, name = output.settings, output.name
-        match output.driver:
-            case "hbridge":
-                for way, value in (("forward", 1.0), ("backward", -1.0), ("enable", 1.0)):
-                    add(f"{name} {way}", settings[way], output, value)
-            case "phase_enable":
-                add(f"{name} enable", settings["enable"], output)
-                add(f"{name} backward", settings["phase"], output, -1.0)
-            case "servo" | "esc" if settings["over"] == "lgpio":
-                add(f"{name}, dimly", settings["pin"], output)
-            case "servo" | "esc":
-                place = f"channel {settings['channel']} of the {settings['over']}"
-                found.append(BenchLamp(f"{name}, dimly", place, output, 1.0, None))
-            case driver:
-                raise RobotError(
-                    f"Output {name} is a servo on a bus ({driver}), and an LED cannot stand for "
-                    "it: take a robot whose outputs are on pins, such as `init car`."
-                )
-    add("enable line", plan.enable_pin, None)
+        name, settings = output.name, output.settings
+        if "channel" in settings:
+            place = f"channel {settings['channel']} of the {settings['over']}"
+            found.append(BenchLamp(f"{name}, dimly", place, output, 1.0, None))
+        elif output.driver in _LIT:
+            for key, words, value in _LIT[output.driver]:
+                if (pin := settings[key]) >= 0:
+                    found.append(BenchLamp(name + words, f"GPIO{pin}", output, value, pin))
+        else:
+            raise RobotError(
+                f"Output {name} is a servo on a bus ({output.driver}), and an LED cannot stand for "
+                "it: take a robot whose outputs are on pins, such as `init car`."
+            )
+    if (pin := plan.enable_pin) is not None:
+        found.append(BenchLamp("enable line", f"GPIO{pin}", None, 1.0, pin))
     return found
 
 
-@contextmanager
-def _lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
-    """Light one LED, through the driver of its output, and put it out at the end."""
-    if lamp.output is None:
-        with closing(enable_device(lamp.pin or 0, hardware)) as device:
-            try:
-                device.on()
-                yield
-            finally:
-                device.off()
-        return
-    with closing(open_output(lamp.output, hardware)) as driver:
-        driver.write(lamp.value, hardware.clock.now_ns())
-        yield
-        driver.write(0.0, hardware.clock.now_ns())
-
-
-def lamp_checks(
+def check_lamps(
     plan: GuardPlan,
     connect_pins: Callable[[], Hardware],
     ask: Ask,
     sees: Callable[[BenchLamp], bool | None],
     shown_s: float = SHOWN_S,
-) -> Checks:
-    """Yield a check of each LED, which lights it alone, and asks or measures whether it is lit.
+) -> Iterator[Finding]:
+    """Light each LED alone, and ask or measure whether it is lit.
 
     Args:
         plan: The robot.
@@ -219,8 +203,8 @@ def lamp_checks(
         sees: Measures whether an LED is lit; None if it cannot.
         shown_s: Time for which an LED is lit when nobody answers, s.
     """
-
-    def check(lamp: BenchLamp) -> Results:
+    for lamp in lamps_of(plan):
+        check = f"LED {lamp.place}"
         try:
             # Opened afresh, because a closed output stays claimed.
             with closing(connect_pins()) as hardware, _lit(lamp, hardware):
@@ -229,15 +213,26 @@ def lamp_checks(
                     time.sleep(shown_s)
                 measured = sees(lamp)
         except RobotError as error:
-            yield "bad", f"{lamp.name}: {error}"
-            return
+            yield Finding(check, "bad", f"{lamp.name}: {error}")
+            continue
         seen = {True: "lit", False: "NOT lit", None: "not asked"}[answer]
         if measured is not None:
             seen += f", measured as {'lit' if measured else 'NOT lit'}"
-        if answer is None and measured is None:
-            yield "unknown", f"{lamp.name}: {seen}."
-        else:
-            yield judged(False not in (answer, measured), f"{lamp.name}: {seen}.")
+        level, sentence = judged(False not in (answer, measured), f"{lamp.name}: {seen}.")
+        unknown = answer is None and measured is None
+        yield Finding(check, "unknown" if unknown else level, sentence)
 
-    for lamp in lamps_of(plan):
-        yield f"LED {lamp.place}", check(lamp)
+
+@contextmanager
+def _lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
+    """Light one LED, through the driver of its output, and put it out at the end."""
+    with ExitStack() as opened:
+        if lamp.output is None:
+            device = opened.enter_context(closing(enable_device(lamp.pin or 0, hardware)))
+            opened.callback(device.off)
+            device.on()
+        else:
+            driver = opened.enter_context(closing(open_output(lamp.output, hardware)))
+            opened.callback(lambda: driver.write(0.0, hardware.clock.now_ns()))
+            driver.write(lamp.value, hardware.clock.now_ns())
+        yield

@@ -1,7 +1,7 @@
 """Judge from the ledger alone whether a robot moved without permission.
 
-The inputs are the ledger, the wiring and the arrival times of commands, but nothing from the
-robot's own programs.
+The inputs are the ledger, the wiring and the times at which the robot was permitted to move, but
+nothing from the robot's own programs.
 """
 
 from __future__ import annotations
@@ -13,18 +13,6 @@ from typing import NamedTuple
 from shapechanger.robot.drivers.simulation import Levels, WiredOutput
 from shapechanger.robot.twin.signals import Transition, apply
 from shapechanger.robot.twin.wiring import TwinWiring
-
-
-class ExpectedCommand(NamedTuple):
-    """A command that the robot was to obey.
-
-    Attributes:
-        arrival_ns: Arrival, on the ledger's clock.
-        ttl_ms: Time to live, ms; the deadline applies if it is shorter.
-    """
-
-    arrival_ns: int
-    ttl_ms: float
 
 
 class Interval(NamedTuple):
@@ -50,56 +38,42 @@ def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval
     enable line ends them.
     """
     found: list[Interval] = []
-    running: dict[str, tuple[int, float]] = {}
-    names = wiring.propelling
+    running: dict[str, Interval] = {}
     for t, outputs in _moments(ledger, wiring):
-        for name in names:
+        for name in wiring.propelling:
             value, at_rest = outputs[name]
-            start = running.get(name)
-            if at_rest and start is not None:
-                found.append(Interval(name, start[0], t, start[1]))
-                del running[name]
-            elif not at_rest:
-                since, most = start or (t, 0.0)
-                value = value or 0.0
-                running[name] = (since, value if abs(value) > abs(most) else most)
-    found.extend(Interval(name, t, math.inf, most) for name, (t, most) in running.items())
+            if not at_rest:
+                since = running.get(name, Interval(name, t, math.inf, 0.0))
+                running[name] = since._replace(value=max(since.value, value or 0.0, key=abs))
+            elif name in running:
+                found.append(running.pop(name)._replace(end_ns=t))
+    found.extend(running.values())
     return [interval for interval in found if interval.end_ns > interval.start_ns]
 
 
 def unauthorised(
     ledger: Iterable[Transition],
     wiring: TwinWiring,
-    commands: Iterable[ExpectedCommand | tuple[int, float]],
-    deadline_ms: float,
-    slack_ms: float = 0.0,
+    permitted: Iterable[tuple[float, float]],
 ) -> list[Interval]:
-    """Return when a propelling output was not at rest without a fresh command.
+    """Return when a propelling output was not at rest without permission.
 
     Args:
         ledger: Transitions, ordered by time.
         wiring: Wiring of the robot.
-        commands: Arrival of each accepted command, ns, and its time to live, ms.
-        deadline_ms: Longest effect of a command, ms.
-        slack_ms: How much later than that an output may come to rest, ms.
+        permitted: Start and end of each time in which it may move, ns, such as from the arrival of
+            a command to its deadline.
     """
-    allowed = sorted(
-        (arrival_ns, arrival_ns + (min(ttl_ms, deadline_ms) + slack_ms) * 1e6)
-        for arrival_ns, ttl_ms in commands
-    )
+    never = (math.inf, math.inf)
+    permits = [*sorted(permitted), never]
     found: list[Interval] = []
     for interval in propelled(ledger, wiring):
-        start = interval.start_ns
-        for allowed_start, allowed_end in allowed:
-            if allowed_end <= start:
-                continue
-            if allowed_start >= interval.end_ns:
-                break
-            if allowed_start > start:
-                found.append(interval._replace(start_ns=start, end_ns=allowed_start))
-            start = allowed_end
-        if start < interval.end_ns:
-            found.append(interval._replace(start_ns=start))
+        at_ns = interval.start_ns
+        for start_ns, end_ns in permits:
+            gap = interval._replace(start_ns=at_ns, end_ns=min(start_ns, interval.end_ns))
+            if gap.end_ns > gap.start_ns:
+                found.append(gap)
+            at_ns = max(at_ns, end_ns)
     return found
 
 
@@ -118,12 +92,10 @@ def _moments(
 ) -> Iterator[tuple[int, dict[str, WiredOutput]]]:
     """Yield the states of the outputs after each transition and at the end of the one-shot."""
     levels = Levels()
-    for transition in ledger:
+    for line in (*ledger, None):
         ends_ns = wiring.power_ends_ns(levels)
-        if ends_ns is not None and ends_ns < transition.t:
+        if ends_ns is not None and (line is None or ends_ns < line.t):
             yield ends_ns, wiring.read(levels, ends_ns)
-        apply(levels, transition)
-        yield transition.t, wiring.read(levels, transition.t)
-    ends_ns = wiring.power_ends_ns(levels)
-    if ends_ns is not None:
-        yield ends_ns, wiring.read(levels, ends_ns)
+        if line is not None:
+            apply(levels, line)
+            yield line.t, wiring.read(levels, line.t)

@@ -14,20 +14,50 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.errors import RobotError
+from shapechanger.robot.check.pins import lamps_of
 from shapechanger.robot.check.report import Finding
 from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.twin.check import trial as module
-from shapechanger.robot.twin.check.bench import Bench, Watcher
 from shapechanger.robot.twin.check.faults import FAULTS, Fault
 from shapechanger.robot.twin.check.trial import (
+    Bench,
     TrialResult,
+    Watcher,
     check_robot,
-    fault_results,
-    lacks,
+    fault_finding,
     require_level,
     run_trial,
 )
-from tests.robot.check.held_pins import shipped
+from tests.robot.check.held_pins import HeldPins, shipped
+
+
+def test_a_probe_measures_the_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the time of the last edge; a pin that stays high never stops."""
+    now_ns = 0
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns)
+    pins, car = HeldPins(), shipped("car")
+    monkeypatch.setattr(module, "RealHardware", lambda: pins)
+    watcher = Bench(car, twin=False, probe=20).watcher()
+    wire = pins.factory.pin(20)
+    now_ns = 1_000_000_000
+    assert watcher.rest_ms(now_ns) == 0.0
+    wire.drive_high()
+    assert watcher.moves()
+    assert math.isinf(watcher.rest_ms(now_ns))
+    now_ns += 30_000_000
+    wire.drive_low()
+    assert watcher.moves()
+    assert watcher.rest_ms(1_000_000_000) == 30.0
+    assert watcher.rest_ms(2_000_000_000) == 0.0
+    now_ns += 50_000_000
+    assert not watcher.moves()
+    assert [watcher.sees(lamp) for lamp in lamps_of(car)[:2]] == [False, None]
+    watcher.close()
+
+
+def test_a_twin_takes_no_probe() -> None:
+    with pytest.raises(RobotError, match="A twin needs no --probe"):
+        Bench(shipped("car"), probe=20)
 
 
 def _result(stopped_ms: float, *, drove: bool = True, answer: bool | None = None) -> TrialResult:
@@ -37,10 +67,10 @@ def _result(stopped_ms: float, *, drove: bool = True, answer: bool | None = None
 _VOID = _result(0.0, drove=False)
 
 
-def _findings(
+def _finding(
     monkeypatch: pytest.MonkeyPatch, *results: TrialResult | RobotError, trials: int = 1
-) -> list[tuple[str, str]]:
-    """Return the findings of a fault whose trials have given results."""
+) -> tuple[str, str]:
+    """Return the finding of a fault whose trials have given results."""
     given = list(results)
 
     def run(*_: object) -> TrialResult:
@@ -50,7 +80,7 @@ def _findings(
         return result
 
     monkeypatch.setattr(module, "run_trial", run)
-    return list(fault_results(Bench(shipped("car")), FAULTS["driver killed"], trials))
+    return fault_finding(Bench(shipped("car")), FAULTS["driver killed"], trials)
 
 
 @pytest.mark.parametrize(
@@ -78,22 +108,22 @@ def test_a_fault_is_a_check(
     sentence: str,
 ) -> None:
     """It is good only if the stop was in time, and was measured or seen."""
-    assert _findings(monkeypatch, *results) == [(level, sentence)]
+    assert _finding(monkeypatch, *results) == (level, sentence)
 
 
 def test_trials_of_one_fault_are_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     """One late stop among them is bad."""
     results = map(_result, (200.0, 300.0, 210.0))
-    ((level, sentence),) = _findings(monkeypatch, *results, trials=3)
+    level, sentence = _finding(monkeypatch, *results, trials=3)
     assert level == "bad"
     assert sentence.startswith("At rest 210 ms later, and at most 300 ms in 3 trials; 270")
 
 
 def test_faults_need_parts_of_a_robot() -> None:
     bench = Bench(shipped("car"))
-    assert not lacks(bench, "")
-    assert lacks(bench, "bumper") == "This robot has no bumper."
-    assert lacks(Bench(shipped("finger")), "throttle") == "This robot has no throttle."
+    assert not bench.lacks("")
+    assert bench.lacks("bumper") == "This robot has no bumper."
+    assert Bench(shipped("finger")).lacks("throttle") == "This robot has no throttle."
     # Only a board makes the other faults.
     assert {fault.needs for fault in FAULTS.values() if fault.on_pins} == {"", "one-shot"}
 
@@ -113,15 +143,15 @@ def test_a_part_is_named_before_its_questions(monkeypatch: pytest.MonkeyPatch) -
     bench: Any = Bench(shipped("car"))
     events: list[str] = []
 
-    def lit() -> Iterator[tuple[str, str]]:
+    def lit(*_: object) -> Iterator[Finding]:
         events.append("lit")
-        yield "good", "lit."
+        yield Finding("LED GPIO22", "good", "lit.")
 
     def closed() -> list[str]:
         events.append("closed")
-        return ["GPIO22 burns."]
+        return ["GPIO22 burns."] if events.count("closed") == 1 else []
 
-    monkeypatch.setattr(module, "lamp_checks", lambda *_: [("LED GPIO22", lit())])
+    monkeypatch.setattr(module, "check_lamps", lit)
     monkeypatch.setattr(module, "examine", lambda _: iter(()))
     bench.watcher, bench.close = Watcher, closed
     parts = check_robot("leds", bench, StandingRobot(bench.profile), cap=0.2)
@@ -132,7 +162,7 @@ def test_a_part_is_named_before_its_questions(monkeypatch: pytest.MonkeyPatch) -
         Finding("LED GPIO22", "good", "lit."),
         Finding("safe pins", "bad", "GPIO22 burns."),
     ]
-    assert events == ["lit", "closed"]
+    assert events == ["lit", "closed", "closed"]
 
 
 @pytest.fixture
@@ -144,7 +174,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     for name in ("SHOWN_S", "_STAYS_S", "_DRIVES_S"):
         monkeypatch.setattr(module, name, 0.0)
     monkeypatch.setattr(module, "_calm", lambda _: None)
-    monkeypatch.setattr(module, "BadNetwork", lambda port: nullcontext(SimpleNamespace(port=port)))
+    monkeypatch.setattr(module, "BadNetwork", lambda port: SimpleNamespace(port=port, close=int))
     monkeypatch.setattr(module, "Driver", lambda *_, **__: nullcontext(driver))
     made: Any = Bench(shipped("car"), twin=False)
     made.robot = lambda: robot
@@ -170,8 +200,8 @@ def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
         return False
 
     bench.ask = ask
-    found = list(fault_results(bench, _fault(bench), 1))
-    assert found == [("bad", "NOT lit, or NOT out afterwards.")]
+    found = fault_finding(bench, _fault(bench), 1)
+    assert found == ("bad", "NOT lit, or NOT out afterwards.")
     assert bench.events == [
         "fault",
         "Did a motor's LED light up, and are all of them out now (guard and supervisor killed)?",
@@ -199,8 +229,8 @@ def test_pins_that_stay_driven_are_bad(bench: Any) -> None:
     """The finding names them, and the next fault is tried all the same."""
     failures = [["GPIO22 is stuck."], []]
     bench.close = lambda: failures.pop(0)
-    found = list(fault_results(bench, _fault(bench), 1))
-    assert found == [("bad", "Not everything is at rest: GPIO22 is stuck.")]
+    found = fault_finding(bench, _fault(bench), 1)
+    assert found == ("bad", "Not everything is at rest: GPIO22 is stuck.")
 
 
 @pytest.mark.realtime

@@ -1,8 +1,8 @@
 """Program that drives at full throttle in a separate process.
 
-It is started by path, reads the robot's address from standard input, and prints the time of each
-sent command on a line: monotonic, ns. A pilot, which drives as a policy on board does, replaces it
-for faults of policies, and fails at a signal of `FAILURES`.
+It reads the robot's address from standard input, and prints the time of each sent command on a
+line: monotonic, ns. A pilot, which drives as a policy on board does, replaces it for faults of
+policies, and fails at a signal of `FAILURES`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Self
@@ -24,6 +23,7 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 
+_PROGRAM: Final = "shapechanger.robot.twin.check.driver"
 _STARTED_S: Final = 30.0
 
 FAILURES: Final = {
@@ -47,18 +47,12 @@ class Driver:
     def __init__(self, robot: KnownRobot, within: Sequence[str] = (), *, pilot: str = "") -> None:
         self._folder = TemporaryDirectory(prefix="shapechanger-driver-")
         # Files and not pipes, which a driver that is never read would fill.
-        self._sent, self._log = (Path(self._folder.name, name) for name in ("sent", "log"))
-        with self._sent.open("wb") as sent, self._log.open("wb") as log:
-            self.process = subprocess.Popen(
-                # By path, so that little is imported.
-                [*within, sys.executable, "-P", *(["-m", pilot] if pilot else [__file__])],
-                stdin=subprocess.PIPE,
-                stdout=sent,
-                stderr=log,
-            )
-        assert self.process.stdin is not None
-        with self.process.stdin as address:
-            address.write(msgspec.json.encode(asdict(robot)))
+        files = [Path(self._folder.name, name) for name in ("address", "sent", "log")]
+        address, self._sent, self._log = files
+        address.write_bytes(msgspec.json.encode(robot))
+        with address.open() as asked, self._sent.open("wb") as sent, self._log.open("wb") as log:
+            command = [*within, sys.executable, "-P", "-m", pilot or _PROGRAM]
+            self.process = subprocess.Popen(command, stdin=asked, stdout=sent, stderr=log)
 
     def __enter__(self) -> Self:
         """Return the driver."""
@@ -87,7 +81,7 @@ class Driver:
 
 def asked_robot() -> KnownRobot:
     """Read the robot to drive from standard input."""
-    return KnownRobot(**msgspec.json.decode(sys.stdin.buffer.read()))
+    return msgspec.json.decode(sys.stdin.buffer.read(), type=KnownRobot)
 
 
 def print_time() -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import socket
+import struct
 import time
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Coroutine
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final, Literal
+from threading import Thread
+from typing import Any, Final, Literal
 
 from shapechanger.contract.plan import LimitPlan
 from shapechanger.errors import LinkError, RobotError, RobotRefused
@@ -19,14 +22,92 @@ from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.link.messages import Role
 from shapechanger.robot.twin.check.driver import FAILURES, Driver
-from shapechanger.robot.twin.network import BadNetwork
 from shapechanger.robot.twin.robot import Operator, RunningRobot
 
-_LATE_S: Final = 1.0
-# Longest duration of an instantaneous fault; a longer one means that the machine was paused.
-_AT_ONCE_MS: Final = 5.0
-# Unlike a broken robot, a busy machine recovers.
-_UNTIMELY_ATTEMPTS: Final = 10
+_POLL_S: Final = 0.001
+_MOST_BYTES: Final = 65536
+# Linger for 0 s: closing then sends a reset instead of an orderly end.
+_RESET: Final = struct.pack("ii", 1, 0)
+
+
+class BadNetwork:
+    """Forwards TCP connections from a free port of 127.0.0.1 to another one, badly, until `close`.
+
+    Args:
+        port: Port of 127.0.0.1 to forward to.
+
+    Attributes:
+        latency_s: Least delay of each byte, s.
+        slice_bytes: Most bytes to forward at once.
+        silent: Whether to block all data while connections stay open, as when a radio dies.
+        port: Port on which it listens.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.latency_s = 0.0
+        self.slice_bytes = _MOST_BYTES
+        self.silent = False
+        self._robot_port = port
+        self._ends: list[asyncio.StreamWriter] = []  # The driver's and the robot's in turn.
+        self._loop = asyncio.new_event_loop()
+        self._thread = Thread(target=self._loop.run_forever, name="bad network", daemon=True)
+        self._thread.start()
+        self._server = self._run(asyncio.start_server(self._join, "127.0.0.1", 0))
+        self.port: int = self._server.sockets[0].getsockname()[1]
+
+    def reset(self) -> None:
+        """Reset all connections, as a router does after a restart."""
+        self._run(self._reset())
+
+    def half_close(self) -> None:
+        """End the direction towards the robot of all connections."""
+        for robot in self._ends[1::2]:
+            if not robot.is_closing():
+                robot.get_extra_info("socket").shutdown(socket.SHUT_WR)
+
+    def close(self) -> None:
+        """End all connections and the thread."""
+        self._run(self._close())
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def _run(self, act: Coroutine[Any, Any, Any]) -> Any:
+        return asyncio.run_coroutine_threadsafe(act, self._loop).result()
+
+    async def _join(self, read: asyncio.StreamReader, driver: asyncio.StreamWriter) -> None:
+        try:
+            answers, robot = await asyncio.open_connection("127.0.0.1", self._robot_port)
+        except OSError:
+            driver.close()  # As if the robot refused the connection.
+            return
+        self._ends += driver, robot
+        with suppress(asyncio.CancelledError):
+            await asyncio.gather(self._pass_on(read, robot), self._pass_on(answers, driver))
+
+    async def _pass_on(self, source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> None:
+        with closing(sink), suppress(ConnectionError):
+            while data := await source.read(_MOST_BYTES):
+                await asyncio.sleep(self.latency_s)
+                while self.silent:
+                    await asyncio.sleep(_POLL_S)
+                for at in range(0, len(data), self.slice_bytes):
+                    sink.write(data[at : at + self.slice_bytes])
+                await sink.drain()
+
+    async def _reset(self) -> None:
+        for end in self._ends:
+            if not end.is_closing():
+                linger = (socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+                end.get_extra_info("socket").setsockopt(*linger)
+                end.transport.abort()
+
+    async def _close(self) -> None:
+        self._server.close()
+        ended = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in ended:
+            task.cancel()
+        await asyncio.gather(*ended, return_exceptions=True)
 
 
 class NotTried(RobotError):
@@ -49,22 +130,15 @@ class Scene:
         robot: The robot.
         driver: The driving process.
         network: The network between them.
-        opened: What to close after the trial.
-        twin: The operator of the robot's twin; None on pins.
+        opened: What to undo after the trial.
+        board: The board of the robot's twin; None on pins.
     """
 
     robot: RunningRobot
     driver: Driver
     network: BadNetwork
     opened: ExitStack
-    twin: Operator | None
-
-    @property
-    def board(self) -> Operator:
-        """The operator of the twin."""
-        if self.twin is None:
-            raise RobotError("Only the board of a twin has this fault.")
-        return self.twin
+    board: Operator | None
 
 
 Make = Callable[[Scene], int | None]
@@ -82,7 +156,7 @@ class Fault:
         after: How the robot can notice it: at once, by its deadline, or by the age of a frame.
         then: The robot afterwards: it continues, its processes restart, or it is gone.
         needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot". The
-            board makes the faults of the first three, its ledger dates them, and it is repaired.
+            board makes the faults of the first three, and its ledger dates them.
         harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
         silences: Whether later commands of the driver do not count.
         guards_late: Whether the guard itself fails, which adds its own promised time.
@@ -107,17 +181,11 @@ class Fault:
         waits = {"": 0, "deadline": limits.deadline_ms, "camera": limits.camera_stale_ms}
         return self.within_ms + waits[self.after]
 
-    def repair(self, board: Operator) -> None:
-        """Repair the board after a fault that it has made."""
-        match self.needs:
-            case "camera":
-                board.break_camera("")
-            case "bumper":
-                board.press_bumper(down=False)
-            case "button":
-                board.press_stop(down=False)
-            case _:
-                pass
+
+# Longest duration of an instantaneous fault; a longer one means that the machine was paused.
+_AT_ONCE_MS: Final = 5.0
+# Unlike a broken robot, a busy machine recovers.
+_UNTIMELY_ATTEMPTS: Final = 10
 
 
 def _at_once(act: Callable[[], object]) -> int:
@@ -147,6 +215,30 @@ def _kill_both(scene: Scene) -> int:
     os.kill(guard, signal.SIGKILL)
     scene.robot.supervisor.kill()
     return at_ns
+
+
+def _on_board(act: Callable[[Operator, Any], None], broken: object, sound: object) -> Make:
+    """Break or press something on the board of a twin until the trial ends."""
+
+    def make(scene: Scene) -> None:
+        assert scene.board is not None  # Only twins have these faults.
+        act(scene.board, broken)
+        scene.opened.callback(act, scene.board, sound)
+
+    return make
+
+
+def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
+    """Act over a connection of another client."""
+
+    def make(scene: Scene) -> int:
+        with scene.robot.client(role=role, frames=False) as client:
+            at_ns = time.monotonic_ns()
+            act(client)
+            client.ping()  # Lets the message arrive before the connection closes.
+            return at_ns
+
+    return make
 
 
 def _set_network(name: str, value: float) -> Make:
@@ -179,19 +271,6 @@ def _connect_silently(scene: Scene) -> None:
         scene.opened.enter_context(stranger)
 
 
-def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
-    """Act over a connection of another client."""
-
-    def make(scene: Scene) -> int:
-        with scene.robot.client(role=role, frames=False) as client:
-            at_ns = time.monotonic_ns()
-            act(client)
-            client.ping()  # Lets the message arrive before the connection closes.
-            return at_ns
-
-    return make
-
-
 def _list_faults() -> list[Fault]:
     by_deadline = partial(Fault, after="deadline")
     by_policy = partial(by_deadline, by_policy=True)
@@ -211,7 +290,7 @@ def _list_faults() -> list[Fault]:
         by_deadline("network half closed", lambda s: _at_once(s.network.half_close)),
         # Answers to an observation of a second ago are refused, so the last command that acts is
         # one that had arrived already.
-        by_deadline("network late by 1 s", _set_network("latency_s", _LATE_S)),
+        by_deadline("network late by 1 s", _set_network("latency_s", 1.0)),
         silences(
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
@@ -224,12 +303,16 @@ def _list_faults() -> list[Fault]:
         harmless("a message of 1 MB", _say_too_much),
         harmless("a second program commands", _by_another("program", _command_without_the_lease)),
         harmless("strangers who say nothing", _connect_silently),
-        camera("camera frozen", lambda s: s.board.break_camera("freeze")),
-        camera("camera garbage", lambda s: s.board.break_camera("garbage")),
-        camera("camera sends half pictures", lambda s: s.board.break_camera("short")),
-        camera("camera off", lambda s: s.board.break_camera("off")),
-        Fault("bumper pressed", lambda s: s.board.press_bumper(), 40.0, needs="bumper"),
-        silences("emergency button", lambda s: s.board.press_stop(), 40.0, needs="button"),
+        camera("camera frozen", _on_board(Operator.break_camera, "freeze", "")),
+        camera("camera garbage", _on_board(Operator.break_camera, "garbage", "")),
+        camera("camera sends half pictures", _on_board(Operator.break_camera, "short", "")),
+        camera("camera off", _on_board(Operator.break_camera, "off", "")),
+        Fault(
+            "bumper pressed", _on_board(Operator.press_bumper, True, False), 40.0, needs="bumper"
+        ),
+        silences(
+            "emergency button", _on_board(Operator.press_stop, True, False), 40.0, needs="button"
+        ),
         restarts("daemon killed", _to_program("daemon", signal.SIGKILL)),
         restarts("daemon stopped", _to_program("daemon", signal.SIGSTOP), after="deadline"),
         guard("guard killed", _to_program("guard", signal.SIGKILL)),

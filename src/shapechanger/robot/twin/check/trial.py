@@ -7,26 +7,218 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final, Literal
 
 from shapechanger.errors import RobotError, ShapechangerError
-from shapechanger.robot.check.pins import SHOWN_S, lamp_checks, lamps_of
-from shapechanger.robot.check.report import Finding, Results, judged, run_checks
+from shapechanger.robot.check.pins import SHOWN_S, Ask, BenchLamp, check_lamps, lamps_of, probed_pin
+from shapechanger.robot.check.report import Finding, Level, judged
 from shapechanger.robot.check.standing import StandingRobot, examine
-from shapechanger.robot.twin.check.bench import Bench, Watcher
+from shapechanger.robot.drivers.edges import EdgeInput
+from shapechanger.robot.drivers.simulation import PwmChannel
+from shapechanger.robot.guard.outputs import make_safe
+from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.twin.check.driver import Driver
 from shapechanger.robot.twin.check.driving import check_driving
-from shapechanger.robot.twin.check.faults import FAULTS, Fault, NotTried, Scene
-from shapechanger.robot.twin.judge import (
-    ExpectedCommand,
-    Interval,
-    propelled,
-    time_to_rest,
-    unauthorised,
-)
-from shapechanger.robot.twin.network import BadNetwork
-from shapechanger.robot.twin.robot import RunningRobot
-from shapechanger.robot.twin.signals import Transition, read_ledger
+from shapechanger.robot.twin.check.faults import FAULTS, BadNetwork, Fault, NotTried, Scene
+from shapechanger.robot.twin.hardware import connect
+from shapechanger.robot.twin.judge import Interval, propelled, time_to_rest, unauthorised
+from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
+from shapechanger.robot.twin.signals import read_ledger
+from shapechanger.robot.twin.start import BoardAt, start_board
+from shapechanger.robot.twin.wiring import TwinWiring
+
+# Longest low time of software PWM while a motor runs: two cycles at 50 Hz.
+_PWM_S: Final = 0.04
+
+
+class Watcher:
+    """Measures the outputs, independently of the robot's programs; this one measures nothing."""
+
+    def sees(self, lamp: BenchLamp) -> bool | None:
+        """Return whether an LED is lit; None if that is not measured."""
+
+    def moves(self) -> bool | None:
+        """Return whether an output that propels is driven now; None if that is not measured."""
+
+    def rest_ms(self, at_ns: int) -> float:
+        """Return the time from a moment to the last propulsion after it, ms.
+
+        It is infinite if the propulsion goes on, and NaN if it is not measured.
+        """
+        del at_ns
+        return math.nan
+
+    def close(self) -> None:
+        """Stop watching."""
+
+
+class _BoardWatcher(Watcher):
+    """Reads the levels of a twin, whose ledger has the times."""
+
+    def __init__(self, board: BoardAt, wiring: TwinWiring) -> None:
+        self._wiring = wiring
+        self._operator = Operator(board.socket_path)
+        self.close = self._operator.close
+
+    def sees(self, lamp: BenchLamp) -> bool | None:
+        levels = self._operator.levels()
+        if lamp.pin is not None:
+            return levels.duties.get(lamp.pin, 0.0) > 0.0
+        if lamp.output is None:
+            return None
+        settings = lamp.output.settings
+        channel = PwmChannel(*(settings[key] for key in ("bus", "address", "channel")))
+        return channel in levels.channels and levels.channels[channel].us > 0.0
+
+    def moves(self) -> bool:
+        outputs = self._wiring.read(self._operator.levels(), time.monotonic_ns())
+        return not all(outputs[name].at_rest for name in self._wiring.propelling)
+
+
+class _ProbeWatcher(Watcher):
+    """Watches the pin of a motor through a wire to a free pin.
+
+    Edges are stamped here when they arrive, about a millisecond late.
+
+    Args:
+        probe: Free BCM pin at the end of the wire.
+        probed: BCM pin of the motor.
+        hardware: The pins.
+    """
+
+    def __init__(self, probe: int, probed: int, hardware: Hardware) -> None:
+        self._probed = probed
+        self._last_ns = 0
+        self._hardware = hardware
+        self._input = EdgeInput(probe, "down", hardware.pin_factory(), self._changed)
+
+    def sees(self, lamp: BenchLamp) -> bool | None:
+        return self.moves() if lamp.pin == self._probed else None
+
+    def moves(self) -> bool:
+        return bool(self._input.level) or time.monotonic_ns() - self._last_ns < _PWM_S * 1e9
+
+    def rest_ms(self, at_ns: int) -> float:
+        return math.inf if self._input.level else max(0.0, (self._last_ns - at_ns) / 1e6)
+
+    def close(self) -> None:
+        self._input.close()
+        self._hardware.close()
+
+    def _changed(self, at_s: float, level: int) -> None:
+        del at_s, level  # lgpio's clock is not stated.
+        self._last_ns = time.monotonic_ns()
+
+
+class Bench:
+    """A robot to check, on its twin or on the pins of this machine, until `close`.
+
+    Args:
+        profile: The robot.
+        twin: Whether on its twin.
+        one_shot: Whether a twin has the one-shot of the enable line, if the profile has one.
+        probe: Free BCM pin with a wire to the pin of the motor that drives forward; None without.
+        arguments: Further arguments of `serve`.
+        pilot: Module of the program that drives as a policy on board; see `Driver`.
+        ask: Asks a person.
+
+    Attributes:
+        wiring: Wiring of a twin.
+        restarts: How often the robot has restarted since it was served.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        *,
+        twin: bool = True,
+        one_shot: bool = True,
+        probe: int | None = None,
+        arguments: tuple[str, ...] = (),
+        pilot: str = "",
+        ask: Ask = lambda _: None,
+    ) -> None:
+        if twin and probe is not None:
+            raise RobotError("A twin needs no --probe: its ledger has every change of a pin.")
+        self.profile = profile
+        self.twin = twin
+        self.pilot = pilot
+        self.ask = ask
+        self.restarts = 0
+        self._one_shot_ms = float(profile.enable_hold_ms) if one_shot else None
+        self.wiring = TwinWiring(profile, self._one_shot_ms)
+        self._probe = None if probe is None else (probe, probed_pin(profile, probe))
+        self._arguments = arguments
+        self._board: BoardAt | None = None
+        self._robot: RunningRobot | None = None
+        self._stack = ExitStack()
+
+    def board(self) -> BoardAt:
+        """Return the board of the twin; it outlives the robot's processes, as hardware does."""
+        if self._board is None:
+            folder = self._stack.enter_context(TemporaryDirectory(prefix="shapechanger-check-"))
+            board = start_board(
+                self.profile.guard_plan(),
+                clock="real",
+                folder=Path(folder),
+                camera=self.profile.camera,
+                one_shot_ms=self._one_shot_ms,
+            )
+            self._board = self._stack.enter_context(board)
+        return self._board
+
+    def pins(self) -> Hardware:
+        """Open the pins and buses."""
+        return connect(self.board().socket_path) if self.twin else RealHardware()
+
+    def watcher(self) -> Watcher:
+        """Open a watcher of the outputs."""
+        if self.twin:
+            return _BoardWatcher(self.board(), self.wiring)
+        return Watcher() if self._probe is None else _ProbeWatcher(*self._probe, RealHardware())
+
+    def robot(self) -> RunningRobot:
+        """Return the robot, served now if it is not."""
+        if self._robot is None:
+            folder = self.board().folder if self.twin else None
+            robot = run_robot(
+                self.profile, twin=self.twin, folder=folder, arguments=self._arguments
+            )
+            self._robot = self._stack.enter_context(robot)
+        return self._robot
+
+    def close(self) -> list[str]:
+        """End everything, and put the pins of this machine at rest after any fault.
+
+        Returns:
+            Outputs that could not be put at rest.
+        """
+        was_served = self._robot is not None
+        self._robot = self._board = None
+        self.restarts = 0
+        self._stack.close()
+        if self.twin or not was_served:
+            return []
+        with closing(RealHardware()) as hardware:
+            return make_safe(self.profile, hardware)
+
+    def lacks(self, need: str) -> str:
+        """Return why a fault is not tried; "" if the robot has what it needs."""
+        profile = self.profile
+        has = {
+            "camera": profile.camera is not None,
+            "bumper": any(sensor.measures == "bump" for sensor in profile.sensors),
+            "button": profile.stop_pin is not None,
+            # Pins without it are tried, too: whoever has fitted none learns what then happens.
+            "one-shot": profile.enable_pin is not None or not self.twin,
+            "throttle": any(one.name == "throttle" and one.propels for one in profile.actions),
+        }
+        return "" if has.get(need, True) else f"This robot has no {need}."
+
 
 _ATTEMPTS: Final = 3
 # Retries of a trial in which the robot was not moving before the fault.
@@ -79,17 +271,17 @@ def run_trial(bench: Bench, fault: Fault) -> TrialResult:
         attempt += 1
         try:
             result = _try(bench, fault)
+            break
         except NotTried as error:
             _replace(bench)
             if attempt >= error.attempts:
                 raise
-            continue
-        if fault.then == "starts afresh":
-            bench.robot().await_restart()
-            bench.restarts += 1
-        if fault.then == "is gone" or bench.restarts >= _MOST_RESTARTS:
-            _replace(bench)
-        return result
+    if fault.then == "starts afresh":
+        bench.robot().await_restart()
+        bench.restarts += 1
+    if fault.then == "is gone" or bench.restarts >= _MOST_RESTARTS:
+        _replace(bench)
+    return result
 
 
 def _replace(bench: Bench) -> None:
@@ -101,15 +293,15 @@ def _replace(bench: Bench) -> None:
 def _try(bench: Bench, fault: Fault) -> TrialResult:
     robot = bench.robot()
     began_ns = time.monotonic_ns()
-    limit_ms = fault.limit_ms(bench.plan.limits)
+    limit_ms = fault.limit_ms(bench.profile.limits)
     with ExitStack() as opened:
-        twin = opened.enter_context(robot.operator()) if bench.twin else None
-        network = opened.enter_context(BadNetwork(robot.port))
+        board = opened.enter_context(robot.operator()) if bench.twin else None
+        network = opened.enter_context(closing(BadNetwork(robot.port)))
         watcher = opened.enter_context(closing(bench.watcher()))
         try:
             _calm(robot)
-            if twin is not None:
-                twin.place(0)
+            if board is not None:
+                board.place(0)
             known = robot.known_at(f"127.0.0.1:{network.port}")
             pilot = bench.pilot if fault.by_policy else ""
             driver = opened.enter_context(Driver(known, pilot=pilot))
@@ -123,8 +315,7 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
         if fault.then == "starts afresh":
             robot.forget_ready()
         called_ns = time.monotonic_ns()
-        at_ns = fault.make(Scene(robot, driver, network, opened, twin))
-        at_ns = called_ns if at_ns is None else at_ns
+        at_ns = fault.make(Scene(robot, driver, network, opened, board)) or called_ns
         if not fault.harms:
             # The driver must still work, and the stop is measured by killing it.
             driver.await_commands(len(driver.sent) + _COMMANDS)
@@ -132,10 +323,8 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
             at_ns = time.monotonic_ns()
             driver.process.kill()
         _await_rest(watcher, limit_ms)
-        if twin is not None:
-            result = _judged(bench, fault, began_ns, at_ns, driver.sent)
-            fault.repair(twin)
-            return result
+        if bench.twin:
+            return _judged(bench, fault, began_ns, at_ns, driver.sent)
         stopped_ms = watcher.rest_ms(at_ns)
         answer = None
         if math.isnan(stopped_ms):  # Asked before anything else puts the LEDs out.
@@ -191,77 +380,44 @@ def _judged(
     bench: Bench, fault: Fault, began_ns: int, at_ns: int, sent: Sequence[int]
 ) -> TrialResult:
     """Judge a trial on a twin by its ledger."""
-    ledger, limits = read_ledger(bench.board().ledger_path), bench.plan.limits
-    at_ns = _made_ns(bench, fault, ledger, at_ns)
-    commands = [
-        ExpectedCommand(sent_ns, limits.deadline_ms)
-        for sent_ns in sent
-        if not (fault.silences and sent_ns > at_ns + _LATE_MS * 1e6)
-    ]
+    profile, ledger = bench.profile, read_ledger(bench.board().ledger_path)
+    if fault.needs in {"camera", "bumper", "button"}:
+        # It begins with its line of the ledger. Until then the request waits for this process and
+        # the board, neither of which is part of a robot.
+        switches = [one.settings["pins"] for one in profile.sensors if one.driver == "switch"]
+        pins = [profile.stop_pin, *(pin for pins in switches for pin in pins)]
+        begins = {("fault", None), *(("input", pin) for pin in pins)}
+        made = (one.t for one in ledger if one.t >= at_ns and (one.kind, one.pin) in begins)
+        at_ns = next(made, at_ns)
     # A fault of the guard itself has its own promised time.
     slack_ms = fault.within_ms if fault.guards_late else _LATE_MS
-    strangers = unauthorised(ledger, bench.wiring, commands, limits.deadline_ms, slack_ms)
-    moved = propelled(ledger, bench.wiring)
+    obeyed_ns = (profile.limits.deadline_ms + slack_ms) * 1e6
+    last_ns = at_ns + _LATE_MS * 1e6 if fault.silences else math.inf
+    permitted = [(sent_ns, sent_ns + obeyed_ns) for sent_ns in sent if sent_ns <= last_ns]
+    strangers = unauthorised(ledger, bench.wiring, permitted)
     return TrialResult(
         stopped_ms=1e3 * time_to_rest(ledger, bench.wiring, at_ns),
-        limit_ms=fault.limit_ms(limits),
-        drove=any(i.start_ns < at_ns < i.end_ns for i in moved),
+        limit_ms=fault.limit_ms(profile.limits),
+        drove=any(i.start_ns < at_ns < i.end_ns for i in propelled(ledger, bench.wiring)),
         unauthorised=tuple(i for i in strangers if i.end_ns > began_ns),
     )
 
 
-def _made_ns(bench: Bench, fault: Fault, ledger: Sequence[Transition], at_ns: int) -> int:
-    """Return the time of a fault, ns.
-
-    A fault that the board makes begins with its line of the ledger: the edge of the button or
-    bumper, or the failure of the camera. Until then the request waits for this process and the
-    board, neither of which is part of a robot.
-    """
-    match fault.needs:
-        case "camera":
-            made = [line.t for line in ledger if line.kind == "fault"]
-        case "bumper" | "button":
-            pins = [bench.plan.stop_pin]
-            if fault.needs == "bumper":
-                switches = [one for one in bench.plan.sensors if one.driver == "switch"]
-                pins = [pin for one in switches for pin in one.settings["pins"]]
-            made = [line.t for line in ledger if line.kind == "input" and line.pin in pins]
-        case _:
-            made = []
-    return next((t for t in made if t >= at_ns), at_ns)
-
-
-def lacks(bench: Bench, need: str) -> str:
-    """Return why a fault is not tried; "" if the robot has what it needs."""
-    profile = bench.profile
-    has = {
-        "camera": profile.camera is not None,
-        "bumper": any(sensor.measures == "bump" for sensor in profile.sensors),
-        "button": profile.stop_pin is not None,
-        # Pins without it are tried, too: whoever has fitted none learns what then happens.
-        "one-shot": profile.enable_pin is not None or not bench.twin,
-        "throttle": any(one.name == "throttle" and one.propels for one in profile.actions),
-    }
-    return "" if has.get(need, True) else f"This robot has no {need}."
-
-
-def fault_results(bench: Bench, fault: Fault, trials: int) -> Results:
-    """Try a fault as often as asked, and yield one result."""
-    if why := lacks(bench, "throttle") or lacks(bench, fault.needs):
-        yield "unknown", why
-        return
+def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
+    """Try a fault as often as asked, and return the level and sentence of its finding."""
+    if why := bench.lacks("throttle") or bench.lacks(fault.needs):
+        return "unknown", why
     try:
         results = [_moving(bench, fault) for _ in range(trials)]
     except ShapechangerError as error:
         # The next robot begins at rest.
-        yield "bad", " ".join([str(error), *bench.close()])
-        return
+        return "bad", " ".join([str(error), *bench.close()])
     promised = f"{results[0].limit_ms:.0f} ms are promised"
     times = sorted(result.stopped_ms for result in results)
     answers = {result.answer for result in results}
     if not all(result.drove for result in results):
-        yield "bad", "It did not drive before the fault."
-    elif not any(map(math.isnan, times)):
+        return "bad", "It did not drive before the fault."
+    if not any(map(math.isnan, times)):
         stopped = f"{times[len(times) // 2]:.0f} ms later"
         if len(times) > 1:
             stopped += f", and at most {times[-1]:.0f} ms in {len(times)} trials"
@@ -269,22 +425,20 @@ def fault_results(bench: Bench, fault: Fault, trials: int) -> Results:
         strangers = sum(len(result.unauthorised) for result in results)
         moved = f" It moved {strangers} times without a fresh command." if strangers else ""
         good = all(result.kept for result in results)
-        yield judged(good, f"At rest {stopped}; {promised}.{moved}")
-    elif answers == {None}:
-        yield "unknown", f"Not measured: a wire to a free pin does, with --probe; {promised}."
-    else:
-        otherwise = "NOT lit, or NOT out afterwards."
-        yield judged(answers == {True}, "The LEDs were lit, and then out.", otherwise)
+        return judged(good, f"At rest {stopped}; {promised}.{moved}")
+    if answers == {None}:
+        return "unknown", f"Not measured: a wire to a free pin does, with --probe; {promised}."
+    otherwise = "NOT lit, or NOT out afterwards."
+    return judged(answers == {True}, "The LEDs were lit, and then out.", otherwise)
 
 
 def _moving(bench: Bench, fault: Fault) -> TrialResult:
     """Run a trial, and repeat it if the robot was not moving before the fault."""
-    result = run_trial(bench, fault)
     for _ in range(_MORE_TRIES):
-        if result.drove or result.unauthorised:
-            break
         result = run_trial(bench, fault)
-    return result
+        if result.drove or result.unauthorised:
+            return result
+    return run_trial(bench, fault)
 
 
 CheckLevel = Literal["wiring", "plain", "leds", "faults"]
@@ -298,15 +452,12 @@ _PARTS: Final[dict[CheckLevel, tuple[Part, ...]]] = {
 }
 """Parts of each level. Nothing moves in the first part; all others drive outputs."""
 
-# Longer than two cycles of software PWM at 50 Hz.
-_MEASURED_S: Final = 0.04
-
 
 def require_level(level: CheckLevel, bench: Bench) -> None:
     """Refuse a level that a robot cannot have."""
     if level == "leds":
-        lamps_of(bench.plan)
-    if level == "faults" and lacks(bench, "throttle"):
+        lamps_of(bench.profile)
+    if level == "faults" and bench.lacks("throttle"):
         name = bench.profile.name
         raise RobotError(f"Nothing of {name} propels, so there is nothing to stop.")
 
@@ -323,33 +474,31 @@ def check_robot(
         cap: Largest throttle of the checks that drive, 0 to 1.
         trials: Trials of each fault.
     """
+
+    def light_lamps() -> Iterator[Finding]:
+        with closing(bench.watcher()) as watcher:
+            # Longer than two cycles of software PWM at 50 Hz.
+            shown_s = SHOWN_S if type(watcher) is Watcher else _PWM_S
+            yield from check_lamps(bench.profile, bench.pins, bench.ask, watcher.sees, shown_s)
+
+    def drive() -> Iterator[Finding]:
+        with bench.robot() as served:
+            yield from check_driving(served, bench.profile, cap)
+
     faults = [fault for fault in FAULTS.values() if level == "faults" or fault.on_pins]
     parts: dict[Part, Iterator[Finding]] = {
         "wiring": examine(standing),
-        "LEDs": _light_lamps(bench),
-        "driving": _drive(bench, cap),
-        "faults": run_checks((one.name, fault_results(bench, one, trials)) for one in faults),
+        "LEDs": light_lamps(),
+        "driving": drive(),
+        "faults": (Finding(one.name, *fault_finding(bench, one, trials)) for one in faults),
     }
     for part in _PARTS[level]:
         yield part, _leaving_at_rest(bench, parts[part])
 
 
-def _light_lamps(bench: Bench) -> Iterator[Finding]:
-    with closing(bench.watcher()) as watcher:
-        shown_s = SHOWN_S if type(watcher) is Watcher else _MEASURED_S
-        checks = lamp_checks(bench.plan, bench.pins, bench.ask, watcher.sees, shown_s)
-        yield from run_checks(checks)
-
-
-def _drive(bench: Bench, cap: float) -> Iterator[Finding]:
-    with bench.robot() as served:
-        yield from check_driving(served, bench.profile, cap)
-
-
 def _leaving_at_rest(bench: Bench, findings: Iterator[Finding]) -> Iterator[Finding]:
-    try:
+    with closing(bench):
         yield from findings
-    finally:
         failures = bench.close()
     if failures:
         yield Finding("safe pins", "bad", " ".join(failures))

@@ -1,7 +1,8 @@
-"""The bad network adds exactly the faults that were set."""
+"""The bad network between driver and robot adds exactly the faults that were set."""
 
 from __future__ import annotations
 
+import contextlib
 import random
 import socket
 import time
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.robot.twin.network import BadNetwork
+from shapechanger.robot.twin.check.faults import BadNetwork
 from tests.robot.twin.robots import until
 
 pytestmark = pytest.mark.realtime
@@ -64,7 +65,7 @@ def far() -> Iterator[socket.socket]:
 @pytest.fixture
 def line(far: socket.socket) -> Iterator[Line]:
     """A connection through a network without faults."""
-    with BadNetwork(far.getsockname()[1]) as network:
+    with contextlib.closing(BadNetwork(far.getsockname()[1])) as network:
         made = Line(network, far)
         yield made
         made.close()
@@ -73,7 +74,7 @@ def line(far: socket.socket) -> Iterator[Line]:
 @pytest.fixture(scope="module")
 def sliced(far: socket.socket) -> Iterator[Line]:
     """A connection through a network that forwards one byte at a time."""
-    with BadNetwork(far.getsockname()[1]) as network:
+    with contextlib.closing(BadNetwork(far.getsockname()[1])) as network:
         network.slice_bytes = 1
         made = Line(network, far)
         yield made
@@ -145,7 +146,7 @@ def test_a_connection_without_a_listener_closes() -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     with (
-        BadNetwork(port) as network,
+        contextlib.closing(BadNetwork(port)) as network,
         socket.create_connection(("127.0.0.1", network.port), PATIENCE_S) as near,
     ):
         ends: list[bytes] = []
