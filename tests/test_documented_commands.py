@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from benchmarks.run import SUITES
-from shapechanger.cli.main import find_command, options_of, parse
+from shapechanger.cli.main import Group, find_command, options_of, parse
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import ShapechangerError
 
@@ -72,17 +72,12 @@ def leaves() -> dict[tuple[str, ...], type]:
     found: dict[tuple[str, ...], type] = {}
 
     def walk(words: tuple[str, ...]) -> None:
-        try:
-            find_command([*words, "no-such-command"])
-        except ShapechangerError as error:
-            names = str(error).partition("There are: ")[2].rstrip(".").split(", ")
+        kind = find_command(words)[1]
+        if isinstance(kind, Group):
+            for name in kind.commands:
+                walk((*words, name))
         else:
-            kind = find_command(words)[1]
-            assert kind is not None
             found[words] = kind
-            return
-        for name in names:
-            walk((*words, name))
 
     walk(())
     return found
@@ -108,7 +103,7 @@ def refusal(words: list[str]) -> str:
 def completed(words: list[str]) -> list[list[str]]:
     """Return command lines in which what an inline command leaves out is filled in."""
     _, kind = find_command(words)
-    if kind is None:
+    if isinstance(kind, Group):
         return [[*words, "--help"]]
     options = options_of(kind)
     filled: list[str] = []

@@ -13,6 +13,7 @@ from rich.text import Text
 from shapechanger.cli.console import plain_console, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, EnvOptions, asked, opened, options_of
 from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.testing import examine
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
@@ -24,6 +25,7 @@ from shapechanger.envs.catalogue import (
 )
 from shapechanger.envs.naming import env_ref
 from shapechanger.layout import Layout
+from shapechanger.reports.films import write_picture
 
 
 @dataclass(frozen=True)
@@ -118,8 +120,6 @@ class CheckEnv:
 
     def run(self) -> None:
         """Run the exam on the env."""
-        from shapechanger.contract.testing import examine
-
         ref = _env(self.env, self.body, self.options)
         for question in examine(ref.make):
             plain_console().print(Text.assemble(("kept", "green"), f"  {question}"))
@@ -142,25 +142,10 @@ class Render:
 
     def run(self) -> None:
         """Write the image."""
-        from shapechanger.reports.films import write_picture
-
         with opened(_env(self.env, self.body, self.options)) as env:
             picture = asked(env, "picture")(self.width, self.height)
             write_picture(picture, self.out)
         say(f"wrote {self.out}")
-
-
-@dataclass(frozen=True)
-class Envs:
-    """Look at the envs: list, show, compare, check, render."""
-
-    command: (
-        Annotated[ListEnvs, tyro.conf.subcommand("list")]
-        | Annotated[ShowEnv, tyro.conf.subcommand("show")]
-        | Annotated[Compare, tyro.conf.subcommand("compare")]
-        | Annotated[CheckEnv, tyro.conf.subcommand("check")]
-        | Annotated[Render, tyro.conf.subcommand("render")]
-    )
 
 
 def _env(env_id: str, body: str, options: str) -> EnvRef:

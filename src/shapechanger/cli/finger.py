@@ -14,6 +14,7 @@ from rich.table import Table
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, options_of, require_seed
 from shapechanger.contract.env_ref import EnvRef
+from shapechanger.demos.episodes.files import read_file
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.files import require_file, write_atomic
@@ -191,7 +192,6 @@ class ExportFinger:
 
 def _parameters(given: str) -> FingerParameters:
     """Return a named set of parameters, or one from a file."""
-    from shapechanger.demos.episodes.files import read_file
     from shapechanger.finger.parameters import PARAMETER_SETS, FingerParameters, named_set
 
     path = Path(given)
@@ -201,14 +201,3 @@ def _parameters(given: str) -> FingerParameters:
         return FingerParameters.from_json(read_file(path, _MOST_BYTES))
     except OSError as error:
         raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error
-
-
-@dataclass(frozen=True)
-class Finger:
-    """Record, identify and export a finger."""
-
-    command: (
-        Annotated[RecordFinger, tyro.conf.subcommand("record")]
-        | Annotated[Identify, tyro.conf.subcommand("identify")]
-        | Annotated[ExportFinger, tyro.conf.subcommand("export")]
-    )

@@ -10,12 +10,15 @@ from typing import Annotated, Any, Final
 
 import tyro
 
+from shapechanger import hub
 from shapechanger.cli.console import counted, say
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS
+from shapechanger.demos.exchange.files import new_folder
 from shapechanger.errors import HubError, StudyError
 from shapechanger.files import require_file, write_atomic
 from shapechanger.layout import Layout
+from shapechanger.policy import kind_of, load_policy
 from shapechanger.reports.numbers import duration_text, shares_text
 
 _MAX_POLICY_BYTES: Final = 256 << 20  # As for the files of policies.
@@ -37,8 +40,6 @@ class PushPolicy:
 
     def run(self) -> None:
         """Check the policy, upload it, and print its address."""
-        from shapechanger import hub
-
         card = _policy_card(self.file, self.repo)
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / hub.POLICY).symlink_to(self.file.resolve())
@@ -59,8 +60,6 @@ class PullPolicy:
 
     def run(self) -> None:
         """Download the policy, check it, and print its revision."""
-        from shapechanger import hub
-
         if self.out.exists():
             raise HubError(f"{self.out} exists already: choose another name, or move it away.")
         with tempfile.TemporaryDirectory() as folder:
@@ -96,8 +95,6 @@ class PushDemonstrations:
 
     def run(self) -> None:
         """Check the episodes, upload them, and print their address."""
-        from shapechanger import hub
-
         with tempfile.TemporaryDirectory() as folder:
             episodes = [read_episode(path) for path in episodes_of(self.data)]
             hashes: dict[str, str] = {}
@@ -129,9 +126,6 @@ class PullDemonstrations:
 
     def run(self) -> None:
         """Download and check the episodes, and print their revision."""
-        from shapechanger import hub
-        from shapechanger.demos.exchange.files import new_folder
-
         if not 0.0 < self.max_gib < float("inf"):
             raise HubError(f"--max-gib is more than 0, got {self.max_gib}.")
         with (
@@ -158,7 +152,6 @@ class PullDemonstrations:
 def _described_policy(file: Path) -> dict[str, Any]:
     """Load a policy, which checks its hash, and return its card."""
     from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.policy import kind_of, load_policy
 
     if kind_of(file) == "clone":
         clone = CameraPolicy.load(file).card
@@ -194,8 +187,6 @@ def _features(layout: Layout | None, more: str = "") -> str:
 
 def _policy_card(file: Path, repo: str) -> str:
     """Return the README of a policy."""
-    from shapechanger import hub
-
     about = _described_policy(file)
     rows = {name: about[name] for name in ("env", "learner", "steps", "seed", "version")}
     rows["SHA-256"] = hub.sha256_of(file)

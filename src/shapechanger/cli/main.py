@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import ast
 import errno
 import io
+import itertools
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
-from typing import Annotated, Any, Final, NoReturn, get_args, get_type_hints
+from pathlib import Path
+from typing import Annotated, Any, Final, NoReturn, Union, get_args, get_type_hints
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError, UnknownName
 
@@ -23,39 +28,123 @@ try:
     try:
         import tyro
 
-        from shapechanger.cli.console import plain_console
+        from shapechanger.cli.console import Interrupted, plain_console
     except ImportError:  # pragma: no cover  # Tested in a subprocess.
         sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
-
-    from shapechanger.cli.console import Interrupted
-    from shapechanger.cli.demos import Demos
-    from shapechanger.cli.doctor import ExamineMachine
-    from shapechanger.cli.envs import Envs
-    from shapechanger.cli.finger import Finger
-    from shapechanger.cli.play import Play
-    from shapechanger.cli.policies import Policies
-    from shapechanger.cli.robot import Robot
-    from shapechanger.cli.suite import Suite
-    from shapechanger.cli.train import Train
-    from shapechanger.cli.transfer import Methods, Transfer
 except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
     print("Stopped.", file=sys.stderr)
     sys.exit(_INTERRUPTED)
 
-_Command = (
-    Annotated[Envs, tyro.conf.subcommand("envs")]
-    | Annotated[Train, tyro.conf.subcommand("train")]
-    | Annotated[Play, tyro.conf.subcommand("play")]
-    | Annotated[Transfer, tyro.conf.subcommand("transfer")]
-    | Annotated[Suite, tyro.conf.subcommand("suite")]
-    | Annotated[Methods, tyro.conf.subcommand("methods")]
-    | Annotated[Policies, tyro.conf.subcommand("policies")]
-    | Annotated[Robot, tyro.conf.subcommand("robot")]
-    | Annotated[Demos, tyro.conf.subcommand("demos")]
-    | Annotated[Finger, tyro.conf.subcommand("finger")]
-    | Annotated[ExamineMachine, tyro.conf.subcommand("doctor")]
-)
 
+@dataclass(frozen=True)
+class Group:
+    """Commands with the same first word.
+
+    Attributes:
+        summary: One line for the help.
+        commands: Module and class of each command, keyed by name.
+    """
+
+    summary: str
+    commands: Mapping[str, str | Group]
+
+
+_GROUPS: Final[Mapping[str, str | Group]] = {
+    "envs": Group(
+        "Look at the envs: list, show, compare, check, render.",
+        {
+            "list": "envs:ListEnvs",
+            "show": "envs:ShowEnv",
+            "compare": "envs:Compare",
+            "check": "envs:CheckEnv",
+            "render": "envs:Render",
+        },
+    ),
+    "train": "train:Train",
+    "play": "play:Play",
+    "transfer": "transfer:Transfer",
+    "suite": Group(
+        "Run, watch and merge suites: many studies with one page.",
+        {
+            "run": "suite:RunSuite",
+            "watch": "suite:WatchSuite",
+            "merge": "suite:MergeSuites",
+            "list": "suite:ListSuites",
+        },
+    ),
+    "methods": "transfer:Methods",
+    "policies": Group(
+        "List, inspect, watch, evaluate, export, convert and share policies.",
+        {
+            "list": "policies:ListPolicies",
+            "show": "policies:Show",
+            "play": "policies:PlayPolicy",
+            "evaluate": "policies:EvaluatePolicy",
+            "export": "policies:ExportPolicy",
+            "convert": "policies:Convert",
+            "push": "hub:PushPolicy",
+            "pull": "hub:PullPolicy",
+        },
+    ),
+    "robot": Group(
+        "Set up, serve, find, drive and test robots.",
+        {
+            "init": "robot.setup:Init",
+            "install": "robot.setup:Install",
+            "check": "robot.check:CheckRobot",
+            "calibrate": "robot.calibrate:Calibrate",
+            "camera": "robot.camera:CameraView",
+            "home": "robot.setup:Home",
+            "serve": "robot.serve:Serve",
+            "key": "robot.key:Key",
+            "find": "robot.remote:Find",
+            "remember": "robot.remote:Remember",
+            "forget": "robot.remote:Forget",
+            "drive": "robot.drive:Drive",
+            "fetch": "robot.remote:FetchEpisodes",
+            "stop": "robot.remote:Stop",
+            "safe-pins": "robot.setup:SafePins",
+        },
+    ),
+    "demos": Group(
+        "Record, inspect, edit and share demonstrations, and learn from them.",
+        {
+            "record": "demos.record:RecordDemonstrations",
+            "list": "demos.recordings:ListEpisodes",
+            "show": "demos.recordings:ShowEpisodes",
+            "cut": "demos.recordings:CutEpisode",
+            "bad": "demos.recordings:Bad",
+            "good": "demos.recordings:Good",
+            "mark": "demos.recordings:MarkStep",
+            "merge": "demos.recordings:Merge",
+            "repair": "demos.recordings:RepairEpisodes",
+            "replay": "demos.replay:Replay",
+            "import": "demos.recordings:Import",
+            "export": "demos.recordings:Export",
+            "push": "hub:PushDemonstrations",
+            "pull": "hub:PullDemonstrations",
+            "train": "demos.train:TrainClone",
+            "evaluate": "demos.train:Evaluate",
+        },
+    ),
+    "finger": Group(
+        "Record, identify and export a finger.",
+        {
+            "record": "finger:RecordFinger",
+            "identify": "finger:Identify",
+            "export": "finger:ExportFinger",
+        },
+    ),
+    "doctor": "doctor:ExamineMachine",
+}
+
+COMMANDS: Final = Group(
+    "Learn a skill in one body, move it to another, and measure the gain. Begin with "
+    "`shapechanger doctor`, then `shapechanger transfer InvertedPendulum BigInvertedPendulum "
+    "--quick`; each command has --help.",
+    _GROUPS,
+)
+"""Module and class of each command in this package, so that only the given one is imported."""
 
 # Options that take several values.
 _SEVERAL: Final = ("--set", "--rule", "--arms", "--only")
@@ -102,38 +191,56 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def parse(arguments: Sequence[str]) -> Any:
     """Return the command that a command line names, which its `run` executes."""
-    said, leaf_class = find_command(arguments)
-    if leaf_class is not None:
-        _require_options(arguments, said, leaf_class)
-    _require_single(arguments)
-    command = tyro.cli(
-        _Command,
-        prog="shapechanger",
-        description=(
-            "Learn a skill in one body, move it to another, and measure the gain. Begin with "
-            "`shapechanger doctor`, then `shapechanger transfer InvertedPendulum "
-            "BigInvertedPendulum --quick`; each command has --help."
-        ),
-        args=arguments,
-        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
-    )
-    return getattr(command, "command", command)  # A group holds its subcommand.
+    words, command = find_command(arguments)
+    rest, prog = arguments[len(words) :], " ".join(("shapechanger", *words))
+    kind: Any = Union
+    if isinstance(command, Group):
+        described = [
+            Annotated[_NotLoaded, tyro.conf.subcommand(name, description=_summary(place))]
+            for name, place in command.commands.items()
+        ]
+        kind, description = kind[tuple(described)], command.summary
+    else:
+        _require_options(rest, prog, command)
+        _require_single(rest)
+        kind, description = command, None
+    config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone)
+    return tyro.cli(kind, prog=prog, description=description, args=rest, config=config)
 
 
-def find_command(arguments: Sequence[str]) -> tuple[str, type | None]:
-    """Return the words of the command and its class; None if it has no subcommand yet."""
-    said, kinds = "shapechanger", _commands(_Command)
+@dataclass(frozen=True)
+class _NotLoaded:
+    """Command in the help of its group, which is not imported for that."""
+
+
+def find_command(arguments: Sequence[str]) -> tuple[list[str], type | Group]:
+    """Return the words of the command that a command line begins with, and its class or group."""
+    words: list[str] = []
+    found: str | Group = COMMANDS
     for word in arguments:
-        name = word.replace("_", "-")  # As tyro.
-        if word.startswith("-"):
+        if isinstance(found, str) or word.startswith("-"):
             break
-        if name not in kinds:
-            raise UnknownName(f"command of `{said}`", word, kinds)
-        said, kind = f"{said} {name}", kinds[name]
-        kinds = _commands(kind)
-        if not kinds:
-            return said, kind
-    return said, None
+        name = word.replace("_", "-")  # As tyro.
+        if name not in found.commands:
+            group = " ".join(("shapechanger", *words))
+            raise UnknownName(f"command of `{group}`", word, found.commands)
+        words.append(name)
+        found = found.commands[name]
+    if isinstance(found, Group):
+        return words, found
+    module, _, kind = found.partition(":")
+    return words, getattr(import_module(f"shapechanger.cli.{module}"), kind)
+
+
+def _summary(command: str | Group) -> str:
+    """Return the line of a command in its group's help, from the file of its class."""
+    if isinstance(command, Group):
+        return command.summary
+    module, _, kind = command.partition(":")
+    file = Path(__file__).parent.joinpath(*module.split(".")).with_suffix(".py")
+    classes = (node for node in ast.parse(file.read_text()).body if isinstance(node, ast.ClassDef))
+    text = next(ast.get_docstring(node) for node in classes if node.name == kind) or ""
+    return " ".join(text.partition("\n\n")[0].split())
 
 
 def options_of(kind: type) -> dict[str, Any]:
@@ -154,7 +261,7 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
     named = options_of(kind)
     flags = [name for name, hint in named.items() if hint is bool]
     options = [*named, *(name.replace("--", "--no-", 1) for name in flags), "--help"]
-    for word, value in zip(arguments, [*arguments[1:], "--"], strict=True):
+    for word, value in itertools.pairwise([*arguments, "--"]):
         if not word.startswith("--"):
             continue
         given, equals, _ = word.partition("=")
@@ -178,15 +285,6 @@ def _require_single(arguments: Sequence[str]) -> None:
             raise StudyError(f"{name} is given twice: give it once, with all its values after it.")
     if options.count("--policy") > 1:
         raise StudyError("--policy is given twice, and one policy drives at a time: give it once.")
-
-
-def _commands(kind: Any) -> dict[str, Any]:
-    """Return the subcommands of a command or of a union, keyed by name."""
-    if isinstance(kind, type):
-        grouped = "command" in kind.__annotations__
-        kind = get_type_hints(kind, include_extras=True)["command"] if grouped else None
-    pairs = (get_args(annotated) for annotated in get_args(kind))
-    return {config.name: command for command, config in pairs}
 
 
 def _stop(message: str, code: int) -> NoReturn:

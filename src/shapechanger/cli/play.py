@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.cli.acting import acting_in
 from shapechanger.cli.console import say
 from shapechanger.cli.env_arguments import (
     Body,
@@ -22,6 +23,7 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
+from shapechanger.reports.films import require_film, write_film
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,6 @@ class Watching:
 
     def show(self, ref: EnvRef, policy: Path | None, *, trained_in: bool = False) -> None:
         """Show episodes in a window or write them as a film, and print the returns."""
-        from shapechanger.cli.acting import acting_in
         from shapechanger.transfer.learners.evaluation import random_actions
 
         require_seed(self.seed)
@@ -48,8 +49,6 @@ class Watching:
             raise StudyError("Playing takes at least one episode of one step.")
         out = self.out or (None if has_screen() else Path("play.mp4"))
         if out is not None:
-            from shapechanger.reports.films import require_film
-
             require_film(out)
             if self.out is None:
                 say(f"There is no screen, so this writes {out}; drawing can take minutes.")
@@ -73,8 +72,6 @@ class Watching:
                         frames.append(cast("NDArray[Any]", env.render()))
                 say(f"episode {episode}: return {worth:.1f} in {steps} steps{why}")
             if out is not None:
-                from shapechanger.reports.films import write_film
-
                 write_film(frames, out, float(env.metadata["render_fps"]))
                 say(f"wrote {out}")
 

@@ -14,7 +14,6 @@ from rich.table import Table
 from shapechanger.cli.acting import acting_in, load_any_policy
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
-from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
@@ -337,19 +336,3 @@ class Convert:
         )
         TrainedPolicy(model, None, card).save(self.out)
         say(f"wrote {self.out}")
-
-
-@dataclass(frozen=True)
-class Policies:
-    """List, inspect, watch, evaluate, export, convert and share policies."""
-
-    command: (
-        Annotated[ListPolicies, tyro.conf.subcommand("list")]
-        | Annotated[Show, tyro.conf.subcommand("show")]
-        | Annotated[PlayPolicy, tyro.conf.subcommand("play")]
-        | Annotated[EvaluatePolicy, tyro.conf.subcommand("evaluate")]
-        | Annotated[ExportPolicy, tyro.conf.subcommand("export")]
-        | Annotated[Convert, tyro.conf.subcommand("convert")]
-        | Annotated[PushPolicy, tyro.conf.subcommand("push")]
-        | Annotated[PullPolicy, tyro.conf.subcommand("pull")]
-    )

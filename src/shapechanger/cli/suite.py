@@ -33,11 +33,18 @@ from shapechanger.envs.suite_file import (
     suite_tasks,
 )
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
-from shapechanger.files import read_json, write_json
+from shapechanger.files import read_json, write_atomic, write_json
 from shapechanger.reports.numbers import interval_text
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import resolve_learner
-from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
+from shapechanger.transfer.plan import (
+    PLAN_FILE,
+    SOURCE,
+    Plan,
+    TransferTask,
+    planned_arms,
+    read_plan,
+)
 
 if TYPE_CHECKING:
     from shapechanger.transfer.report.suite import FilmStrip
@@ -183,7 +190,6 @@ class MergeSuites:
 
     def run(self) -> None:
         """Copy what has ended, and report the studies that are complete."""
-        from shapechanger.transfer.plan import PLAN_FILE
         from shapechanger.transfer.study import STUDY_FILE, looks_in, run_study, unfinished_runs
         from shapechanger.transfer.suite import merge_study
 
@@ -230,21 +236,8 @@ class ListSuites:
         print_table(table)
 
 
-@dataclass(frozen=True)
-class Suite:
-    """Run, watch and merge suites: many studies with one page."""
-
-    command: (
-        Annotated[RunSuite, tyro.conf.subcommand("run")]
-        | Annotated[WatchSuite, tyro.conf.subcommand("watch")]
-        | Annotated[MergeSuites, tyro.conf.subcommand("merge")]
-        | Annotated[ListSuites, tyro.conf.subcommand("list")]
-    )
-
-
 def _progress_table(out: Path) -> tuple[Table, bool]:
     """A row for each study in a suite's folder, and whether all are complete."""
-    from shapechanger.transfer.plan import PLAN_FILE, planned_arms, read_plan
     from shapechanger.transfer.runs import last_evaluation, load_result
 
     table = Table("study", "runs", "steps", "at work", box=None)
@@ -304,7 +297,6 @@ class _Page:
     def add(self, name: str, study: Study) -> None:
         """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.envs.study_films import film_study
-        from shapechanger.files import write_atomic
         from shapechanger.transfer.report.study import write_study_report
         from shapechanger.transfer.report.suite import Sweep, suite_html
 

@@ -16,6 +16,8 @@ from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_trait
 from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.files import make_folder, require_file
+from shapechanger.policy import load_policy
+from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.presets import in_many_bodies, resolve_learner, tuning_text
 
 if TYPE_CHECKING:
@@ -84,7 +86,6 @@ class Train:
 
     def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
-        from shapechanger.transfer.learners import SharedFile
         from shapechanger.transfer.runs import learner_of
 
         own = "limbs" if self.bodies else default_learner(env)
@@ -134,7 +135,6 @@ class Train:
 
     def _by_teacher(self, env: EnvRef, out: Path, teacher: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training of a student of another policy."""
-        from shapechanger.policy import load_policy
         from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student
 
         if self.learner is not None or self.set or self.tensorboard is not None:

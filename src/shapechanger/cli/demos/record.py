@@ -13,7 +13,9 @@ from gymnasium.wrappers import TimeLimit
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
 from shapechanger.cli.env_arguments import Body, EnvId, options_of, require_seed
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.drivers import EXPERT
+from shapechanger.demos.drivers import EXPERT, CorrectedPilot, record_steps
+from shapechanger.demos.pilots import pilot_of
+from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.envs.naming import driven, env_ref
 from shapechanger.errors import DemosError
@@ -48,9 +50,6 @@ class RecordDemonstrations:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from shapechanger.demos.drivers import CorrectedPilot, record_steps
-        from shapechanger.demos.pilots import pilot_of
-        from shapechanger.demos.recording import RecordEpisodes
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
         require_seed(self.seed)

@@ -27,6 +27,9 @@ from shapechanger.demos.episodes import (
     read_episode,
     repair,
 )
+from shapechanger.demos.exchange import export_recording, formats, import_recording
+from shapechanger.demos.merging import merge
+from shapechanger.demos.report import distributions, recording_html
 from shapechanger.demos.statistics import summary
 from shapechanger.errors import DemosError
 from shapechanger.files import require_file, write_atomic
@@ -100,8 +103,6 @@ class ShowEpisodes:
 
     def run(self) -> None:
         """Print the summary and write the page."""
-        from shapechanger.demos.report import distributions
-
         episodes: list[Episode] = []
         broken: list[str] = []
         for path in episodes_of(self.data):
@@ -120,7 +121,6 @@ class ShowEpisodes:
             say(sentence)
         if self.out is None:
             return
-        from shapechanger.demos.report import recording_html
 
         name = self.data.resolve().name
         write_atomic(self.out, recording_html(name, episodes, broken).encode())
@@ -239,8 +239,6 @@ class Merge:
 
     def run(self) -> None:
         """Merge and print a summary."""
-        from shapechanger.demos.merging import merge
-
         done = merge(self.data, self.out)
         for source, target in done.episodes:
             if source.name != target.name:
@@ -319,8 +317,6 @@ class Import:
 
     def run(self) -> None:
         """Import and print a summary; exit with 3 if something was left out."""
-        from shapechanger.demos.exchange import import_recording
-
         done = import_recording(
             self.source,
             self.out,
@@ -363,8 +359,6 @@ class Export:
 
     def run(self) -> None:
         """Export and print a summary."""
-        from shapechanger.demos.exchange import export_recording, formats
-
         done = export_recording(
             self.data, self.out, self.to, dropped=self.dropped, task=self.task, images=self.images
         )

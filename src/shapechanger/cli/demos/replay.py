@@ -10,8 +10,10 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.demos.episodes import episode_at
+from shapechanger.demos.replay import play_in_env, write_episode_film
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import DemosError
+from shapechanger.robot.client.replay import play_on_robot
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,6 @@ class Replay:
         episode = episode_at(self.episode)
         if not episode.kept:
             raise DemosError(f"No step of {episode.path} counts: `shapechanger demos good` it.")
-        from shapechanger.demos.replay import play_in_env, write_episode_film
-        from shapechanger.robot.client.replay import play_on_robot
 
         if self.film is not None:
             say(write_episode_film(episode, self.film))

@@ -16,6 +16,9 @@ from shapechanger.cli.env_arguments import require_seed
 from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import require_file, write_atomic
+from shapechanger.transfer.learners.presets import LEARNERS
+from shapechanger.vehicles.cameras.rectify import CameraGeometry, CanonicalView
+from shapechanger.vehicles.waypoints import SteeringResponse, as_waypoints
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.evaluation import EvaluationResult
@@ -69,7 +72,6 @@ class TrainClone:
         from shapechanger.demos.cloning.learn import learn
         from shapechanger.demos.cloning.settings import settings_for
         from shapechanger.demos.cloning.shrinking import ShrunkFrames
-        from shapechanger.transfer.learners.presets import LEARNERS
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
         view = self._view()
@@ -82,8 +84,6 @@ class TrainClone:
         data = load_dataset(self.data, shrink=shrinking)
         origin: dict[str, Any] = {}
         if view is not None:
-            from shapechanger.vehicles.waypoints import as_waypoints
-
             shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):
                 say(note)
@@ -175,14 +175,10 @@ class TrainClone:
 
 def _view(camera: tuple[float, float] | None) -> CanonicalView:
     """Return how pictures are warped to the virtual camera, from pitch and field of view given."""
-    from shapechanger.vehicles.cameras.rectify import CameraGeometry, CanonicalView
-
     return CanonicalView(None if camera is None else CameraGeometry(*camera))
 
 
 def _response(given: tuple[float, float] | None) -> SteeringResponse | None:
-    from shapechanger.vehicles.waypoints import SteeringResponse
-
     return None if given is None else SteeringResponse(*given)
 
 
@@ -257,8 +253,6 @@ class Evaluate:
         shrinking = ShrunkFrames(policy.card.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         if view is not None and view.rectifiers:
-            from shapechanger.vehicles.waypoints import as_waypoints
-
             shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):
                 say(note)
