@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 import pytest
 
@@ -20,7 +20,7 @@ from shapechanger.robot.link.messages import (
 )
 
 PAGE: Final = (Path(__file__).parents[3] / "docs" / "wire.md").read_text()
-MESSAGES: Final = [*get_args(ClientMessage), *get_args(RobotMessage)]
+MESSAGES: Final = [*ClientMessage.__subclasses__(), *RobotMessage.__subclasses__()]
 
 
 def rows(head: str) -> dict[str, str]:

@@ -13,7 +13,7 @@ from shapechanger.demos.episodes import episode_at
 from shapechanger.demos.replay import play_in_env, write_episode_film
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import DemosError
-from shapechanger.robot.client.replay import play_on_robot
+from shapechanger.robot.client.recordings import play_on_robot
 
 
 @dataclass(frozen=True)

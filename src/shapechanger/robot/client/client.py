@@ -270,16 +270,16 @@ class RobotClient(Inbox):
         return self._ask_disk(
             messages.Record(on=on, name=name),
             messages.RecorderState,
-            accepts=lambda state: state.recording == on and bool(state.episode),
+            lambda state: state.recording == on and bool(state.episode),
         )
 
     def mark(self, text: str = "") -> messages.RecorderState:
         """Mark the newest step of the episode being recorded; raises as `record` does."""
-        before = 0 if self.recorder is None else self.recorder.marks
+        before = self.recorder.marks if self.recorder else 0
         return self._ask_disk(
             messages.Mark(text=text),
             messages.RecorderState,
-            accepts=lambda state: state.marks > before,
+            lambda state: state.marks > before,
         )
 
     def undo(self, seconds: float = 5.0) -> messages.RecorderState:
@@ -288,11 +288,11 @@ class RobotClient(Inbox):
         Args:
             seconds: How far back, s, above 0.
         """
-        before = 0 if self.recorder is None else self.recorder.dropped
+        before = self.recorder.dropped if self.recorder else 0
         return self._ask_disk(
             messages.Undo(seconds=seconds),
             messages.RecorderState,
-            accepts=lambda state: state.dropped > before,
+            lambda state: state.dropped > before,
         )
 
     def run_policy(self, name: str) -> messages.PolicyState:
@@ -308,39 +308,33 @@ class RobotClient(Inbox):
         return self._ask_disk(
             messages.RunPolicy(policy=name),
             messages.PolicyState,
-            accepts=lambda state: state.running == name,
+            lambda state: state.running == name,
         )
 
-    def browse(self, before: str = "", timeout_s: float = _DISK_S) -> messages.Recordings:
+    def browse(self, before: str = "") -> messages.Recordings:
         """List the episodes on the robot, newest first.
 
         Args:
             before: Only episodes whose id sorts before this one; "" for the newest.
-            timeout_s: Time limit, s.
 
         Raises:
             RobotRefused: If the robot has no folder for recordings.
             LinkError: If it does not answer in time.
         """
-        return self._ask_disk(messages.Browse(before=before), messages.Recordings, timeout_s)
+        return self._ask_disk(messages.Browse(before=before), messages.Recordings)
 
-    def fetch(
-        self, episode: str, first: int = 0, count: int = 1_000, timeout_s: float = _DISK_S
-    ) -> messages.Piece:
+    def fetch(self, episode: str, first: int = 0, count: int = 1_000) -> messages.Piece:
         """Read a part of an episode on the robot's disk; raises as `browse` does.
 
         Args:
             episode: Id of the episode.
             first: Number of the first line, from 0.
             count: Most lines to read; fewer are sent where the message would be too large.
-            timeout_s: Time limit, s.
         """
         request = messages.Fetch(episode=episode, first=first, count=count)
-        return self._ask_disk(request, messages.Piece, timeout_s)
+        return self._ask_disk(request, messages.Piece)
 
-    def judge(
-        self, episode: str, first: int, last: int, *, keep: bool, timeout_s: float = _DISK_S
-    ) -> messages.EpisodeSummary:
+    def judge(self, episode: str, first: int, last: int, *, keep: bool) -> messages.EpisodeSummary:
         """Keep or drop steps of an episode; only as a person.
 
         Args:
@@ -348,7 +342,6 @@ class RobotClient(Inbox):
             first: Number of the first step.
             last: Number of the last step, inclusive.
             keep: Whether to use the steps for training.
-            timeout_s: Time limit, s.
 
         Returns:
             The episode after the change.
@@ -358,16 +351,16 @@ class RobotClient(Inbox):
             LinkError: If the robot does not answer in time.
         """
         request = messages.Judge(episode=episode, first=first, last=last, keep=keep)
-        return self._ask_disk(request, messages.Recordings, timeout_s).episodes[0]
+        return self._ask_disk(request, messages.Recordings).episodes[0]
 
-    def ping(self, timeout_s: float | None = None) -> tuple[float, int]:
+    def ping(self) -> tuple[float, int]:
         """Measure the round trip.
 
         Returns:
             The round trip, s, and the robot's time at its answer, ns.
         """
         start = time.monotonic()
-        pong = self._ask(messages.Ping(), messages.Pong, timeout_s)
+        pong = self._ask(messages.Ping(), messages.Pong)
         return time.monotonic() - start, pong.now_ns
 
     def close(self) -> None:
@@ -414,21 +407,20 @@ class RobotClient(Inbox):
         self,
         message: ClientMessage,
         kind: type[_Answer],
-        timeout_s: float = _DISK_S,
         accepts: Callable[[_Answer], bool] = lambda _: True,
     ) -> _Answer:
         """Ask a question about recordings, of which a robot answers one at a time."""
         # A field out of range is an error before anything is sent.
         messages.decode_client_message(messages.encode(message))
         with self._asking:
-            return self._ask(message, kind, timeout_s, accepts)
+            return self._ask(message, kind, accepts, _DISK_S)
 
     def _ask(
         self,
         message: ClientMessage,
         kind: type[_Answer],
-        timeout_s: float | None = None,
         accepts: Callable[[_Answer], bool] = lambda _: True,
+        timeout_s: float | None = None,
     ) -> _Answer:
         with self.request(kind, accepts) as request:
             self._post(message)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from functools import partial
 from typing import Any, Final, Literal
 
 import gymnasium as gym
@@ -18,7 +19,7 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.known_robots import KnownRobot, known_names, recall
-from shapechanger.robot.client.observations import BUMP, RobotSpaces, StepMeter, View
+from shapechanger.robot.client.observations import RobotSpaces, StepMeter, View
 from shapechanger.robot.client.operator import Preparation, Takeover, interruption
 from shapechanger.robot.link.messages import Observation, Pace, Role, Welcome
 
@@ -136,20 +137,27 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if not callable(on_reset) and on_reset not in _WAYS_TO_RESET:
             raise UnknownName("way to reset", on_reset, _WAYS_TO_RESET)
         self._robot = _resolve(robot)
-        self._key, self._fingerprint = key, fingerprint
+        self._open = partial(
+            RobotClient.connect,
+            self._robot,
+            key=key,
+            fingerprint=fingerprint,
+            role=role,
+            name=name,
+            pace=pace,
+            frames=image is not False or render_mode == "rgb_array",
+            timeout_s=timeout_s,
+        )
         self._pace: Pace = pace
         self._role: Role = role
-        self._name = name
         self._takeover = Takeover(allowed=interventions)
         self._on_reset = on_reset
         self._on_waiting = on_waiting
         self._reset_timeout_s = reset_timeout_s
-        self._timeout_s = timeout_s
         self.render_mode = render_mode
-        self._clock = time.monotonic
-        self._frames = image is not False or render_mode == "rgb_array"
-        self._client = self._connect()
-        try:
+        with ExitStack() as opened:
+            self._client = self._connect()
+            opened.callback(self._client.close)
             welcome = self._client.welcome
             wide, high = size or welcome.image_size or (160, 120)
             self._spaces = RobotSpaces(welcome, (int(wide), int(high)), image, state)
@@ -160,19 +168,15 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
                     f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so "
                     "commands would expire before they act: pass pace='lockstep'."
                 )
-        except BaseException:
-            self._client.close()
-            raise
+            opened.pop_all()
         self.observation_space = self._spaces.observation_space
         self.action_space = self._spaces.action_space
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
-        longest_s = welcome.max_observation_age_ms / 1e3
-        self._patience_s = max_observation_age_s or longest_s
+        self._patience_s = max_observation_age_s or welcome.max_observation_age_ms / 1e3
         if pace == "lockstep":
             self._patience_s = _LOCKSTEP_S
-        self._schedule = Schedule(1.0 / welcome.control_hz, self._clock)
+        self._schedule = Schedule(1.0 / welcome.control_hz, time.monotonic)
         self._last: Received | None = None
-        self._last_view: View | None = None
         self._missed = 0
         self._has_stepped = False
 
@@ -216,7 +220,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         """
         super().reset(seed=seed)
         known_as = self._robot.name if isinstance(self._robot, KnownRobot) else ""
-        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._clock, known_as)
+        ready = Preparation(self._reset_timeout_s, self._on_waiting, known_as)
         if not self._client.alive:
             self._client = ready.connect(self._connect)
             self._spaces.reconnect()
@@ -233,9 +237,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         ready.arm(robot, self._role, by_person=self._on_reset == "person")
         if self._on_reset == "routine":
             ready.play(robot)
-        received = ready.first(robot, self._spaces.rest, self._is_after)
+        self._last = received = ready.first(robot, self._spaces.rest, self._is_after)
         view = self._spaces.view(received)
-        self._last, self._last_view = received, view
         self._meter.start(received.message)
         self._takeover.start()
         self._missed, self._has_stepped = 0, False
@@ -258,31 +261,33 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if not self._has_stepped:
             self._schedule.start()
             self._has_stepped = True
-        sent_at = self._clock()
+        sent_at = time.monotonic()
         try:
             seq = self._takeover.act(robot, values, last.message)
             received = self._next(robot, last, sent_at)
             view = self._spaces.view(received)
         except LinkError as failure:
-            return self._cut(last, str(failure))
-        late = self._schedule.advance(received.received_at)
-        self._missed += late and self._pace == "realtime"
+            self._last = None
+            view = self._spaces.view(last)
+            measured = self._meter.measure(last.message, last.message, bumped=False)
+            terms = dict.fromkeys(self._reward.terms(*measured), 0.0)
+            info = self._info(last, view, truncated_because=str(failure), reward_terms=terms)
+            info |= terms | {"events": (), "refused": "", "latency": {}, "frame_repeated": True}
+            return view.observation, 0.0, False, True, info
+        self._missed += self._schedule.advance(received.received_at) and self._pace == "realtime"
         events = robot.events()
-        bumped = any(event.name == BUMP for event in events)
+        bumped = any(event.name == "bump" for event in events)
         measured = self._meter.measure(last.message, received.message, bumped)
         terms = self._reward.terms(*measured)
-        info = self._info(received, view)
-        info |= terms
-        info["reward_terms"] = terms
+        is_lent = self._takeover.goes_on(received.message)
+        because = "" if is_lent else interruption(received.message)
+        info = self._info(received, view, truncated_because=because, reward_terms=terms) | terms
         info["events"] = tuple(event.text for event in events)
         info["refused"] = robot.refusal(seq)
-        clock = robot.welcome.clock
-        info["latency"] = latencies(last.message, seq, sent_at, received, clock)
-        is_lent = self._takeover.goes_on(received.message)
-        info["truncated_because"] = "" if is_lent else interruption(received.message)
-        self._last, self._last_view = received, view
-        terminated = self._reward.ends(measured.collided)
-        truncated = not terminated and bool(info["truncated_because"])
+        info["latency"] = latencies(last.message, seq, sent_at, received, self.welcome.clock)
+        self._last = received
+        terminated = self._reward.ends(measured[1])
+        truncated = not terminated and bool(because)
         return view.observation, sum(terms.values()), terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -317,16 +322,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self.spec = state["spec"]
 
     def _connect(self) -> RobotClient:
-        client = RobotClient.connect(
-            self._robot,
-            key=self._key,
-            fingerprint=self._fingerprint,
-            role=self._role,
-            name=self._name,
-            pace=self._pace,
-            frames=self._frames,
-            timeout_s=self._timeout_s,
-        )
+        client = self._open()
         # An env that is dropped without `close` must not keep control.
         weakref.finalize(self, client.abandon)
         return client
@@ -350,31 +346,13 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             found = robot.observation(found.message.seq, left_s + self._patience_s)
         while (left_s := self._schedule.left_s) > 0.0:
             robot.acknowledge()
-            with contextlib.suppress(StaleObservation):
+            with suppress(StaleObservation):
                 found = robot.observation(found.message.seq, left_s)
         return found
 
-    def _cut(self, last: Received, because: str) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Return the end of an episode after a lost link."""
-        view = self._spaces.view(last)
-        info = self._info(last, view)
-        measured = self._meter.measure(last.message, last.message, False)
-        terms = dict.fromkeys(self._reward.terms(*measured), 0.0)
-        info |= terms
-        info |= {
-            "reward_terms": terms,
-            "events": (),
-            "refused": "",
-            "latency": {},
-            "truncated_because": because,
-            "frame_repeated": True,
-        }
-        self._last = None
-        return view.observation, 0.0, False, True, info
-
-    def _info(self, received: Received, view: View) -> dict[str, Any]:
+    def _info(self, received: Received, view: View, **facts: Any) -> dict[str, Any]:
         message = received.message
-        info: dict[str, Any] = {
+        info = facts | {
             "action_applied": np.array(message.action_applied, np.float32),
             "stop_reason": message.stop_reason,
             "armed": message.armed,
@@ -389,7 +367,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if by_person is not None:
             info["intervene_action"] = np.array(by_person, np.float32)
         if self._spaces.has_image:
-            info["frame_age"] = frame_age_s(received, self._clock())
+            on_robot_s = (message.sent_ns - message.captured_ns) / _NS_PER_S
+            info["frame_age"] = on_robot_s + time.monotonic() - received.received_at
             info["frame_repeated"] = not view.fresh
         return info
 
@@ -464,6 +443,14 @@ def latencies(
     if seen.applied_seq != seq or not seen.mine:
         return known
     if seen.command_ns is not None:
+        on_robot_s = (seen.sent_ns - seen.command_ns) / _NS_PER_S
+        if clock == "real":
+            known["round_trip"] = received.received_at - sent_at - on_robot_s
+        known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
+        if seen.applied_ns is not None:
+            known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
+    return known
+    if seen.command_ns is not None:
         on_robot = (seen.sent_ns - seen.command_ns) / _NS_PER_S
         if clock == "real":
             known["round_trip"] = received.received_at - sent_at - on_robot
@@ -471,17 +458,6 @@ def latencies(
     if seen.command_ns is not None and seen.applied_ns is not None:
         known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
     return known
-
-
-def frame_age_s(received: Received, now: float) -> float:
-    """Return the age of an observation's frame, s, without its time on the network.
-
-    Args:
-        received: The observation.
-        now: Time on this machine's clock, s.
-    """
-    seen = received.message
-    return (seen.sent_ns - seen.captured_ns) / _NS_PER_S + now - received.received_at
 
 
 def _resolve(robot: str) -> KnownRobot | str:

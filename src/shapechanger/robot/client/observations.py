@@ -3,46 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import LinkError, MissingExtra, RobotRefused, SpaceMismatch
+from shapechanger.demos.jpeg import decode_picture
+from shapechanger.errors import DemosError, LinkError, RobotRefused, SpaceMismatch
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.link.messages import Observation, Welcome
 
-try:
-    import simplejpeg  # pyright: ignore[reportMissingTypeStubs]  # Typed, but for its arrays.
-except ImportError as error:
-    raise MissingExtra("simplejpeg", "remote") from error
-
 IMAGE: Final = "camera/image"
 """Name of the picture in an observation layout."""
 
-BUMP: Final = "bump"
-"""Name of the bump event, and of the quantity."""
-
-# A few bytes of JPEG can claim 65,535 x 65,535 pixels, which is 12 GB.
-_MAX_PIXELS: Final = 4096 * 4096
 _ABSENT: Final = "absent"
 _BRIGHTEST: Final = 255
 _NS_PER_S: Final = 1e9
-_QUANTITIES: Final = ("speed", "collision", "stall")
-
-
-def decode_picture(jpeg: bytes) -> NDArray[np.uint8]:
-    """Decode a JPEG to RGB, shape (height, width, 3)."""
-    try:
-        height, width = (int(n) for n in simplejpeg.decode_jpeg_header(jpeg)[:2])
-        if height * width > _MAX_PIXELS:
-            raise LinkError(f"A picture of {width} x {height} pixels is too large.")
-        return simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
-    except ValueError as error:
-        raise LinkError(f"The robot sent an invalid JPEG: {error}.") from None
 
 
 def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -67,8 +45,7 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
     return picture[rows[:, None], columns[None, :]]
 
 
-@dataclass(frozen=True, slots=True)
-class View:
+class View(NamedTuple):
     """Observation of an env, and facts for its `info`.
 
     Attributes:
@@ -109,20 +86,12 @@ class RobotSpaces:
         self._size = size
         self.has_image = has_camera if image is None else image
         self._has_state = state or not self.has_image
-        self._state_layout = Layout.from_json(welcome.state_layout)
-        self._state_size = self._state_layout.size
-        self._places: dict[str, int] = {
-            name: place.start for name, place in self._state_layout.slices.items()
-        }
         self.action_layout = Layout.from_json(welcome.action_layout)
-        self._low, self._high = self.action_layout.low, self.action_layout.high
-        self.action_space = gym.spaces.Box(
-            self._low.astype(np.float32), self._high.astype(np.float32)
-        )
-        low, high = (
-            bound.astype(np.float32) for bound in (self._state_layout.low, self._state_layout.high)
-        )
-        space: gym.Space[Any] = gym.spaces.Box(low, high)
+        self.action_space = _box(self.action_layout)
+        self._action_range = self.action_layout.low, self.action_layout.high
+        self._state_layout = Layout.from_json(welcome.state_layout)
+        self._places = self._state_layout.slices
+        space: gym.Space[Any] = _box(self._state_layout)
         features = self._state_layout.features if self._has_state else ()
         if self.has_image:
             shape = (size[1], size[0], 3)
@@ -134,9 +103,11 @@ class RobotSpaces:
         self.observation_layout = Layout(features)
         self.observation_space = space
         self.picture: NDArray[np.uint8] | None = None
-        self._tried_seq = 0
-        self._picture_seq = 0
-        self._viewed_seq = 0
+        self.reconnect()
+
+    def reconnect(self) -> None:
+        """Forget the numbers of frames: after a restart, the robot counts from 1 again."""
+        self._tried_seq = self._picture_seq = self._viewed_seq = 0
 
     def values(self, action: Any) -> tuple[float, ...]:
         """Return the values of a command, clipped to the range of the action."""
@@ -146,25 +117,26 @@ class RobotSpaces:
                 f"An action of this robot is {len(self.action_layout)} finite numbers "
                 f"({', '.join(self.action_layout.names)}), got {array.tolist()}."
             )
-        return tuple(np.clip(array, self._low, self._high).tolist())
+        return tuple(np.clip(array, *self._action_range).tolist())
 
     @property
     def rest(self) -> tuple[float, ...]:
         """The action at rest: 0, or the bound nearest to it."""
         return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
 
-    def quantity(self, message: Observation, name: str) -> float | None:
-        """Return a quantity of the state, or None if no sensor measures it."""
-        place = self._places.get(name)
-        if place is None or message.sources.get(name, _ABSENT) == _ABSENT:
-            return None
-        value = message.state[place]
-        return None if math.isnan(value) else value
+    def quantity(self, message: Observation, *names: str) -> tuple[float | None, str]:
+        """Return the first quantity of these names that is measured.
 
-    def source(self, message: Observation, name: str) -> str:
-        """Return the source of a quantity: name of the sensor, "estimated" or "absent"."""
-        is_measured = self.quantity(message, name) is not None
-        return message.sources[name] if is_measured else _ABSENT
+        Returns:
+            Its value, or None; and its source: name of the sensor, "estimated" or "absent".
+        """
+        for name in names:
+            source = message.sources.get(name, _ABSENT)
+            if name in self._places and source != _ABSENT:
+                value = message.state[int(self._places[name].start)]
+                if not math.isnan(value):
+                    return value, source
+        return None, _ABSENT
 
     def shows(self, received: Received) -> bool:
         """Decode the frame of an observation. Return False for a missing or invalid frame.
@@ -177,22 +149,18 @@ class RobotSpaces:
         if seq != self._tried_seq:  # An invalid frame is tried once, too.
             self._tried_seq = seq
             try:
-                self.picture = decode_picture(received.jpeg)
-            except LinkError:
+                self.picture = decode_picture(received.jpeg, "")
+            except DemosError:
                 return False
             self._picture_seq = seq
         return seq == self._picture_seq
 
-    def reconnect(self) -> None:
-        """Forget the numbers of frames: after a restart, the robot counts from 1 again."""
-        self._tried_seq = self._picture_seq = self._viewed_seq = 0
-
     def view(self, received: Received) -> View:
         """Return the env's observation for an observation of the robot."""
         message = received.message
-        if len(message.state) != self._state_size:
+        if len(message.state) != self._state_layout.size:
             raise LinkError(
-                f"The state layout has {self._state_size} numbers, and the robot sent "
+                f"The state layout has {self._state_layout.size} numbers, and the robot sent "
                 f"{len(message.state)}."
             )
         state, absent = self._state(message)
@@ -210,31 +178,19 @@ class RobotSpaces:
     def _state(self, message: Observation) -> tuple[NDArray[np.float32], tuple[str, ...]]:
         """Return the state with absent values at the middle of their range, and their names."""
         state = np.array(message.state, dtype=np.float32)
-        missing = np.isnan(state)
-        if not missing.any():
+        if not np.isnan(state).any():
             return state, ()
-        features, places = self._state_layout.features, self._state_layout.slices
-        absent = [f for f in features if missing[places[f.name]].any()]
-        for feature in absent:
-            block = state[places[feature.name]]
-            block[np.isnan(block)] = feature.middle
-        return state, tuple(feature.name for feature in absent)
+        absent: list[str] = []
+        for feature in self._state_layout:
+            block = state[self._places[feature.name]]
+            if (missing := np.isnan(block)).any():
+                absent.append(feature.name)
+                block[missing] = feature.middle
+        return state, tuple(absent)
 
 
-class StepMeasures(NamedTuple):
-    """Measured quantities of one step, from which a task computes its reward.
-
-    Attributes:
-        speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.
-        collided: Whether the robot touches something that it did not touch before; None if unknown.
-        stalled: Whether it pushes without moving; None if unknown.
-        dt_s: Duration of the step, s, at least 0.
-    """
-
-    speed_mps: float | None
-    collided: bool | None
-    stalled: bool | None
-    dt_s: float
+def _box(layout: Layout) -> gym.spaces.Box[np.float32]:
+    return gym.spaces.Box(layout.low.astype(np.float32), layout.high.astype(np.float32))
 
 
 class StepMeter:
@@ -248,29 +204,27 @@ class StepMeter:
         """Begin an episode; an obstacle that is touched already does not count as a collision."""
         self._touched = bool(self._touches(seen)[0])
 
-    def measure(self, before: Observation, seen: Observation, bumped: bool) -> StepMeasures:
-        """Return the measured quantities of a step."""
-        touches = self._touches(seen)[0]
-        stall = self._spaces.quantity(seen, "stall")
+    def measure(
+        self, before: Observation, seen: Observation, bumped: bool
+    ) -> tuple[float | None, bool | None, bool | None, float]:
+        """Return the quantities of a step, as `DriveReward.terms` takes them."""
+        speed, _ = self._spaces.quantity(seen, "speed")
+        stall, _ = self._spaces.quantity(seen, "stall")
+        touches, _ = self._touches(seen)
         hits = bool(touches) or bumped
         collided = None if touches is None else hits and not self._touched
         self._touched = hits
-        return StepMeasures(
-            self._spaces.quantity(seen, "speed"),
-            collided,
-            None if stall is None else bool(stall),
-            max(0, seen.state_ns - before.state_ns) / _NS_PER_S,
-        )
+        dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
+        return speed, collided, None if stall is None else bool(stall), dt_s
 
     def sources(self, seen: Observation) -> dict[str, str]:
         """Return the source of each quantity of the reward."""
-        sources = {name: self._spaces.source(seen, name) for name in _QUANTITIES}
-        return sources | {"collision": self._touches(seen)[1]}
+        return {
+            "speed": self._spaces.quantity(seen, "speed")[1],
+            "collision": self._touches(seen)[1],
+            "stall": self._spaces.quantity(seen, "stall")[1],
+        }
 
     def _touches(self, seen: Observation) -> tuple[float | None, str]:
         """Return whether the robot touches something, 0 or 1, and the source."""
-        for quantity in ("collision", BUMP):
-            value = self._spaces.quantity(seen, quantity)
-            if value is not None:
-                return value, self._spaces.source(seen, quantity)
-        return None, _ABSENT
+        return self._spaces.quantity(seen, "collision", "bump")

@@ -26,19 +26,17 @@ class Preparation:
     """Steps of one reset, with one time limit for all of them."""
 
     def __init__(
-        self,
-        timeout_s: float,
-        on_waiting: Callable[[str], object] | None,
-        clock: Callable[[], float],
-        known_as: str = "",
+        self, timeout_s: float, on_waiting: Callable[[str], object] | None, known_as: str
     ) -> None:
         self._timeout_s = timeout_s
         self._on_waiting = on_waiting
-        self._clock = clock
         self._known_as = known_as
-        self._since = clock()
-        self._until = self._since + timeout_s
+        self._since = time.monotonic()
         self._reported: set[str] = set()
+
+    @property
+    def _left_s(self) -> float:
+        return self._since + self._timeout_s - time.monotonic()
 
     def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
         """Connect, with retries."""
@@ -55,12 +53,10 @@ class Preparation:
         """Take control, once no other client has it."""
         while True:
             try:
-                robot.take()
+                return robot.take()
             except RobotRefused as refusal:
                 if not self._wait(str(refusal), _HAND_OVER):
                     raise
-            else:
-                return
 
     def disarm(self, robot: RobotClient) -> None:
         """Disarm the robot, so that a person can put it back."""
@@ -81,7 +77,7 @@ class Preparation:
         waits_for = f"{name} waits for its operator: put it at the start and arm it: {how}."
         while True:
             seen = robot.ask().message
-            if not seen.mine and self._clock() <= self._until:
+            if not seen.mine and self._left_s >= 0.0:
                 # A person has control, and gives it back to arm the robot for us.
                 self.take(robot)
                 continue
@@ -91,10 +87,9 @@ class Preparation:
             if role == "person" or may:
                 try:
                     robot.arm()
+                    continue
                 except RobotRefused as refusal:
                     because = str(refusal).rstrip(".")
-                else:
-                    continue
             if not self._wait(waits_for):
                 stopped = f" ({seen.stop_reason.rstrip('.')})" if seen.stop_reason else ""
                 raise RobotRefused(
@@ -132,7 +127,7 @@ class Preparation:
         _, now_ns = robot.ping()
         seen = robot.ask()
         while not is_new(seen, now_ns):
-            if self._clock() > self._until:
+            if self._left_s < 0.0:
                 raise LinkError(
                     f"{robot.welcome.robot} sends no new observation. Does its camera still work?"
                 )
@@ -141,17 +136,15 @@ class Preparation:
 
     def _wait(self, sentence: str, hint: str = "") -> bool:
         """Wait a moment. Return False after the time limit."""
-        now = self._clock()
-        is_due = self._on_waiting is not None or now - self._since > _LOG_AFTER_S
-        if is_due and sentence not in self._reported:
-            self._reported.add(sentence)
+        if sentence not in self._reported:
             if self._on_waiting is not None:
+                self._reported.add(sentence)
                 self._on_waiting(sentence)
-            else:
+            elif self._timeout_s - self._left_s > _LOG_AFTER_S:
+                self._reported.add(sentence)
                 words = f"{sentence} {hint}".rstrip()
-                left_s = max(0.0, self._until - now)
-                _log.warning("%s (Waiting for up to %.0f s more.)", words, left_s)
-        if self._clock() > self._until:
+                _log.warning("%s (Waiting for up to %.0f s more.)", words, max(0.0, self._left_s))
+        if self._left_s < 0.0:
             return False
         time.sleep(_POLL_S)
         return True

@@ -1,25 +1,35 @@
-"""Recordings on a robot: their list, their download, and recording for the time of a block."""
+"""Recordings and robots: their list, their download, recording for a while, and replay."""
 
 from __future__ import annotations
 
 import os
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from shapechanger.demos.episodes import Episode
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode, lock, write_all
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
-from shapechanger.errors import DemosError, OutputError, UnknownName
+from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
+from shapechanger.errors import (
+    DemosError,
+    LinkError,
+    OutputError,
+    RobotRefused,
+    UnknownName,
+    translate_errors,
+)
 from shapechanger.files import cannot_write, write_atomic
+from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.link.messages import EpisodeSummary, Piece
+from shapechanger.robot.client.known_robots import recall
+from shapechanger.robot.client.teleop import Terminal
+from shapechanger.robot.link.messages import EpisodeSummary, Piece, Welcome
 
-_PART: Final = ".fetching"
 _STEP: Final = b'{"kind":"step",'
-_LINES: Final = 1_000
 _CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps.
 _LOOK_EVERY_S: Final = 0.1
 
@@ -58,19 +68,17 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
     An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
     here are kept after the robot's, so that they override these.
     """
-    here, part = data / name, data / f".{name}{_PART}"
+    here, part = data / name, data / f".{name}.fetching"
     folder = here if is_episode(here) else part
-    try:
+    with translate_errors(OSError, to=lambda error: cannot_write(folder, error)):
         (folder / FRAMES).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise cannot_write(folder, error) from error
     fd = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
     try:
         have = _complete_lines(folder, fd)
         # Lines up to the last step are the robot's; marks and edits of both sides follow.
         begin = 1 + max((n for n, line in enumerate(have) if line.startswith(_STEP)), default=-1)
         edits, theirs = have[begin:], list[bytes]()
-        piece = robot.fetch(name, max(begin - 1, 0), _LINES)
+        piece = robot.fetch(name, max(begin - 1, 0))
         if begin and [line.encode() + b"\n" for line in piece.lines[:1]] != have[begin - 1 : begin]:
             raise DemosError(
                 f"{folder} has other steps than {name} on the robot, so it stays as it is: "
@@ -82,7 +90,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
             theirs += new
             if not edits:
                 write_all(fd, b"".join(new))
-            piece = robot.fetch(name, piece.first + len(lines), _LINES)
+            piece = robot.fetch(name, piece.first + len(lines))
         own = _without(edits, theirs)
         if edits and (merged := have[:begin] + theirs + own) != have:
             write_atomic(folder / STEPS, b"".join(merged))
@@ -145,14 +153,12 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
         if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
             raise DemosError(f"A step names the picture {step.frame!r}.")
         file = frames / step.frame
-        if jpeg is None:
-            is_good = file.is_file() and file.stat().st_size == picture.size
-        else:
-            is_good = picture.fits(jpeg)
-        if not is_good:
-            words = f"The picture {step.frame} of step {step.index} is damaged on the robot."
-            raise DemosError(words)
-        if jpeg is not None and not (file.is_file() and file.read_bytes() == jpeg):
+        known = file.read_bytes() if file.is_file() else b""
+        if not (len(known) == picture.size if jpeg is None else picture.fits(jpeg)):
+            raise DemosError(
+                f"The picture {step.frame} of step {step.index} is damaged on the robot."
+            )
+        if jpeg is not None and known != jpeg:
             file.write_bytes(jpeg)
     return lines
 
@@ -175,3 +181,99 @@ def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
         if all(episode.closed for episode in new) or time.monotonic() > until_s:
             return new
         time.sleep(_LOOK_EVERY_S)
+
+
+def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> None:
+    """Replay an episode on a robot after a person at this terminal has armed it.
+
+    The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
+    """
+    known = recall(name)
+    with (
+        Terminal() as terminal,
+        RobotClient.connect(known, role="person", frames=False) as robot,
+    ):
+        _require_fit(episode, robot.welcome)
+        terminal.keys(0.0)  # Keys pressed before this line was shown are no consent.
+        say(
+            f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
+            f"{robot.welcome.robot} starts from its present place.\n"
+            "E arms it and starts · any other key cancels; during the replay, any key stops it."
+        )
+        if not _agreed(robot, terminal):
+            say("cancelled; nothing was played")
+            return
+        try:
+            robot.take()
+            robot.arm()
+            ended = _play(robot, terminal, episode)
+        finally:
+            if robot.alive:
+                robot.disarm()
+                robot.release()
+        say(ended)
+
+
+def _require_fit(episode: Episode, welcome: Welcome) -> None:
+    """Refuse a robot that does not fit the recording."""
+    recorded = Layout.from_json(episode.header.action_layout)
+    moved = Layout.from_json(welcome.action_layout)
+    if [_range(f) for f in recorded] != [_range(f) for f in moved]:
+        raise DemosError(
+            f"{welcome.robot} takes {_told(moved)}, and {episode.path.name} was recorded with "
+            f"{_told(recorded)}."
+        )
+    rate, own = episode.header.control_hz, welcome.control_hz
+    if not is_same_rate(rate, own, rate_jitter(gaps_s(episode), rate)):
+        raise DemosError(
+            f"{welcome.robot} takes {own:g} commands a second, and {episode.path.name} has "
+            f"{rate:g} steps a second."
+        )
+    if welcome.clock == "twin":
+        raise DemosError(
+            f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so no one "
+            "could stop it in time: serve it with `--clock real`."
+        )
+
+
+def _agreed(robot: RobotClient, terminal: Terminal) -> bool:
+    """Return whether the person confirms with E; any other key declines."""
+    while True:
+        robot.acknowledge()  # Keeps the link alive meanwhile.
+        if keys := terminal.keys(0.5):
+            return keys == ["e"]
+
+
+def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
+    """Send step after step until the end or a key press, and describe the outcome."""
+    period_s = 1.0 / robot.welcome.control_hz
+    steps = episode.kept
+    seen = robot.ask().message
+    due_s = time.monotonic()
+    for number, step in enumerate(steps):
+        if terminal.keys(max(0.0, due_s - time.monotonic())):
+            robot.emergency_stop("A person pressed a key.")
+            return f"stopped by a key after {number} of {len(steps)} steps: emergency stop"
+        if not (seen.mine and seen.armed):
+            why = seen.stop_reason or f"{seen.holder or 'no one'} commands it now"
+            return f"stopped after {number} of {len(steps)} steps: {why}"
+        # The applied actions include the caps at that time; the current caps apply on top.
+        robot.command(step.action if step.applied is None else step.applied, answers=seen.seq)
+        try:
+            seen = robot.observation(seen.seq).message
+        except RobotRefused:
+            raise
+        except LinkError as error:
+            raise LinkError(f"After {number} of {len(steps)} steps: {error}") from error
+        # Late steps are not caught up.
+        due_s = max(due_s + period_s, time.monotonic())
+    terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command gets a full period, too.
+    return f"played {len(steps)} steps"
+
+
+def _range(feature: object) -> tuple[object, ...]:
+    return tuple(getattr(feature, name) for name in ("name", "unit", "shape", "low", "high"))
+
+
+def _told(layout: Layout) -> str:
+    return ", ".join(f"{f} from {f.low:g} to {f.high:g}" for f in layout)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import enum
 import math
 import os
 import re
@@ -12,6 +11,7 @@ import sys
 import termios
 import time
 import tty
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -130,13 +130,11 @@ class NoTerminal(ShapechangerError, RuntimeError):
     """No terminal to read keys from."""
 
 
-class _State(enum.Enum):
-    GROUND = enum.auto()
-    ESCAPE = enum.auto()  # After an escape character.
-    CSI = enum.auto()  # Up to a final character.
-    SS3 = enum.auto()  # The same, and other sequences of the form ESC, intermediates, final.
-    STRING = enum.auto()  # Up to ST.
-    TAIL = enum.auto()  # A number of characters that mean nothing.
+def _skip(count: int) -> Generator[None, str, str]:
+    """Take characters that mean nothing."""
+    for _ in range(count):
+        yield
+    return OTHER
 
 
 class KeyParser:
@@ -153,9 +151,9 @@ class KeyParser:
     def __init__(self) -> None:
         # A byte that is not UTF-8 becomes a lone surrogate.
         self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
-        self._state = _State.GROUND
-        self._text = ""  # Of a CSI or SS3 sequence, or the introducer of a string.
-        self._left = 0  # Characters of a tail.
+        self._rest: Generator[None, str, str] | None = None  # Takes a sequence, returns its key.
+        self._is_alone = False  # Only the escape character of the sequence has come.
+        self._is_string = False
         self._begun_s = 0.0
         self._last_s = 0.0
         self._is_reported = False  # The sequence was reported as Escape: its rest is nothing.
@@ -164,9 +162,9 @@ class KeyParser:
     @property
     def due_s(self) -> float:
         """Time at which `expire` returns keys, s; infinity if nothing is pending."""
-        if self._state is _State.GROUND:
+        if self._rest is None:
             return math.inf
-        if self._state is _State.ESCAPE and not self._is_reported:
+        if self._is_alone and not self._is_reported:
             return self._begun_s + ESCAPE_WAIT_S
         return self._last_s + REST_WAIT_S
 
@@ -196,14 +194,14 @@ class KeyParser:
             now_s: Present time, s.
         """
         keys: list[str] = []
-        if self._state is _State.ESCAPE and not self._is_reported and now_s >= self.due_s:
+        if self._is_alone and not self._is_reported and now_s >= self.due_s:
             keys.append("escape")
             self._is_reported = True
             self._is_pasted = False  # The end of the pasted text was lost.
-        if self._state is not _State.GROUND and now_s >= self.due_s:
+        if self._rest is not None and now_s >= self.due_s:
             if not self._is_reported:
                 keys.append(OTHER)
-            self._state = _State.GROUND
+            self._begin(None, now_s)
         return keys
 
     def _key(self, char: str, now_s: float) -> str | None:
@@ -211,74 +209,67 @@ class KeyParser:
         code = ord(char) - 0xDC00 if "\udc80" <= char <= "\udcff" else ord(char)
         is_byte = code != ord(char)
         if char in {" ", "\x00"}:
-            if self._state is _State.ESCAPE:
-                self._state = _State.SS3
+            if self._is_alone:
+                self._step(" ")
             return "space"
         if char == _ESCAPE:
-            was_alone = self._state is _State.ESCAPE and not self._is_reported
-            self._begin(_State.ESCAPE, now_s)
+            was_alone = self._is_alone and not self._is_reported
+            self._begin(self._sequence(), now_s, is_alone=True)
             self._is_reported = was_alone
             return "escape" if was_alone else None
         if 0x80 <= code < 0xA0:  # C1 controls: ESC and a character of seven bits.
-            if self._state is _State.STRING and code != 0x9C:
+            if self._is_string and code != 0x9C:
                 return None
             introducer = chr(code - 0x40)
-            if is_byte and introducer not in {"[", "O", "\\", *_STRINGS}:
-                return self._two_bytes(now_s)
-            self._begin(_State.ESCAPE, now_s)
-            return self._step(introducer)
-        if is_byte and self._state is _State.GROUND:
-            return self._two_bytes(now_s)
+            if not is_byte or introducer in {"[", "O", "\\", *_STRINGS}:
+                self._begin(self._sequence(), now_s)
+                return self._step(introducer)
+            self._begin(None, now_s)
+        if is_byte and self._rest is None:
+            # A character of another encoding, whose second byte may be a letter's.
+            return self._begin(_skip(1), now_s)
         return self._step(char)
 
-    def _begin(self, state: _State, now_s: float) -> None:
-        self._state, self._begun_s, self._text, self._is_reported = state, now_s, "", False
-
-    def _two_bytes(self, now_s: float) -> None:
-        """Begin a character of another encoding, whose second byte may be a letter's."""
-        self._begin(_State.TAIL, now_s)
-        self._left = 1
-
-    def _end(self, key: str = OTHER) -> str | None:
-        self._state = _State.GROUND
-        return None if self._is_reported else key
+    def _begin(
+        self, rest: Generator[None, str, str] | None, now_s: float, *, is_alone: bool = False
+    ) -> None:
+        """Begin a sequence, or end one."""
+        self._rest, self._begun_s = rest, now_s
+        self._is_alone, self._is_string, self._is_reported = is_alone, False, False
+        if rest is not None:
+            next(rest)
 
     def _step(self, char: str) -> str | None:
         """Advance by one character that begins no sequence."""
-        is_final = "@" <= char <= "~"
-        match self._state:
-            case _State.GROUND:
-                return _NAMES.get(char, char.lower() if "!" <= char <= "~" else OTHER)
-            case _State.ESCAPE:
-                if char in _STRINGS:
-                    self._state, self._text = _State.STRING, char
-                elif char == "[":
-                    self._state = _State.CSI
-                elif char == "O" or "!" <= char <= "/":
-                    self._state = _State.SS3
-                else:
-                    return self._end()  # Alt and a key, or the end of a string.
-            case _State.CSI if is_final and not self._text and char in _TAILS:
-                self._state, self._left = _State.TAIL, _TAILS[char]
-            case _State.CSI | _State.SS3 if is_final:
-                return self._end(self._meaning(self._text + char))
-            case _State.CSI | _State.SS3:
-                self._text += char
-            case _State.STRING:
-                if char == "\x07" and self._text == "]":
-                    return self._end()
-            case _State.TAIL:
-                self._left -= 1
-                if not self._left:
-                    return self._end()
+        if self._rest is None:
+            return _NAMES.get(char, char.lower() if "!" <= char <= "~" else OTHER)
+        self._is_alone = False
+        try:
+            self._rest.send(char)
+        except StopIteration as end:
+            key = None if self._is_reported else end.value
+            self._begin(None, 0.0)
+            return key
         return None
 
-    def _meaning(self, text: str) -> str:
-        """Return the key of a CSI or SS3 sequence without its introducer."""
-        if text in {"200~", "201~"} and self._state is _State.CSI:
+    def _sequence(self) -> Generator[None, str, str]:
+        """Take the characters after an escape character, and return their key."""
+        kind = yield
+        if kind in _STRINGS:
+            self._is_string = True
+            while (yield) != "\x07" or kind != "]":
+                pass
+            return OTHER
+        if kind not in "[O" and not " " <= kind <= "/":
+            return OTHER  # Alt and a key, or the end of a string.
+        text = ""
+        while not "@" <= text[-1:] <= "~":
+            text += yield
+            if kind == "[" and text in _TAILS:
+                return (yield from _skip(_TAILS[text]))
+        if text in {"200~", "201~"} and kind == "[":
             self._is_pasted = text == "200~"
-        stop = _STOP_CODES.fullmatch(text)
-        if stop is not None:
+        if stop := _STOP_CODES.fullmatch(text):
             return "escape" if "27" in stop.groups() else "space"
         return _ARROWS.get(text, OTHER)
 

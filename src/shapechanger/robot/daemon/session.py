@@ -270,10 +270,12 @@ class Session:
                     self._refuse(self._hub.policies.run(message.policy))
                 else:
                     self._refuse("Only a person can start a policy on this robot, or end it.")
-            case messages.Hello():
-                raise LinkError("The hello was sent already.")
-            case _:
+            case messages.Record() | messages.Mark() | messages.Undo():
                 self._refuse(self._recording(message))
+            case messages.Browse() | messages.Fetch() | messages.Judge():
+                self._refuse(self._recording(message))
+            case _:
+                raise LinkError("The hello was sent already.")
         if self.outbox.is_full:
             raise LinkError(NOT_READING)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -82,26 +82,21 @@ def card_of(
         pictures: Whether its camera is used.
     """
     camera = profile.camera if pictures else None
-    return RobotCard(
-        robot=profile.name,
-        body=profile.body,
-        action_layout=profile.action_layout().to_json(),
-        state_layout=profile.state_layout().to_json(),
-        image_size=None if camera is None else camera.size,
-        camera_pitch_deg=None if camera is None else camera.pitch_deg,
-        camera_fovy_deg=None if camera is None else camera.fovy_deg,
-        control_hz=profile.control_hz,
-        tick_hz=profile.tick_hz,
-        slew_per_s=tuple(_limit(action.slew_per_s) for action in profile.actions),
-        slew_down_per_s=tuple(_limit(action.slew_down_per_s) for action in profile.actions),
-        deadline_ms=profile.limits.deadline_ms,
-        max_observation_age_ms=profile.max_observation_age_ms,
-        reward=profile.reward,
-        reset=profile.reset,
-        arming=arming or profile.arming,
-        clock=clock,
-        turning=profile.turning,
-    )
+    same = {n: getattr(profile, n) for n in RobotCard.__struct_fields__ if hasattr(profile, n)}
+    others: dict[str, Any] = {
+        "robot": profile.name,
+        "action_layout": profile.action_layout().to_json(),
+        "state_layout": profile.state_layout().to_json(),
+        "image_size": None if camera is None else camera.size,
+        "camera_pitch_deg": None if camera is None else camera.pitch_deg,
+        "camera_fovy_deg": None if camera is None else camera.fovy_deg,
+        "slew_per_s": tuple(_limit(action.slew_per_s) for action in profile.actions),
+        "slew_down_per_s": tuple(_limit(action.slew_down_per_s) for action in profile.actions),
+        "deadline_ms": profile.limits.deadline_ms,
+        "arming": arming or profile.arming,
+        "clock": clock,
+    }
+    return RobotCard(**same | others)
 
 
 def _limit(slew_per_s: float) -> float:

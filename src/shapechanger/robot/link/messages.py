@@ -1,24 +1,8 @@
 """Messages between a client and a robot, each one binary WebSocket message.
 
 A message is a msgpack map with its type under `kind`; JPEG bytes are sent as they are. Unknown
-keys are ignored, so that newer minor versions stay readable; unknown types are refused.
-
-The course of a connection:
-
-```
-robot   Challenge          name of the robot, version, nonce
-client  Hello              version, name and role of the client, proof that it holds the key
-robot   Welcome | Refused  description of the robot; or the reason why the connection ends
-client  Take               asks for control; answered by Lease
-client  Arm                (a person, by default) lets the outputs move
-robot   Observation        the newest one, whenever the client has credit
-client  Command            values for the outputs, and the observation it answers; gives credit
-client  Suggest            the same from a client without control, to show; gives credit
-client  Record Mark Undo   (a person) records an episode on the robot's disk
-robot   RecorderState      state of the recorder, to all clients
-client  Browse Fetch Judge asks for the list of episodes, or a piece of one; marks steps as bad
-robot   Recordings Piece   the answers
-```
+keys are ignored, so that newer minor versions stay readable; unknown types are refused. The course
+of a connection is in `docs/wire.md`.
 
 Times are nanoseconds of the robot's monotonic clock. Clocks of two machines are never subtracted:
 the age of a command is the time since the robot sent the observation that it answers.
@@ -26,7 +10,7 @@ the age of a command is the time since the robot sent the observation that it an
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, TypeVar
+from typing import Annotated, Final, Literal, TypeVar, Union
 
 import msgspec
 from msgspec import Meta
@@ -80,18 +64,17 @@ class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_
         return f"{type(self).__name__}({', '.join(fields)})"
 
 
-# Messages of a client.
+class ClientMessage(_Message, frozen=True):
+    """A message of a client."""
 
 
-class Hello(_Message, frozen=True):
+class Hello(ClientMessage, frozen=True):
     """First message of a client.
 
     Attributes:
         version: Version of the messages that the client uses.
         proof: Answer to the challenge, see `shapechanger.robot.link.authentication`.
         name: Display name.
-        role: Kind of client.
-        pace: Whether the clocks or the client set the pace.
         frames: Whether observations carry frames.
     """
 
@@ -103,7 +86,7 @@ class Hello(_Message, frozen=True):
     frames: bool = True
 
 
-class Command(_Message, frozen=True):
+class Command(ClientMessage, frozen=True):
     """Values for the outputs, in force until the next command or until they expire.
 
     Attributes:
@@ -121,21 +104,21 @@ class Command(_Message, frozen=True):
     scale: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
 
 
-class Acknowledge(_Message, frozen=True):
+class Acknowledge(ClientMessage, frozen=True):
     """Request for the observation after number `seq`, without a command; 0 for the first."""
 
     seq: _Sequence = 0
 
 
-class Take(_Message, frozen=True):
+class Take(ClientMessage, frozen=True):
     """Request for control."""
 
 
-class Release(_Message, frozen=True):
+class Release(ClientMessage, frozen=True):
     """Return of control; the robot stops and disarms."""
 
 
-class Arm(_Message, frozen=True):
+class Arm(ClientMessage, frozen=True):
     """Request to let the outputs move; from a person it also ends an emergency stop.
 
     Attributes:
@@ -149,33 +132,28 @@ class Arm(_Message, frozen=True):
     emergency: _Sequence = 0
 
 
-class Disarm(_Message, frozen=True):
+class Disarm(ClientMessage, frozen=True):
     """Request to keep the outputs at rest."""
 
 
-class EmergencyStop(_Message, frozen=True):
+class EmergencyStop(ClientMessage, frozen=True):
     """Stop of all outputs, from any client, until a person arms the robot again."""
 
     reason: _Words = ""
 
 
-class Ping(_Message, frozen=True):
+class Ping(ClientMessage, frozen=True):
     """Request for a `Pong` with the same token."""
 
     token: _Sequence = 0
 
 
-class Suggest(_Message, frozen=True):
+class Suggest(ClientMessage, frozen=True):
     """Values that a client without control would command; the robot does not apply them.
 
     A suggestion is shown to all clients (`Observation.suggested`) and recorded, and gives credit
     for the next observation, as a command does. It expires after `Welcome.deadline_ms`, and when
-    its sender leaves or takes control.
-
-    Attributes:
-        seq: Number of the suggestion, larger than the one before. A refusal names it.
-        answers: `seq` of the observation that the suggestion answers.
-        values: One number for each action of the robot, in the order of its action layout.
+    its sender leaves or takes control. The fields are as in `Command`.
     """
 
     seq: _Sequence
@@ -183,7 +161,7 @@ class Suggest(_Message, frozen=True):
     values: _Values
 
 
-class Record(_Message, frozen=True):
+class Record(ClientMessage, frozen=True):
     """Begin or end of an episode on the robot's disk; only from a person.
 
     Answered by `RecorderState` to all clients, or by `Refused`. Commands of any client are
@@ -198,13 +176,13 @@ class Record(_Message, frozen=True):
     name: _Name = ""
 
 
-class Mark(_Message, frozen=True):
+class Mark(ClientMessage, frozen=True):
     """Mark with a text for the newest step of the episode being recorded; only from a person."""
 
     text: _Words = ""
 
 
-class Undo(_Message, frozen=True):
+class Undo(ClientMessage, frozen=True):
     """Request to drop the last `seconds` of the episode being recorded; only from a person.
 
     The steps stay on the disk, and are not used for training.
@@ -213,13 +191,13 @@ class Undo(_Message, frozen=True):
     seconds: Annotated[float, Meta(gt=0.0, le=3_600.0)] = 5.0
 
 
-class Browse(_Message, frozen=True):
+class Browse(ClientMessage, frozen=True):
     """Request for `Recordings` with ids before `before`, or the newest ones for ""."""
 
     before: _Before = ""
 
 
-class Fetch(_Message, frozen=True):
+class Fetch(ClientMessage, frozen=True):
     """Request for a part of an episode; answered by `Piece`.
 
     A further question about recordings is refused until the answer has been sent.
@@ -235,7 +213,7 @@ class Fetch(_Message, frozen=True):
     count: Annotated[int, Meta(ge=1, le=100_000)] = 1_000
 
 
-class Judge(_Message, frozen=True):
+class Judge(ClientMessage, frozen=True):
     """Judgement that steps of an episode are bad, or good after all; only from a person.
 
     Answered by `Recordings` with that episode alone.
@@ -253,7 +231,7 @@ class Judge(_Message, frozen=True):
     keep: bool = False
 
 
-class RunPolicy(_Message, frozen=True):
+class RunPolicy(ClientMessage, frozen=True):
     """Start of a policy on board, instead of the running one; only from a person.
 
     Answered by `PolicyState` to all clients, or by `Refused`. The policy is a separate client, a
@@ -266,31 +244,11 @@ class RunPolicy(_Message, frozen=True):
     policy: _Name = ""
 
 
-ClientMessage = (
-    Hello
-    | Command
-    | Acknowledge
-    | Take
-    | Release
-    | Arm
-    | Disarm
-    | EmergencyStop
-    | Ping
-    | Suggest
-    | Record
-    | Mark
-    | Undo
-    | Browse
-    | Fetch
-    | Judge
-    | RunPolicy
-)
+class RobotMessage(_Message, frozen=True):
+    """A message of a robot."""
 
 
-# Messages of a robot.
-
-
-class Challenge(_Message, frozen=True):
+class Challenge(RobotMessage, frozen=True):
     """First message of a robot.
 
     Attributes:
@@ -304,7 +262,7 @@ class Challenge(_Message, frozen=True):
     robot: str
 
 
-class Welcome(RobotCard, frozen=True, kw_only=True, tag_field="kind", tag="welcome"):
+class Welcome(RobotCard, RobotMessage, frozen=True, kw_only=True):
     """Card of the robot for an authenticated client.
 
     Attributes:
@@ -318,11 +276,10 @@ class Welcome(RobotCard, frozen=True, kw_only=True, tag_field="kind", tag="welco
     @classmethod
     def of(cls, card: RobotCard, session: int, *, can_record: bool = False) -> Welcome:
         """Return the message of a card."""
-        fields = {name: getattr(card, name) for name in RobotCard.__struct_fields__}
-        return cls(**fields, session=session, can_record=can_record)
+        return cls(**msgspec.structs.asdict(card), session=session, can_record=can_record)
 
 
-class Refused(_Message, frozen=True):
+class Refused(RobotMessage, frozen=True):
     """Refusal of a message.
 
     Attributes:
@@ -336,7 +293,7 @@ class Refused(_Message, frozen=True):
     fatal: bool = False
 
 
-class Observation(_Message, frozen=True):
+class Observation(RobotMessage, frozen=True):
     """Sensor values, and the state of the outputs.
 
     Attributes:
@@ -389,7 +346,7 @@ class Observation(_Message, frozen=True):
     suggested_by: str = ""
 
 
-class Lease(_Message, frozen=True):
+class Lease(RobotMessage, frozen=True):
     """The client in control, after a change or a refused request.
 
     Attributes:
@@ -403,7 +360,7 @@ class Lease(_Message, frozen=True):
     reason: str = ""
 
 
-class Event(_Message, frozen=True):
+class Event(RobotMessage, frozen=True):
     """Event on the robot, for people to read.
 
     Attributes:
@@ -417,14 +374,14 @@ class Event(_Message, frozen=True):
     at_ns: int
 
 
-class Pong(_Message, frozen=True):
+class Pong(RobotMessage, frozen=True):
     """Answer to a `Ping`, with its token and the robot's time."""
 
     token: int
     now_ns: int
 
 
-class RecorderState(_Message, frozen=True):
+class RecorderState(RobotMessage, frozen=True):
     """State of the recorder, sent at each change and once a second while recording.
 
     Attributes:
@@ -470,7 +427,7 @@ class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
     outcome: str = ""
 
 
-class Recordings(_Message, frozen=True):
+class Recordings(RobotMessage, frozen=True):
     """List of episodes, newest first.
 
     Attributes:
@@ -482,7 +439,7 @@ class Recordings(_Message, frozen=True):
     more: bool = False
 
 
-class Piece(_Message, frozen=True):
+class Piece(RobotMessage, frozen=True):
     """Part of an episode, as it is on the robot's disk.
 
     Attributes:
@@ -504,7 +461,7 @@ class Piece(_Message, frozen=True):
     header: str = ""
 
 
-class PolicyState(_Message, frozen=True):
+class PolicyState(RobotMessage, frozen=True):
     """The policies on board, sent to a new client and at each change.
 
     Attributes:
@@ -518,45 +475,20 @@ class PolicyState(_Message, frozen=True):
     text: str = ""
 
 
-RobotMessage = (
-    Challenge
-    | Welcome
-    | Refused
-    | Observation
-    | Lease
-    | Event
-    | Pong
-    | RecorderState
-    | Recordings
-    | Piece
-    | PolicyState
-)
+encode: Final = msgspec.msgpack.Encoder().encode
+"""Encode a message."""
 
-_ENCODER: Final = msgspec.msgpack.Encoder()
-_CLIENT_DECODER: Final = msgspec.msgpack.Decoder(ClientMessage)
-_ROBOT_DECODER: Final = msgspec.msgpack.Decoder(RobotMessage)
-
-
-def encode(message: ClientMessage | RobotMessage) -> bytes:
-    """Encode a message."""
-    return _ENCODER.encode(message)
+_CLIENT_DECODER: Final = msgspec.msgpack.Decoder(Union[*ClientMessage.__subclasses__()])
+_ROBOT_DECODER: Final = msgspec.msgpack.Decoder(Union[*RobotMessage.__subclasses__()])
 
 
 def decode_client_message(data: bytes) -> ClientMessage:
-    """Decode a message of a client.
-
-    Raises:
-        LinkError: If the bytes are too many, or not a message of a client.
-    """
+    """Decode a message of a client; raise `LinkError` for any other bytes."""
     return _decoded(_CLIENT_DECODER, data, MAX_CLIENT_MESSAGE)
 
 
 def decode_robot_message(data: bytes) -> RobotMessage:
-    """Decode a message of a robot.
-
-    Raises:
-        LinkError: If the bytes are too many, or not a message of a robot.
-    """
+    """Decode a message of a robot; raise `LinkError` for any other bytes."""
     return _decoded(_ROBOT_DECODER, data, MAX_ROBOT_MESSAGE)
 
 
