@@ -10,11 +10,27 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
+import msgspec
 from msgspec import Meta
+
+DrivingPart = Literal[
+    "wheels", "left track", "right track", "propeller", "left propeller", "right propeller"
+]
+"""Part that propels the robot."""
+
+Part = Literal["", DrivingPart, "steering", "rudder", "gear", "bed", "joint", "tendon"]
+"""Part that an output may move."""
+
+
+Mix = Annotated[
+    dict[str, Annotated[float, Meta(ge=-10, le=10)]],
+    Meta(description="a table of numbers from -10 to 10 by name of action"),
+]
+"""Weight of each action, keyed by its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +65,21 @@ class ActionPlan:
     unit: Literal["1", "deg", "rad", "m", "m/s", "N", "N·m"] = "1"
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
 
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """Return the keys that contradict others, and what is wrong, as the end of a sentence."""
+        if self.one_sided and self.low < 0.0:
+            yield "low", "must be 0 to 1, because it is one-sided"
+        if not self.low < self.high:
+            yield "high", f"must be above low, which is {self.low:g}, not {self.high:g}"
+        if not self.low <= self.rest <= self.high:
+            yield "rest", f"must lie between low and high, {self.low:g} to {self.high:g}"
+        if self.propels and self.rest != 0.0:
+            yield "rest", "must be 0, because it propels"
+        if self.propels and self.slew_down_per_s < math.inf:
+            yield "slew_down_per_s", "must be left out, because it propels: a stop is immediate"
+        if self.gain != 1.0 and self.unit == "1":
+            yield "gain", "needs a unit, such as unit = 'deg'"
+
 
 @dataclass(frozen=True, slots=True)
 class OutputPlan:
@@ -68,9 +99,9 @@ class OutputPlan:
 
     name: str
     driver: str
-    part: str = ""
-    mix: dict[str, float] = field(default_factory=dict[str, float])
-    offset: float = 0.0
+    part: Part = ""
+    mix: Mix = field(default_factory=dict[str, float])
+    offset: Annotated[float, Meta(ge=-1, le=1)] = 0.0
     settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
@@ -111,13 +142,22 @@ class LimitPlan:
     """
 
     deadline_ms: Annotated[int, Meta(ge=20, le=1000)] = 250
-    camera_stale_ms: Annotated[int, Meta(ge=50, le=5000)] = 0
+    camera_stale_ms: Annotated[int, Meta(ge=0, le=5000)] = 0
     bump_hold_ms: Annotated[int, Meta(ge=0, le=60_000)] = 750
     stop_distance_m: Annotated[float, Meta(ge=0, le=5)] = 0.0
     stall_s: Annotated[float, Meta(ge=0, le=10)] = 0.4
     stall_throttle: Annotated[float, Meta(gt=0, le=1)] = 0.2
     low_battery_v: Annotated[float, Meta(ge=0, le=100)] = 0.0
     high_temperature_c: Annotated[float, Meta(ge=0, le=120)] = 0.0
+
+    measured: ClassVar = {
+        "stop_distance_m": "distance",
+        "low_battery_v": "battery",
+        "high_temperature_c": "temperature",
+        "stall_s": "speed",
+        "bump_hold_ms": "bump",
+    }
+    """What a sensor must measure for a limit, keyed by the limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,20 +211,8 @@ class GuardPlan:
 
     @classmethod
     def from_json(cls, text: str) -> GuardPlan:
-        """Read the output of `to_json`. The text is trusted and not validated."""
-        return cls.from_dict(json.loads(text))
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> GuardPlan:
-        """Read the output of `dataclasses.asdict`, which is trusted and not validated."""
-        parts: dict[str, Any] = {
-            "actions": tuple(ActionPlan(**action) for action in data["actions"]),
-            "outputs": tuple(OutputPlan(**output) for output in data["outputs"]),
-            "sensors": tuple(SensorPlan(**sensor) for sensor in data["sensors"]),
-            "limits": LimitPlan(**data["limits"]),
-            "stop": StopPlan(**data["stop"]),
-        }
-        return cls(**data | parts)
+        """Read the output of `to_json`."""
+        return msgspec.convert(json.loads(text), cls)
 
 
 def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...]:

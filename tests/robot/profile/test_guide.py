@@ -10,8 +10,8 @@ import pytest
 from shapechanger.robot.drivers.as5600 import JointKeys
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.profile import shipped_profiles
-from shapechanger.robot.profile.diagnostics import fields_of
-from shapechanger.robot.profile.read import CAMERAS, TABLES
+from shapechanger.robot.profile.read import CAMERAS, GIVEN, TABLES
+from shapechanger.robot.profile.toml import fields_of
 from tests.robot.profile.texts import read
 
 GUIDE = (Path(__file__).parents[3] / "docs" / "profiles.md").read_text()
@@ -21,7 +21,6 @@ KINDS = {
     *CAMERAS.values(),
     JointKeys,
 }
-GIVEN = {"rows", "settings"}  # No keys of a table.
 
 
 def test_vehicle_of_the_guide_is_a_profile() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.profile.diagnostics import Place, line_of
+from shapechanger.robot.profile.toml import Place, line_of
 
 TEXT = '''\
 # [not.a.table]

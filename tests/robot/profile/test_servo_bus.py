@@ -73,7 +73,7 @@ def test_an_action_of_two_tendons_has_no_newtons() -> None:
         ),
         (
             shipped_profiles()["car"].read_text() + "\n" + _SENSOR,
-            r"\[sensor.tendons\] needs outputs with the driver bus_servo",
+            r"\[sensor.tendons\] needs an output with the driver bus_servo",
         ),
     ],
 )

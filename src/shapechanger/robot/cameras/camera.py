@@ -42,6 +42,10 @@ class Frame:
 
 
 _Side = Annotated[int, Meta(ge=16, le=1920, multiple_of=2)]
+_Size = Annotated[
+    tuple[_Side, _Side],
+    Meta(description="[width, height] in pixels, each an even number from 16 to 1920"),
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +64,7 @@ class CameraPlan:
     """
 
     driver: str
-    size: tuple[_Side, _Side] = (160, 120)
+    size: _Size = (160, 120)
     fps: Annotated[float, Meta(ge=1, le=120)] = 20.0
     jpeg_quality: Annotated[int, Meta(ge=1, le=100)] = 80
     flip: bool = False

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import LinkError, OutputError, RobotError
+from shapechanger.files import write_new
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link.address import is_loopback
 from shapechanger.robot.link.authentication import fingerprint_of, new_key, parse_key
-from shapechanger.files import write_new
 
 _KEY: Final = "key"
 _CERTIFICATE: Final = "certificate.pem"

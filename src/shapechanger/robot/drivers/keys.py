@@ -12,10 +12,18 @@ from shapechanger.robot.drivers.pins import I2C_PINS, Pin
 
 _PRINTABLE: Final = r"\A(?=.*\S)[\x20-\x7e\xa0-\U0010ffff]+\Z"
 
-Text = Annotated[str, Meta(min_length=1, max_length=64, pattern=_PRINTABLE)]
+_TEXT: Final = "a text of 1 to {} characters that can be printed"
+
+Text = Annotated[
+    str,
+    Meta(min_length=1, max_length=64, pattern=_PRINTABLE, description=_TEXT.format(64)),
+]
 """A name, as long as names in messages may be; see `shapechanger.robot.link.messages`."""
 
-FilePath = Annotated[str, Meta(min_length=1, max_length=4096, pattern=_PRINTABLE)]
+FilePath = Annotated[
+    str,
+    Meta(min_length=1, max_length=4096, pattern=_PRINTABLE, description=_TEXT.format(4096)),
+]
 """Path of a file or a device."""
 
 BusNumber = Annotated[int, Meta(ge=0, le=99)]

@@ -27,7 +27,7 @@ class SwitchKeys(Keys, frozen=True, kw_only=True):
         pull: "up" for switches to ground, "down" for switches to 3.3 V.
     """
 
-    pins: Annotated[list[Pin], Meta(min_length=1)]
+    pins: Annotated[list[Pin], Meta(min_length=1, description=f"a list of pins, each {Pin.words}")]
     pull: Literal["up", "down"] = "up"
 
 

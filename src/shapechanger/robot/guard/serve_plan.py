@@ -16,6 +16,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
+
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.guard import start
 from shapechanger.robot.hardware import REAL
@@ -61,11 +63,8 @@ class ServePlan:
 
     @classmethod
     def from_json(cls, text: str) -> ServePlan:
-        """Read the output of `to_json`. The text is trusted and not validated."""
-        data: dict[str, Any] = json.loads(text)
-        source, argument = data["hardware"]
-        data |= {"guard": GuardPlan.from_dict(data["guard"]), "hardware": (source, argument)}
-        return cls(**data)
+        """Read the output of `to_json`."""
+        return msgspec.convert(json.loads(text), cls)
 
 
 def plan_fd(plan: ServePlan) -> int:

@@ -186,7 +186,7 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
                 raise UnknownName(f"table of {target.name}", name, known)
             table = table[name]
         if isinstance(value, dict):
-            entries = tomlkit.inline_table()
+            entries: Any = tomlkit.inline_table()
             entries.update(value)
             table[key] = entries
         else:

@@ -7,12 +7,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+from msgspec import Meta
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.chip import SENSORS
+from shapechanger.robot.drivers.keys import Text
 
 _INF: Final = math.inf
 # Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the
@@ -96,37 +99,63 @@ class ResetStep(NamedTuple):
     seconds: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Profile(GuardPlan):
+_A_DATE: Final = "a date, such as 2026-11-03"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotTable:
+    """Keys of `[robot]`.
+
+    Attributes:
+        name: Name of the robot.
+        body: Kind of robot, such as "car".
+        control_hz: Expected rate of commands, Hz.
+        calibrated: Date of the calibration, which `shapechanger robot calibrate` writes; None if it
+            never was.
+        turn_deg_per_m: Turn for each metre at full steering, degrees, which policies of waypoints
+            need on board: a car's; None if not measured.
+        turn_deg_per_s: Turn for each second at full steering, degrees, of vehicles that turn in
+            place: a tank's; None if not measured.
+    """
+
+    name: Text
+    body: Text
+    control_hz: Annotated[float, Meta(ge=1, le=100)] = 20.0
+    calibrated: Annotated[datetime.date, Meta(description=_A_DATE)] | None = None
+    turn_deg_per_m: Annotated[float, Meta(ge=0, le=10_000)] | None = None
+    turn_deg_per_s: Annotated[float, Meta(ge=0, le=10_000)] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandTable:
+    """Keys of `[limits]` that concern clients and their commands.
+
+    Attributes:
+        max_observation_age_ms: Largest age of the observation that a command answers, ms.
+        arming: Who may arm it: a person alone, or anyone, such as a program.
+    """
+
+    max_observation_age_ms: Annotated[int, Meta(ge=20, le=5000)] = 400
+    arming: Literal["person", "anyone"] = "person"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile(GuardPlan, RobotTable, CommandTable):
     """A robot: what it moves and senses, its caps, and when it stops.
 
     Attributes:
         path: The file that it was read from.
-        body: Kind of robot, such as "car".
-        control_hz: Expected rate of commands, Hz.
-        calibrated: Date of calibration; None if it never was.
         camera: Its camera; None without one.
-        max_observation_age_ms: Largest age of the observation that a command answers, ms.
-        arming: Who may arm it.
         reward: Weights of the task, as in `Welcome.reward`: "velocity" per metre forward,
             "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
             1 or 0.
         reset: The reset routine; empty for none.
-        turn_deg_per_m: Turn for each metre at full steering, degrees; None if not measured.
-        turn_deg_per_s: Turn for each second at full steering, degrees; None if not measured.
     """
 
     path: Path
-    body: str
-    control_hz: float
-    calibrated: datetime.date | None
     camera: CameraPlan | None
-    max_observation_age_ms: int
-    arming: Literal["person", "anyone"]
     reward: dict[str, float]
     reset: tuple[ResetStep, ...]
-    turn_deg_per_m: float | None = None
-    turn_deg_per_s: float | None = None
 
     @property
     def turning(self) -> tuple[float, float] | None:

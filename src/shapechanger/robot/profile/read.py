@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import datetime
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Annotated, Any, Final, cast
 
 import msgspec
 from msgspec import Meta
@@ -17,58 +16,16 @@ from shapechanger.contract.plan import ActionPlan, LimitPlan, OutputPlan, Sensor
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
-from shapechanger.robot.drivers.keys import FilePath, Keys, Text
+from shapechanger.robot.drivers.keys import FilePath, Keys
 from shapechanger.robot.drivers.pins import Pin
-from shapechanger.robot.drivers.pulse import PulsedKeys
 from shapechanger.robot.drivers.servos.settings import ServoBusKeys
-from shapechanger.robot.profile.checks import (
-    Part,
-    PinAllocation,
-    check_action,
-    check_limits,
-    check_mix,
-    check_stop,
-    with_servo_bus,
-)
-from shapechanger.robot.profile.diagnostics import Section, called, choice, fields_of
-from shapechanger.robot.profile.profile import Profile, ResetStep
+from shapechanger.robot.profile.profile import CommandTable, Profile, ResetStep, RobotTable
+from shapechanger.robot.profile.rules import RULES
+from shapechanger.robot.profile.toml import Table, choice, fields_of, keys_of
 
 _MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 _DIGITS: Final = re.compile(r"[0-9_]{600}")
-
-
-class RobotKeys(Keys, frozen=True, kw_only=True):
-    """Keys of `[robot]`; see `Profile`."""
-
-    name: Text
-    body: Text
-    control_hz: Annotated[float, Meta(ge=1, le=100)] = 20.0
-    calibrated: datetime.date | None = None
-    turn_deg_per_m: Annotated[float, Meta(ge=0, le=10_000)] | None = None
-    turn_deg_per_s: Annotated[float, Meta(ge=0, le=10_000)] | None = None
-
-
-class OutputKeys(Keys, frozen=True, kw_only=True):
-    """Keys of every output; see `OutputPlan`."""
-
-    driver: str
-    part: Part = ""
-    mix: dict[str, Annotated[float, Meta(ge=-10, le=10)]]
-    offset: Annotated[float, Meta(ge=-1, le=1)] = 0.0
-
-
-class SensorKeys(Keys, frozen=True, kw_only=True):
-    """Key of every sensor."""
-
-    driver: str
-
-
-class CommandKeys(Keys, frozen=True, kw_only=True):
-    """Keys of `[limits]` that concern clients and their commands; see `Profile`."""
-
-    max_observation_age_ms: Annotated[int, Meta(ge=20, le=5000)] = 400
-    arming: Literal["person", "anyone"] = "person"
 
 
 class RewardKeys(Keys, frozen=True, kw_only=True):
@@ -83,7 +40,10 @@ class RewardKeys(Keys, frozen=True, kw_only=True):
 class ResetKeys(Keys, frozen=True, kw_only=True):
     """Keys of a step of the reset routine; see `ResetStep`."""
 
-    values: dict[str, Annotated[float, Meta(ge=-1, le=1)]]
+    values: Annotated[
+        dict[str, Annotated[float, Meta(ge=-1, le=1)]],
+        Meta(description="a table of numbers from -1 to 1 by name of action"),
+    ]
     seconds: Annotated[float, Meta(gt=0, le=60)]
 
 
@@ -128,12 +88,12 @@ CAMERAS: Final[Mapping[str, type[Keys]]] = {
 """Keys of each camera driver."""
 
 TABLES: Final[Mapping[str, tuple[type, ...]]] = {
-    "robot": (RobotKeys,),
+    "robot": (RobotTable,),
     "action": (ActionPlan,),
-    "output": (OutputKeys,),
-    "sensor": (SensorKeys,),
+    "output": (OutputPlan,),
+    "sensor": (SensorPlan,),
     "camera": (CameraPlan,),
-    "limits": (LimitPlan, CommandKeys),
+    "limits": (LimitPlan, CommandTable),
     "stop": (StopPlan,),
     "reward": (RewardKeys,),
     "reset": (ResetKeys,),
@@ -142,6 +102,16 @@ TABLES: Final[Mapping[str, tuple[type, ...]]] = {
     "servo_bus": (ServoBusKeys,),
 }
 """Tables of a profile, with their keys; `action`, `output` and `sensor` hold one table per name."""
+
+DRIVERS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
+    "output": {"driver": OUTPUTS, "over": PULSES},
+    "sensor": {"driver": SENSORS},
+    "camera": {"driver": CAMERAS},
+}
+"""Chips, or their keys, that a key of a table chooses from; their keys are keys of the table."""
+
+GIVEN: Final = ("name", "measures", "settings", "rows")
+"""Fields of `TABLES` and of chips that are no keys of a table, but follow from it."""
 
 
 def read_profile(text: str, path: Path) -> Profile:
@@ -155,53 +125,41 @@ def read_profile(text: str, path: Path) -> Profile:
         ProfileError: If the text is not TOML or not a valid profile; names the file and the line.
     """
     text = text.replace("\r\n", "\n")
-    root = Section(path, text, (), _toml(text, path))
-    for name in root.table:
+    root = Table(path, text, (), _toml(text, path))
+    for name in root.keys:
         if name not in TABLES:
-            raise root.error_at(name, f"a profile has no table or key {choice(name, TABLES)}")
-    robot: RobotKeys = _table(root, "robot")
-    actions = {name: _read_action(name, table) for name, table in _named(root, "action").items()}
+            raise root.error((name,), f"a profile has no table or key {choice(name, TABLES)}")
+    robot: RobotTable = _once(root, "robot")
+    actions = {name: _read_action(name, table) for name, table in _named(root, "action")}
     if not actions:
-        raise root.error_at("action", "a robot needs an action, such as [action.throttle]")
-    wiring = PinAllocation(root)
-    outputs = wiring.shared(
-        [_read_output(name, table, wiring) for name, table in _named(root, "output").items()]
-    )
-    check_mix(root, actions, outputs)
-    sensors = tuple(
-        _read_sensor(name, table, wiring) for name, table in _named(root, "sensor").items()
-    )
-    camera = _read_camera(root.section("camera")) if "camera" in root.table else None
-    stop: StopPlan = _table(root, "stop")
-    check_stop(root, stop, actions, outputs)
+        raise root.error(("action",), "a robot needs an action, such as [action.throttle]")
+    outputs = tuple(_read_output(name, table) for name, table in _named(root, "output"))
+    sensors = tuple(_read_sensor(name, table) for name, table in _named(root, "sensor"))
     pins: dict[str, Any] = {}
-    if "enable" in root.table:
-        enable: EnableKeys = _table(root, "enable")
-        wiring.take(root.section("enable"), enable)
+    if "enable" in root.keys:
+        enable: EnableKeys = _once(root, "enable")
         pins = {"enable_pin": enable.pin, "enable_hold_ms": enable.hold_ms}
-    if "emergency_button" in root.table:
-        button: EmergencyButtonKeys = _table(root, "emergency_button")
-        wiring.take(root.section("emergency_button"), button)
-        pins["stop_pin"] = button.pin
-    bus: ServoBusKeys | None = _table(root, "servo_bus") if "servo_bus" in root.table else None
-    hold_ms: int | None = pins.get("enable_hold_ms")
-    outputs, sensors = with_servo_bus(root, bus, outputs, sensors, stop, hold_ms)
-    limits, commands = root.section("limits").decode(*TABLES["limits"])
-    reward: RewardKeys = _table(root, "reward")
-    return Profile(
+    if "emergency_button" in root.keys:
+        pins["stop_pin"] = _once(root, "emergency_button").pin
+    limits, commands = root.table("limits").decode(*TABLES["limits"])
+    reward: RewardKeys = _once(root, "reward")
+    profile = Profile(
         path=path,
-        **msgspec.structs.asdict(robot),
+        **vars(robot),
         actions=tuple(actions.values()),
         outputs=outputs,
         sensors=sensors,
-        camera=camera,
-        limits=check_limits(root.section("limits"), limits, robot.control_hz, camera, sensors),
-        **msgspec.structs.asdict(commands),
-        stop=stop,
+        camera=_read_part(root.table("camera"), CameraPlan) if "camera" in root.keys else None,
+        limits=limits,
+        **vars(commands),
+        stop=_once(root, "stop"),
         reward={key: float(weight) for key, weight in msgspec.structs.asdict(reward).items()},
         reset=tuple(_reset(root, actions)),
         **pins,
     )
+    for rule in RULES:
+        profile = rule(root, profile)
+    return profile
 
 
 def _toml(text: str, path: Path) -> dict[str, Any]:
@@ -222,96 +180,87 @@ def _toml(text: str, path: Path) -> dict[str, Any]:
     raise ProfileError(f"{path}, line {line}: {message}.")
 
 
-def _table(root: Section, name: str) -> Any:
+def _once(root: Table, name: str) -> Any:
     """Return the keys of a table that is there once."""
-    (keys,) = root.section(name).decode(*TABLES[name])
+    (keys,) = root.table(name).decode(*TABLES[name])
     return keys
 
 
-def _named(root: Section, kind: str) -> dict[str, Section]:
-    """Return the tables of one kind keyed by name, in the order of the file."""
-    tables = root.section(kind).named()
+def _named(root: Table, kind: str) -> Iterable[tuple[str, Table]]:
+    """Return the tables of one kind with their names, in the order of the file."""
+    tables = root.table(kind).named()
     if len(tables) > _MOST_NAMED:
         message = f"a robot has at most {_MOST_NAMED} {kind}s, not {len(tables)}"
-        raise root.error_at(kind, message)
-    return tables
+        raise root.error((kind,), message)
+    return tables.items()
 
 
-def _read_action(name: str, section: Section) -> ActionPlan:
-    (action,) = section.decode(ActionPlan, given={"name": name})
-    if "low" not in section.table and action.one_sided:
+def _read_action(name: str, table: Table) -> ActionPlan:
+    (action,) = table.decode(ActionPlan, given={"name": name})
+    if "low" not in table.keys and action.one_sided:
         action = replace(action, low=0.0)
-    check_action(section, action)
+    for key, words in action.mistakes():
+        raise table.refused(key, words)
     return action
 
 
-def _read_output(name: str, section: Section, wiring: PinAllocation) -> OutputPlan:
+def _read_output(name: str, table: Table) -> OutputPlan:
     """Read one motor, servo or controller."""
-    for key in ("driver", "over"):
-        written = section.table.get(key)
-        if isinstance(written, str) and "gpiozero" in written.lower():
-            raise section.error_at(
+    for key in DRIVERS["output"]:
+        if "gpiozero" in str(table.keys.get(key)).lower():
+            raise table.refused(
                 key,
-                f"{key} of {section} cannot be {written!r}: gpiozero makes the pulses of a servo "
-                "in steps of 200 µs, and 1.4 ms out of a neutral of 1.5 ms (gpiozero#1209); use "
-                f"the driver servo or esc, over one of {', '.join(PULSES)}",
+                "cannot be of gpiozero, which makes the pulses of a servo in steps of 200 µs, and "
+                "1.4 ms out of a neutral of 1.5 ms (gpiozero#1209); use the driver servo or esc, "
+                f"over one of {', '.join(PULSES)}",
             )
-    kinds = [OUTPUTS[section.chosen("driver", OUTPUTS)].keys]
-    given = {"name": name} if "name" in fields_of(kinds[0]) else {}
-    if issubclass(kinds[0], PulsedKeys):
-        kinds.append(PULSES[section.chosen("over", PULSES)].keys)
-    others = {"the driver": OUTPUTS, "the pulse source": PULSES}
-    common, *parts = section.decode(OutputKeys, *kinds, given=given, others=others)
-    settings: dict[str, Any] = {}
-    for keys in parts:
-        wiring.take(section, keys)
-        settings |= keys.settings()
-    return OutputPlan(name=name, **msgspec.structs.asdict(common), settings=settings)
+    return _read_part(table, OutputPlan, name=name)
 
 
-def _read_sensor(name: str, section: Section, wiring: PinAllocation) -> SensorPlan:
+def _read_sensor(name: str, table: Table) -> SensorPlan:
     """Read one sensor; one with a table for each joint has these as its rows."""
-    chip = SENSORS[section.chosen("driver", SENSORS)]
-    given: dict[str, Any] = {}
-    table = section.table
+    chip = SENSORS[table.chosen("driver", SENSORS)]
+    given: dict[str, Any] = {"name": name, "measures": chip.measures}
     if chip.rows is not None:
-        rows: dict[str, Any] = {k: v for k, v in table.items() if isinstance(v, dict)}
+        rows: dict[str, Any] = {
+            key: value for key, value in table.keys.items() if isinstance(value, dict)
+        }
         if not rows:
-            example = called(*section.place, "knee")
-            message = f"{section} needs a table for each joint, such as {example}"
-            raise section.error_at((), message)
-        nested = section.within(rows).named()
-        given["rows"] = {key: one.decode(chip.rows)[0] for key, one in nested.items()}
-        section = section.within({key: v for key, v in table.items() if key not in rows})
-    others = {"the driver": SENSORS}
-    common, keys = section.decode(SensorKeys, chip.keys, given=given, others=others)
-    wiring.take(section, keys)
-    return SensorPlan(name, common.driver, measures=chip.measures, settings=keys.settings())
+            raise table.refused("", f"needs a table for each joint, such as [sensor.{name}.knee]")
+        joints = replace(table, keys=rows).named()
+        given["rows"] = {key: joint.decode(chip.rows)[0] for key, joint in joints.items()}
+        table = replace(table, keys={k: v for k, v in table.keys.items() if k not in rows})
+    return _read_part(table, SensorPlan, **given)
 
 
-def _read_camera(section: Section) -> CameraPlan:
-    keys = CAMERAS[section.chosen("driver", CAMERAS)]
-    others = {"the driver": CAMERAS}
-    camera, own = section.decode(CameraPlan, keys, given={"settings": {}}, others=others)
-    return replace(camera, settings=own.settings())
+def _read_part(table: Table, plan: type, **given: Any) -> Any:
+    """Return a plan with the settings of its driver, and of the pulses if the driver takes any."""
+    drivers = DRIVERS[str(table.place[0])]
+    kinds: list[type[Keys]] = []
+    for key, chips in drivers.items():
+        if not kinds or key in fields_of(kinds[0]):
+            kinds.append(keys_of(chips[table.chosen(key, chips)]))
+    given["settings"] = {}
+    part, *parts = table.decode(plan, *kinds, given=given, drivers=drivers)
+    settings = {key: value for keys in parts for key, value in keys.settings().items()}
+    return replace(part, settings=settings)
 
 
-def _reset(root: Section, actions: Mapping[str, ActionPlan]) -> Iterator[ResetStep]:
+def _reset(root: Table, actions: Mapping[str, ActionPlan]) -> Iterator[ResetStep]:
     """Read the reset routine; in each step, actions without a value are at rest."""
-    tables = root.table.get("reset", [])
+    tables = root.keys.get("reset", [])
     if not isinstance(tables, list):
         message = "the steps of the reset routine are written [[reset]], with two brackets"
-        raise root.error_at("reset", message)
-    for i, table in enumerate(cast("list[Any]", tables)):
-        section = root.section("reset", i, table=table)
-        (step,) = section.decode(ResetKeys)
+        raise root.error(("reset",), message)
+    for i, keys in enumerate(cast("list[Any]", tables)):
+        table = replace(root, place=("reset", i), keys=keys)
+        (step,) = table.decode(ResetKeys)
         for name, value in step.values.items():
             if name not in actions:
-                message = f"values of {section} name no action: {choice(name, actions)}"
-                raise section.error_at(("values", name), message)
+                raise table.refused("values", f"names no action: {choice(name, actions)}", name)
             low, high = actions[name].low, actions[name].high
             if not low <= value <= high:
-                message = f"{name} of {section} must be {low:g} to {high:g}, its own caps"
-                raise section.error_at(("values", name), message)
+                words = f"must have {low:g} to {high:g} for {name}, its own caps"
+                raise table.refused("values", words, name)
         filled = tuple(step.values.get(action.name, action.rest) for action in actions.values())
         yield ResetStep(filled, step.seconds)

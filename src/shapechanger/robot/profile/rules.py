@@ -1,0 +1,218 @@
+"""Rules between the tables of a profile: pins, mixes, stops, limits and the servo bus.
+
+Each returns the profile, completed by what follows from several tables, or raises a `ProfileError`
+with the line and one sentence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final, get_args
+
+from shapechanger.contract.plan import DrivingPart, OutputPlan
+from shapechanger.errors import translate_errors
+from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
+from shapechanger.robot.drivers.keys import Claim, KeyMistake
+from shapechanger.robot.drivers.pins import NO_PIN
+from shapechanger.robot.drivers.servos.settings import (
+    DRIVER,
+    ServoBusKeys,
+    bus_settings,
+    stops_itself,
+)
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.profile.toml import Table, choice
+
+
+def check_claims(root: Table, profile: Profile) -> Profile:
+    """Refuse a pin, a channel or an address that two keys claim."""
+    users: dict[str, tuple[Table, Claim]] = {}
+    for table, claim in ((table, one) for table, keys in root.decoded for one in keys.claims()):
+        before, earlier = users.setdefault(claim.what, (table, claim))
+        if earlier is claim or (claim.group and claim.group == earlier.group):
+            continue
+        raise table.error(
+            (claim.key,),
+            f"{claim.what}{claim.use} is used twice: by {earlier.key} of {before} "
+            f"(line {before.line(earlier.key)}) and by {claim.key} of {table}",
+        )
+    return profile
+
+
+def share_boards(root: Table, profile: Profile) -> Profile:
+    """Give outputs the frequency and the enable pin that a PCA9685 has once."""
+    boards: dict[tuple[int, ...], dict[str, Any]] = {}
+    for output in profile.outputs:
+        for name in ("hz", "output_enable") if (board := _board(output)) else ():
+            shared, value = boards.setdefault(board, {}), output.settings[name]
+            before = shared.setdefault(name, value)
+            if before == NO_PIN:
+                shared[name] = value
+            elif value not in (before, NO_PIN):
+                raise root.error(
+                    ("output", output.name, name),
+                    f"the PCA9685 at {board[1]:#x} of I2C bus {board[0]} has one {name} for all "
+                    f"its channels, {before} or {value}",
+                )
+    outputs = [
+        replace(output, settings=output.settings | boards.get(_board(output), {}))
+        for output in profile.outputs
+    ]
+    return replace(profile, outputs=tuple(outputs))
+
+
+def _board(output: OutputPlan) -> tuple[int, ...]:
+    """Return bus and address of the PCA9685 of an output; () without one."""
+    settings = output.settings
+    return (settings["bus"], settings["address"]) if settings.get("over") == "pca9685" else ()
+
+
+_NEARLY_ZERO: Final = 1e-9
+
+
+def check_mix(root: Table, profile: Profile) -> Profile:
+    """Refuse outputs and actions without a connection, and a rest that drives."""
+    rests = {action.name: action.rest for action in profile.actions}
+    for output in profile.outputs:
+        table = root.table("output", output.name)
+        if not output.mix:
+            words = f"is empty, so nothing moves it; there are: {', '.join(rests)}"
+            raise table.refused("mix", words)
+        for name, weight in output.mix.items():
+            if name not in rests:
+                raise table.refused("mix", f"names no action: {choice(name, rests)}", name)
+            if weight == 0.0:
+                raise table.refused("mix", f"has the weight 0 for {name!r}: leave it out", name)
+        if output.part in get_args(DrivingPart) and not _propelling(profile) & output.mix.keys():
+            words = f"must name an action with propels = true, because it moves the {output.part}"
+            raise table.refused("mix", words)
+        rest = output.offset + sum(weight * rests[name] for name, weight in output.mix.items())
+        if _drives(profile, output) and abs(rest) > _NEARLY_ZERO:
+            raise table.error(
+                ("offset",),
+                f"{table} is at {rest:g} when its actions rest, and must be at 0 then, "
+                "because it propels the robot",
+            )
+    for name in rests:
+        if not any(name in output.mix for output in profile.outputs):
+            raise root.table("action", name).refused("", "moves nothing: no mix names it")
+    return profile
+
+
+def check_stop(root: Table, profile: Profile) -> Profile:
+    """Refuse a stop that holds or ramps an action that contributes to a propelling output."""
+    held = [key for key in ("hold_ms", "ramp_ms") if getattr(profile.stop, key)]
+    for output in profile.outputs if held else ():
+        for name in output.mix.keys() - _propelling(profile):
+            if _drives(profile, output):
+                raise root.table("stop").refused(
+                    held[0],
+                    f"would keep [output.{output.name}] driving after a stop, because {name!r} "
+                    "moves it and does not propel",
+                )
+    return profile
+
+
+def _propelling(profile: Profile) -> set[str]:
+    """Return the names of the actions that propel the robot."""
+    return {action.name for action in profile.actions if action.propels}
+
+
+def _drives(profile: Profile, output: OutputPlan) -> bool:
+    """Return whether an output can propel the robot."""
+    return (
+        OUTPUTS[output.driver].drives
+        or output.part in get_args(DrivingPart)
+        or bool(_propelling(profile) & output.mix.keys())
+    )
+
+
+# Default of `camera_stale_ms`, and its least value.
+_CAMERA_STALE_MS: Final = 500
+_LEAST_STALE_MS: Final = 50
+
+
+def check_limits(root: Table, profile: Profile) -> Profile:
+    """Refuse limits that need something that is missing or too slow."""
+    table, limits, camera = root.table("limits"), profile.limits, profile.camera
+    if limits.deadline_ms * profile.control_hz < 1000:
+        words = f"must be at least {1000 / profile.control_hz:.0f} ms, the time from one command "
+        words += f"to the next at control_hz = {profile.control_hz:g}"
+        raise table.refused("deadline_ms", words)
+    measured = {sensor.measures for sensor in profile.sensors}
+    for name, quantity in limits.measured.items():
+        if table.keys.get(name) and quantity not in measured:
+            drivers = " or ".join(d for d, chip in SENSORS.items() if chip.measures == quantity)
+            words = (
+                f"needs a sensor that measures {quantity}, such as one with the driver {drivers}"
+            )
+            raise table.refused(name, words)
+    key = "camera_stale_ms"
+    if camera is None:
+        if key in table.keys:
+            raise table.refused(key, "needs a [camera]")
+        return profile
+    stale_ms = limits.camera_stale_ms if key in table.keys else _CAMERA_STALE_MS
+    needed_ms = max(2000 / camera.fps, _LEAST_STALE_MS)  # One frame may be lost.
+    if stale_ms < needed_ms:
+        words = f"must be at least {needed_ms:.0f} ms: one of two pictures may be lost at fps = "
+        raise table.refused(key, f"{words}{camera.fps:g}")
+    return replace(profile, limits=replace(limits, camera_stale_ms=stale_ms))
+
+
+# Time in which servos start whose power comes with the guard, s.
+_START_S: Final = 0.5
+
+
+def join_servo_bus(root: Table, profile: Profile) -> Profile:
+    """Give the outputs and the sensor of the servo bus its settings."""
+    servos = [output for output in profile.outputs if output.driver == DRIVER]
+    sensing = [sensor for sensor in profile.sensors if sensor.driver == DRIVER]
+    on_bus = root.table("servo_bus")
+    if not servos:
+        alone = [on_bus] if "servo_bus" in root.keys else []
+        for table in (*alone, *(root.table("sensor", sensor.name) for sensor in sensing)):
+            raise table.refused("", f"needs an output with the driver {DRIVER}")
+        return profile
+    if "servo_bus" not in root.keys:
+        raise root.table("output", servos[0].name).refused("", "is on a bus: add [servo_bus]")
+    if len(sensing) != 1:
+        raise root.error(
+            ("sensor", *(sensor.name for sensor in sensing[1:2])),
+            f"servos need one sensor with the driver {DRIVER}, such as [sensor.tendons], which "
+            "reports their failures",
+        )
+    if profile.stop.then != "release":
+        words = 'must be "release", so that no servo pulls while nobody commands'
+        raise root.table("stop").refused("then", words)
+    (bus,) = on_bus.decode(ServoBusKeys)
+    settings = bus.settings()
+    for output in servos:
+        if not stops_itself(output):
+            if profile.enable_pin is None:
+                words = f"is an {output.settings['model']}, which does not stop when its bus is "
+                words += "silent: add [enable] with the pin that keeps its power on"
+                raise root.table("output", output.name).refused("", words)
+            settings |= {"cut_ms": 2 * profile.enable_hold_ms, "arm_s": _START_S}
+    wired = {one.name: replace(one, settings=one.settings | settings) for one in servos}
+    with translate_errors(KeyMistake, to=lambda error: on_bus.refused(error.key, str(error))):
+        bus_settings([*wired.values()])
+    tendons = {"device": bus.device, "tendons": {one.name: one.settings for one in servos}}
+    return replace(
+        profile,
+        outputs=tuple(wired.get(output.name, output) for output in profile.outputs),
+        sensors=tuple(
+            replace(one, settings=tendons) if one in sensing else one for one in profile.sensors
+        ),
+    )
+
+
+RULES: Final = (
+    check_mix,
+    share_boards,
+    check_stop,
+    check_claims,
+    join_servo_bus,
+    check_limits,
+)
+"""All rules, in the order in which they apply."""

@@ -1,0 +1,260 @@
+"""Tables of a TOML file, decoded by msgspec; every mistake names its line and the way out."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import reprlib
+import tomllib
+from bisect import bisect_left
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date, time
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, cast
+
+import msgspec
+from msgspec import inspect
+
+from shapechanger.errors import ProfileError
+from shapechanger.robot.drivers.keys import KeyMistake, Keys
+from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin, bcm
+
+Place = tuple[str | int, ...]
+"""Path to a value: names of tables and keys, and indices into table arrays."""
+
+
+def line_of(text: str, place: Place) -> int:
+    """Return the line on which a table or key of a TOML text begins, from 1.
+
+    `tomllib` keeps no line numbers, but the beginning of a text up to the end of a statement is
+    valid TOML, so the line follows from the shortest beginning with the key.
+
+    Args:
+        text: Valid TOML, with Unix line ends.
+        place: The table or key; for a missing one the line of its table is returned.
+    """
+    lines = text.split("\n")
+    while not _has(lines, len(lines), place):
+        place = place[:-1]
+    counts = range(1, len(lines) + 1)
+    return 1 + bisect_left(counts, True, key=lambda count: _has(lines, count, place))
+
+
+def _has(lines: list[str], count: int, place: Place) -> bool:
+    """Return whether the first `count` lines, with all of their last statement, have a place."""
+    while True:
+        try:
+            data: Any = tomllib.loads("\n".join(lines[:count]))
+            break
+        except tomllib.TOMLDecodeError:
+            count += 1
+    try:
+        for name in place:
+            data = data[name]
+    except (KeyError, IndexError, TypeError):
+        return False
+    return True
+
+
+def choice(name: str, known: Iterable[str]) -> str:
+    """Describe an unknown name: the nearest spelling and the known names."""
+    names = sorted(known)
+    return f"{name!r}{_nearest(name, names)}; there are: {', '.join(names) or 'none'}"
+
+
+def _nearest(name: str, known: Sequence[str]) -> str:
+    # A key without its unit, such as `slew` for `slew_per_s`, may not be close.
+    with_unit = sorted((one for one in known if one.startswith(f"{name}_")), key=len)
+    close = [*with_unit, *difflib.get_close_matches(name, known, n=1)]
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def shown(value: Any) -> str:
+    """Format a value of a TOML file, shortening long ones."""
+    if isinstance(value, bool | float | date | time):
+        return str(value).lower()
+    try:
+        return reprlib.repr(value)
+    except ValueError:  # Python refuses to print thousands of digits.
+        return "a number too large to write"
+
+
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
+_PATH: Final = re.compile(r" - at `\$\.(\w+)")
+
+
+@cache
+def fields_of(kind: type) -> dict[str, inspect.Field]:
+    """Return the keys that a Struct or dataclass declares, keyed by name."""
+    info = cast("inspect.StructType", inspect.type_info(kind))
+    return {field.encode_name: field for field in info.fields}
+
+
+def keys_of(chip: Any) -> type[Keys]:
+    """Return the keys of a chip, or of a camera, which is no chip."""
+    return getattr(chip, "keys", chip)
+
+
+def permitted(kind: inspect.Type) -> str:
+    """Describe the values that a key may have; other types need `Meta(description=...)`."""
+    match kind:
+        case inspect.Metadata():
+            return cast("Any", kind).extra_json_schema["description"]
+        case inspect.IntType() | inspect.FloatType():
+            number = "a whole number" if isinstance(kind, inspect.IntType) else "a number"
+            if kind.multiple_of is not None:
+                number += f" in steps of {kind.multiple_of:g}"
+            if kind.ge is not None:
+                return f"{number} from {kind.ge:g} to {kind.le:g}"
+            return f"{number} above {kind.gt:g}" + (f" and up to {kind.le:g}" if kind.le else "")
+        case inspect.LiteralType():
+            return f"one of {', '.join(repr(value) for value in kind.values if value)}"
+        case inspect.BoolType():
+            return "true or false"
+        case inspect.UnionType():
+            return permitted(kind.types[0])
+        case _:
+            return cast("Any", kind).cls.words
+
+
+def _pin(kind: type[Pin], written: Any) -> Pin:
+    """Convert a pin for msgspec; the message of the error is the end of a sentence."""
+    if kind is OptionalPin and type(written) is int and written == NO_PIN:
+        return NO_PIN
+    try:
+        return kind(bcm(written))
+    except ValueError as error:
+        raise ValueError(str(error) or f"not {shown(written)}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table of a file, and its place.
+
+    Attributes:
+        path: The file.
+        text: All of its content.
+        place: Path of the table.
+        keys: Its keys and nested tables; anything else is refused.
+        decoded: All tables of the file that were decoded so far, with their `Keys`.
+    """
+
+    path: Path
+    text: str
+    place: Place
+    keys: dict[str, Any]
+    decoded: list[tuple[Table, Keys]] = field(default_factory=list["tuple[Table, Keys]"])
+
+    def __post_init__(self) -> None:
+        """Refuse a value that is no table."""
+        if not isinstance(cast("Any", self.keys), dict):
+            raise self.refused("", f"must be a table, not {shown(self.keys)}")
+
+    def __str__(self) -> str:
+        *names, last = self.place
+        if isinstance(last, int):
+            return f"[[{'.'.join(map(str, names))}]] number {last + 1}"
+        return f"[{'.'.join(map(str, self.place))}]"
+
+    def line(self, *keys: str | int) -> int:
+        """Return the line of one of its keys; for a missing one, the line of the table."""
+        return line_of(self.text, (*self.place, *keys))
+
+    def error(self, keys: Sequence[str | int], message: str) -> ProfileError:
+        """Return an error with the file, the line of a key and a message."""
+        return ProfileError(f"{self.path}, line {self.line(*keys)}: {message}.")
+
+    def refused(self, key: str, words: str, *within: str) -> ProfileError:
+        """Return an error about a key, or an entry within it; "" for the table itself.
+
+        Args:
+            key: Name of the key.
+            words: What is wrong, as the end of a sentence that begins with the key and its table.
+            within: Entry of the key.
+        """
+        if not key:
+            return self.error((), f"{self} {words}")
+        return self.error((key, *within), f"{key} of {self} {words}")
+
+    def table(self, *names: str) -> Table:
+        """Return a nested table, which is empty if the file does not have it."""
+        keys = self.keys
+        for name in names:
+            keys = keys.get(name, {})
+        return replace(self, place=(*self.place, *names), keys=keys)
+
+    def named(self) -> dict[str, Table]:
+        """Return the nested tables keyed by name; refuse names that no part may have."""
+        for name in self.keys:
+            if _NAME.fullmatch(name) is None:
+                raise self.error(
+                    (name,),
+                    f"the name {name!r} must begin with a letter and have at most 32 letters, "
+                    "digits, '_' and '-'",
+                )
+        return {name: self.table(name) for name in self.keys}
+
+    def chosen(self, key: str, names: Iterable[str]) -> str:
+        """Return the value of a key that is one of some names."""
+        kind = inspect.LiteralType(tuple(names))
+        if key not in self.keys:
+            raise self._lacks(key, kind)
+        if self.keys[key] not in kind.values:
+            raise self._unfit(key, kind)
+        return self.keys[key]
+
+    def decode(
+        self,
+        *kinds: type,
+        given: Mapping[str, Any] | None = None,
+        drivers: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> tuple[Any, ...]:
+        """Return one value of each type, whose fields together are the keys of the table.
+
+        Args:
+            kinds: Structs and dataclasses.
+            given: Fields that are no keys of the table.
+            drivers: Chips, or their keys, that a key of the table chooses from, keyed by this key:
+                an unknown key may belong to another one.
+        """
+        given = given or {}
+        known = {n: one for kind in kinds for n, one in fields_of(kind).items() if n not in given}
+        for name in self.keys:
+            if name not in known:
+                raise self.error((name,), self._unknown(name, known, drivers or {}))
+        for name, one in known.items():
+            if one.required and name not in self.keys:
+                raise self._lacks(name, one.type)
+        found = tuple(self._converted(kind, {**self.keys, **given}) for kind in kinds)
+        self.decoded.extend((self, keys) for keys in found if isinstance(keys, Keys))
+        return found
+
+    def _unknown(self, name: str, known: Iterable[str], drivers: Mapping[str, Any]) -> str:
+        for key, chips in drivers.items():
+            having = [repr(one) for one in chips if name in fields_of(keys_of(chips[one]))]
+            if having:
+                return f"{name!r} belongs to {key} = {' or '.join(having)}, not to {self}"
+        return f"{self} has no key {choice(name, known)}"
+
+    def _converted(self, kind: type, keys: dict[str, Any]) -> Any:
+        try:
+            return cast("Any", msgspec.convert(keys, kind, dec_hook=_pin))
+        except msgspec.ValidationError as error:
+            cause = error.__cause__
+            if isinstance(cause, KeyMistake):
+                raise self.refused(cause.key, str(cause)) from None
+            key = _PATH.findall(str(error))[0]  # Missing keys were found before.
+            raise self._unfit(key, fields_of(kind)[key].type, str(cause or "")) from None
+
+    def _lacks(self, key: str, kind: inspect.Type) -> ProfileError:
+        return self.refused("", f"lacks the key {key!r}, {permitted(kind)}")
+
+    def _unfit(self, key: str, kind: inspect.Type, why: str = "") -> ProfileError:
+        """Return an error about a value that the type of its key does not permit."""
+        value = self.keys[key]
+        why = why or f"not {shown(value)}"
+        if isinstance(kind, inspect.LiteralType) and isinstance(value, str):
+            why += _nearest(value, [*map(str, kind.values)])
+        return self.refused(key, f"must be {permitted(kind)}, {why}")
