@@ -1,8 +1,7 @@
 """Hardware below the drivers: pins, buses and clocks, real or of a twin.
 
-The processes of a robot get the source of their hardware as MODULE:FUNCTION and one argument.
-`raspberry_pi` has the real ones, and a twin has its own, so the same drivers run on both, and no
-code of the robot depends on a twin.
+The processes of a robot get the source of their hardware as MODULE:NAME and one argument, so the
+same drivers run on a Raspberry Pi and on a twin, and no code of the robot depends on a twin.
 """
 
 from __future__ import annotations
@@ -11,9 +10,15 @@ import importlib
 import select
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
-REAL: Final = "shapechanger.robot.raspberry_pi:real"
+from shapechanger.errors import RobotError, translate_errors
+
+if TYPE_CHECKING:  # Only a rig needs them.
+    from shapechanger.robot.drivers.servos.registers import ServoPort
+    from shapechanger.robot.drivers.servos.settings import BusSettings
+
+REAL: Final = "shapechanger.robot.hardware:Hardware"
 """Default source of the hardware."""
 
 
@@ -110,35 +115,6 @@ class ServoPins(Protocol):
         ...
 
 
-class Hardware(Protocol):
-    """Pins, buses and clock."""
-
-    @property
-    def clock(self) -> Clock:
-        """Clock of this process."""
-        ...
-
-    def pin_factory(self) -> Any:
-        """Return the `pin_factory` for gpiozero's devices."""
-        ...
-
-    def i2c(self, bus: int) -> I2cBus:
-        """Open the I2C bus of a number."""
-        ...
-
-    def servo_pins(self) -> ServoPins:
-        """Open the pins that send servo pulses."""
-        ...
-
-    def servo_port(self, settings: Any) -> Any:
-        """Open the port of a servo bus: a `ServoPort` for `BusSettings`, of `drivers.servos`."""
-        ...
-
-    def close(self) -> None:
-        """Close all of it."""
-        ...
-
-
 class RealClock:
     """The machine's monotonic clock."""
 
@@ -165,6 +141,68 @@ class RealClock:
         await asyncio.sleep(seconds)
 
 
+class Hardware:
+    """Pins, buses and clock of this machine, a Raspberry Pi; a twin overrides all of them.
+
+    Each library is imported when it is needed.
+
+    Args:
+        _: Argument of a twin's hardware.
+    """
+
+    def __init__(self, _: str = "") -> None:
+        self.clock: Clock = RealClock()
+        """Clock of this process."""
+        self._pin_factory: Any = None
+
+    def pin_factory(self) -> Any:
+        """Return gpiozero's factory for lgpio, independent of the environment variables.
+
+        Its pins go low at once; see `lgpio_pins`.
+
+        Raises:
+            RobotError: If the pins do not exist or cannot be opened.
+        """
+        if self._pin_factory is None:
+            # Of gpiozero or lgpio, or one of them is missing.
+            with translate_errors(Exception, to=_no_pins):
+                from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
+
+                self._pin_factory = LowAtOnceFactory()
+        return self._pin_factory
+
+    def i2c(self, bus: int) -> I2cBus:
+        """Open the I2C bus of a number, with smbus2."""
+        from smbus2 import SMBus
+
+        return SMBus(bus)
+
+    def servo_pins(self) -> ServoPins:
+        """Open the pins that send servo pulses, with lgpio."""
+        from shapechanger.robot.drivers.lgpio_pins import LgpioServoPins
+
+        return LgpioServoPins()
+
+    def servo_port(self, settings: BusSettings) -> ServoPort:
+        """Open the port of a servo bus, with `dynamixel_sdk`."""
+        from shapechanger.robot.drivers.servos.serial_port import open_serial_port
+
+        return open_serial_port(settings)
+
+    def close(self) -> None:
+        """Close all of it."""
+        if self._pin_factory is not None:
+            self._pin_factory.close()
+            self._pin_factory = None
+
+
+def _no_pins(error: Exception) -> RobotError:
+    return RobotError(
+        f"Cannot open this machine's pins ({str(error) or type(error).__name__}); "
+        "`shapechanger robot serve --twin` needs none."
+    )
+
+
 def load(place: str) -> Any:
     """Import what is at MODULE:NAME."""
     module, _, name = place.partition(":")
@@ -172,10 +210,5 @@ def load(place: str) -> Any:
 
 
 def connect(source: str, argument: str) -> Hardware:
-    """Return the hardware of a source.
-
-    Args:
-        source: MODULE:FUNCTION.
-        argument: Argument of the function.
-    """
+    """Return the hardware of a source, MODULE:NAME, which is called with the argument."""
     return load(source)(argument)

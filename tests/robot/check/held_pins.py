@@ -6,9 +6,9 @@ from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
+from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.raspberry_pi import RealHardware
 
 
 def shipped(kind: str) -> Profile:
@@ -16,7 +16,7 @@ def shipped(kind: str) -> Profile:
     return load_profile(find_profile(kind))
 
 
-class HeldPins(RealHardware):
+class HeldPins(Hardware):
     """gpiozero's mock pins, which stay as they are when they are closed."""
 
     def __init__(self) -> None:

@@ -18,7 +18,7 @@ from shapechanger.robot.check.pins import (
     probed_pin,
 )
 from shapechanger.robot.check.report import Finding
-from shapechanger.robot.raspberry_pi import RealHardware
+from shapechanger.robot.hardware import Hardware
 from tests.robot.check.held_pins import HeldPins, shipped
 
 _PLAN = GuardPlan(
@@ -31,7 +31,7 @@ _PLAN = GuardPlan(
 )
 
 
-class _Joined(RealHardware):
+class _Joined(Hardware):
     """gpiozero's mock pins; 20 and 21 are joined, 20 and 16 are not."""
 
     def __init__(self) -> None:

@@ -18,9 +18,8 @@ from shapechanger.robot.check.report import Finding
 from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
-from shapechanger.robot.hardware import RealClock
+from shapechanger.robot.hardware import Hardware, RealClock
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.setup.systemd import unit_name
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
@@ -399,7 +398,7 @@ class _High(MockPin):
         return True
 
 
-class _Pins(RealHardware):
+class _Pins(Hardware):
     """gpiozero's mock pins, some of them held."""
 
     def __init__(self, held: dict[int, type[MockPin]]) -> None:

@@ -16,7 +16,6 @@ from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
 from shapechanger.robot.guard.outputs import enable_device
 from shapechanger.robot.hardware import Hardware
-from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.setup.computer import needs_pins
 
 _TOGGLES: Final = 50
@@ -97,7 +96,7 @@ def check_jumper(
         _require_free_pin(pin, plan)
     if output == sensed:
         raise RobotError(f"A jumper joins two pins, got {output} twice.")
-    with closing(hardware or RealHardware()) as pins:
+    with closing(hardware or Hardware()) as pins:
         factory = pins.pin_factory()
         with (
             DigitalOutputDevice(output, pin_factory=factory) as driven,

@@ -36,7 +36,6 @@ from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.setup.computer import (
     FAST_HZ,
     boot_config,
@@ -72,7 +71,7 @@ class StandingRobot:
     port: int = 0
     root: Path = Path("/")
     look: Callable[[CameraPlan], Camera] = open_camera
-    hardware: Callable[[], Hardware] = RealHardware
+    hardware: Callable[[], Hardware] = Hardware
     motors_off: bool = False
     installed: bool = True
     on_twin: bool = False

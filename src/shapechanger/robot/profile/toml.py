@@ -98,25 +98,26 @@ def keys_of(chip: Any) -> type[Keys]:
 
 
 def permitted(kind: inspect.Type) -> str:
-    """Describe the values that a key may have; other types need `Meta(description=...)`."""
+    """Describe the values that a key may have: by `Meta(description=...)`, or by its type."""
     match kind:
         case inspect.Metadata():
             return cast("Any", kind).extra_json_schema["description"]
         case inspect.IntType() | inspect.FloatType():
             number = "a whole number" if isinstance(kind, inspect.IntType) else "a number"
-            if kind.multiple_of is not None:
-                number += f" in steps of {kind.multiple_of:g}"
-            if kind.ge is not None:
-                return f"{number} from {kind.ge:g} to {kind.le:g}"
-            return f"{number} above {kind.gt:g}" + (f" and up to {kind.le:g}" if kind.le else "")
+            to = "to" if kind.gt is None else "and up to"
+            ends = {"in steps of": kind.multiple_of, "from": kind.ge, "above": kind.gt, to: kind.le}
+            given = (f"{word} {end:g}" for word, end in ends.items() if end is not None)
+            return " ".join((number, *given))
         case inspect.LiteralType():
             return f"one of {', '.join(repr(value) for value in kind.values if value)}"
         case inspect.BoolType():
             return "true or false"
         case inspect.UnionType():
             return permitted(kind.types[0])
+        case inspect.CustomType():
+            return kind.cls.words
         case _:
-            return cast("Any", kind).cls.words
+            return f"a {type(kind).__name__.removesuffix('Type').lower()}"
 
 
 def _pin(kind: type[Pin], written: Any) -> Pin:

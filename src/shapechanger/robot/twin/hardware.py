@@ -11,6 +11,7 @@ from typing import Any
 from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
+from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.twin.rpc import (
     GONE,
     MAX_MESSAGE,
@@ -189,7 +190,7 @@ class TwinServoPort:
         """Do nothing: the bus outlives the port."""
 
 
-class TwinHardware:
+class TwinHardware(Hardware):
     """Pins, buses and time of a board; see `shapechanger.robot.hardware.Hardware`."""
 
     def __init__(self, board: BoardClient, clock: SteadyClock) -> None:

@@ -20,7 +20,6 @@ from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.outputs import make_safe
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.raspberry_pi import RealHardware
 from shapechanger.robot.twin.check.driver import Driver
 from shapechanger.robot.twin.check.driving import check_driving
 from shapechanger.robot.twin.check.faults import FAULTS, BadNetwork, Fault, NotTried, Scene
@@ -173,13 +172,13 @@ class Bench:
 
     def pins(self) -> Hardware:
         """Open the pins and buses."""
-        return connect(self.board().socket_path) if self.twin else RealHardware()
+        return connect(self.board().socket_path) if self.twin else Hardware()
 
     def watcher(self) -> Watcher:
         """Open a watcher of the outputs."""
         if self.twin:
             return _BoardWatcher(self.board(), self.wiring)
-        return Watcher() if self._probe is None else _ProbeWatcher(*self._probe, RealHardware())
+        return Watcher() if self._probe is None else _ProbeWatcher(*self._probe, Hardware())
 
     def robot(self) -> RunningRobot:
         """Return the robot, served now if it is not."""
@@ -203,7 +202,7 @@ class Bench:
         self._stack.close()
         if self.twin or not was_served:
             return []
-        with closing(RealHardware()) as hardware:
+        with closing(Hardware()) as hardware:
             return make_safe(self.profile, hardware)
 
     def lacks(self, need: str) -> str:
