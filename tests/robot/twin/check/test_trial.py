@@ -36,7 +36,7 @@ def test_a_probe_measures_the_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     now_ns = 0
     monkeypatch.setattr("time.monotonic_ns", lambda: now_ns)
     pins, car = HeldPins(), shipped("car")
-    monkeypatch.setattr(module, "RealHardware", lambda: pins)
+    monkeypatch.setattr(module, "Hardware", lambda: pins)
     watcher = Bench(car, twin=False, probe=20).watcher()
     wire = pins.factory.pin(20)
     now_ns = 1_000_000_000
