@@ -24,10 +24,11 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.files import write_atomic
 from shapechanger.finger.gap import GAPS
 from shapechanger.policy import load_policy, save_policy
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 
 SEEDS: Final = 5

@@ -25,10 +25,10 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body
 from shapechanger.files import read_json, write_json
 from shapechanger.policy import load_policy, save_policy
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import fitted
 from shapechanger.transfer.limbs.learner import LimbLearner

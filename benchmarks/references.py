@@ -23,6 +23,7 @@ from shapechanger.contract.env_ref import EnvRef, measures_of
 from shapechanger.envs.naming import default_learner
 from shapechanger.files import read_json, write_atomic, write_json
 from shapechanger.policy import load_policy, save_policy
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
@@ -31,7 +32,7 @@ from shapechanger.transfer.learners.evaluation import (
     zero_actions,
 )
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
 from shapechanger.transfer.runs import RunResult, learner_of

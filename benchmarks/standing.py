@@ -22,10 +22,11 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.contract.world import Pose
 from shapechanger.policy import load_policy, save_policy
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import LEARNERS
-from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import RangesEnv

@@ -36,8 +36,8 @@ from shapechanger.demos.drivers import DriverDecision, ExpertPilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.presets import LEARNERS
-from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.vehicles.cameras.rectify import CanonicalView
 from shapechanger.vehicles.cloning import CloningSettings, record_demonstrations, state_actions
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT

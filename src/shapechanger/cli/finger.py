@@ -18,6 +18,22 @@ from shapechanger.demos.episodes.files import read_file
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.files import require_file, write_atomic
+from shapechanger.finger.anatomy import JOINTS, TENDONS
+from shapechanger.finger.export import finger_mjcf
+from shapechanger.finger.gap import resolve_gap, shipped_rig
+from shapechanger.finger.identify import identify, load_log, save_log
+from shapechanger.finger.identify.log import record_babble
+from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters, named_set
+from shapechanger.finger.report import (
+    arm_cell,
+    finger_html,
+    interval,
+    label,
+    number,
+    summary_line,
+    unknown,
+)
+from shapechanger.finger.tensions import drive_of
 
 if TYPE_CHECKING:
     from shapechanger.finger.identify import IdentifiedFinger
@@ -44,9 +60,6 @@ class Identify:
 
     def run(self) -> None:
         """Print the parameters, and write them and the report."""
-        from shapechanger.finger.identify import identify, load_log
-        from shapechanger.finger.report import finger_html, summary_line, unknown
-
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
         for path in files:
@@ -54,8 +67,6 @@ class Identify:
                 raise OutputError(f"Cannot write {path}: it is the log.")
         log = load_log(self.log)
         if self.geared and log.motors is None:
-            from shapechanger.finger.gap import shipped_rig
-
             log = dataclasses.replace(log, motors=shipped_rig())
         for path in files:
             require_file(path)
@@ -76,9 +87,6 @@ class Identify:
 
 def _arms_table(found: IdentifiedFinger) -> Table:
     """Moment arms, tendon by joint."""
-    from shapechanger.finger.anatomy import JOINTS, TENDONS
-    from shapechanger.finger.report import arm_cell
-
     cells = {e.name: arm_cell(e) for e in found.arms}
     table = Table("moment arm [mm]", *JOINTS, box=None, pad_edge=False)
     for tendon in TENDONS:
@@ -89,8 +97,6 @@ def _arms_table(found: IdentifiedFinger) -> Table:
 
 def _table(found: IdentifiedFinger) -> Table:
     """Parameters other than the moment arms."""
-    from shapechanger.finger.report import interval, label, number
-
     table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
     for e in found.estimates:
         if e not in found.arms:
@@ -122,9 +128,6 @@ class RecordFinger:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from shapechanger.finger.identify import save_log
-        from shapechanger.finger.identify.log import record_babble
-
         require_seed(self.seed)
         require_seed(self.finger_seed)
         if not 0.0 < self.seconds < float("inf"):
@@ -171,11 +174,6 @@ class ExportFinger:
         """Write the file."""
         import numpy as np
 
-        from shapechanger.finger.export import finger_mjcf
-        from shapechanger.finger.gap import resolve_gap
-        from shapechanger.finger.parameters import NOMINAL
-        from shapechanger.finger.tensions import drive_of
-
         require_seed(self.finger_seed)
         require_file(self.out)
         if self.gap and self.parameters:
@@ -192,8 +190,6 @@ class ExportFinger:
 
 def _parameters(given: str) -> FingerParameters:
     """Return a named set of parameters, or one from a file."""
-    from shapechanger.finger.parameters import PARAMETER_SETS, FingerParameters, named_set
-
     path = Path(given)
     if given in PARAMETER_SETS or not (path.suffix or path.exists()):
         return named_set(given)

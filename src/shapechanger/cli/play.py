@@ -24,6 +24,7 @@ from shapechanger.envs.naming import env_ref
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
 from shapechanger.reports.films import require_film, write_film
+from shapechanger.transfer.learners.evaluation import random_actions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +43,6 @@ class Watching:
 
     def show(self, ref: EnvRef, policy: Path | None, *, trained_in: bool = False) -> None:
         """Show episodes in a window or write them as a film, and print the returns."""
-        from shapechanger.transfer.learners.evaluation import random_actions
-
         require_seed(self.seed)
         if self.episodes < 1 or self.max_steps < 1:
             raise StudyError("Playing takes at least one episode of one step.")

@@ -16,6 +16,7 @@ from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
 from shapechanger.cli.play import Watching
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
+from shapechanger.demos.cloning.onnx_policy import export_clone
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.envs.naming import allow_own_modules, driven, env_ref
 from shapechanger.errors import ShapechangerError, StudyError
@@ -23,7 +24,9 @@ from shapechanger.identity import identify_env
 from shapechanger.own_modules import texts_in
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import ENV, known, single_body
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import load_references
+from shapechanger.vehicles.expert import PERIOD_S
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
@@ -164,8 +167,6 @@ class EvaluatePolicy:
 
     def run(self) -> None:
         """Evaluate."""
-        from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
-
         if self.episodes < 1:
             raise StudyError("An evaluation takes at least one episode.")
         ref = _env_of(self.file, self.env, self.body, self.learner)
@@ -245,7 +246,6 @@ class ExportPolicy:
 
     def run(self) -> None:
         """Write the file."""
-        from shapechanger.demos.cloning.onnx_policy import export_clone
         from shapechanger.demos.cloning.policy import CameraPolicy
         from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
@@ -277,8 +277,6 @@ class ExportPolicy:
 
 def _learned_with(card: CloneCard) -> tuple[str, float | None]:
     """Return the body and the rate of a clone's demonstrations, as far as its card tells."""
-    from shapechanger.vehicles.expert.driver import PERIOD_S
-
     env = card.data.get("env")
     if env is None:
         return str(card.data.get("body", "")), card.data.get("control_hz")

@@ -25,6 +25,7 @@ from shapechanger.cli.console import (
 from shapechanger.cli.env_arguments import ClusterAddress, ExecutorKind, executor_of, require_seed
 from shapechanger.cli.transfer import run_steps
 from shapechanger.envs.naming import allow_own_modules, default_learner
+from shapechanger.envs.study_films import film_study
 from shapechanger.envs.suite_file import (
     SuiteFile,
     load_suite,
@@ -45,6 +46,20 @@ from shapechanger.transfer.plan import (
     planned_arms,
     read_plan,
 )
+from shapechanger.transfer.report.study import write_study_report
+from shapechanger.transfer.report.suite import Sweep, suite_html
+from shapechanger.transfer.runs import last_evaluation, load_result
+from shapechanger.transfer.study import (
+    STUDY_FILE,
+    Study,
+    default_arms,
+    inspect_task,
+    looks_in,
+    make_plan,
+    run_study,
+    unfinished_runs,
+)
+from shapechanger.transfer.suite import merge_study, open_study_folder, study_outcome
 
 if TYPE_CHECKING:
     from shapechanger.transfer.report.suite import FilmStrip
@@ -85,9 +100,6 @@ class RunSuite:
 
     def run(self) -> None:
         """Run the studies, write their reports, and print the joint table."""
-        from shapechanger.transfer.study import inspect_task, run_study, unfinished_runs
-        from shapechanger.transfer.suite import open_study_folder
-
         suite = load_suite(self.name)
         given = {name: getattr(self, name) for name in ("seeds", "steps", "source_steps", "seed")}
         chosen = msgspec.structs.replace(
@@ -134,8 +146,6 @@ class RunSuite:
 
 def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
     """Return the plan of one study."""
-    from shapechanger.transfer.study import default_arms, make_plan
-
     learner, settings = resolve_learner(
         suite.learner or default_learner(task.target), suite.settings
     )
@@ -190,9 +200,6 @@ class MergeSuites:
 
     def run(self) -> None:
         """Copy what has ended, and report the studies that are complete."""
-        from shapechanger.transfer.study import STUDY_FILE, looks_in, run_study, unfinished_runs
-        from shapechanger.transfer.suite import merge_study
-
         suite = load_suite(self.name)
         allow_own_modules(suite.learner, *suite.arms)
         tasks = dict(suite_tasks(suite))
@@ -238,8 +245,6 @@ class ListSuites:
 
 def _progress_table(out: Path) -> tuple[Table, bool]:
     """A row for each study in a suite's folder, and whether all are complete."""
-    from shapechanger.transfer.runs import last_evaluation, load_result
-
     table = Table("study", "runs", "steps", "at work", box=None)
     complete = True
     for path in sorted(out.glob(f"*/{PLAN_FILE}")):
@@ -283,8 +288,6 @@ class _Page:
     def __init__(
         self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]
     ) -> None:
-        from shapechanger.transfer.study import STUDY_FILE, Study
-
         self.path = out / "index.html"
         self._suite, self._name, self._out, self._tasks = suite, name, out, tasks
         self._strips: dict[str, list[FilmStrip]] = {}
@@ -296,10 +299,6 @@ class _Page:
 
     def add(self, name: str, study: Study) -> None:
         """Add a study that has ended, or replace it; write its report and the page."""
-        from shapechanger.envs.study_films import film_study
-        from shapechanger.transfer.report.study import write_study_report
-        from shapechanger.transfer.report.suite import Sweep, suite_html
-
         write_study_report(study, self._out / name)
         self._studies[name] = study
         for one in self._studies:
@@ -334,8 +333,6 @@ class _Page:
 
     def outcomes(self) -> list[StudyOutcome]:
         """Return the outcome of each study, in the order of the suite."""
-        from shapechanger.transfer.suite import study_outcome
-
         return [study_outcome(name, study) for name, study in self._ordered().items()]
 
     def _ordered(self) -> dict[str, Study]:

@@ -17,8 +17,10 @@ from shapechanger.envs.naming import allow_own_modules, default_learner, driven,
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.files import make_folder, require_file
 from shapechanger.policy import load_policy
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.presets import in_many_bodies, resolve_learner, tuning_text
+from shapechanger.transfer.runs import learner_of
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Evaluation
@@ -55,8 +57,6 @@ class Train:
 
     def run(self) -> None:
         """Train and print evaluations as they complete."""
-        from shapechanger.transfer.learners.sb3 import use_one_thread
-
         require_seed(self.seed)
         allow_own_modules(self.learner)
         env = driven(env_ref(self.env, self.body))
@@ -86,8 +86,6 @@ class Train:
 
     def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
-        from shapechanger.transfer.runs import learner_of
-
         own = "limbs" if self.bodies else default_learner(env)
         wanted = self.learner or own
         if self.bodies:

@@ -32,6 +32,16 @@ from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import Plan, Run, TransferTask
+from shapechanger.transfer.report.study import write_study_report
+from shapechanger.transfer.report.verdict import findings
+from shapechanger.transfer.study import (
+    default_arms,
+    inspect_task,
+    is_folder_of,
+    make_plan,
+    run_study,
+    unfinished_runs,
+)
 
 if TYPE_CHECKING:
     from shapechanger.transfer.report.verdict import Findings
@@ -113,17 +123,9 @@ class Transfer:
         learner, settings, steps = self._learner(task)
         # Budgets are refused before PyTorch is imported and envs are opened, which takes seconds.
         study_budgets(settings, steps, self.source_steps, is_given=bool(self.source_policy))
-        from shapechanger.transfer.study import (
-            inspect_task,
-            is_folder_of,
-            run_study,
-            unfinished_runs,
-        )
 
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
-        from shapechanger.transfer.report.study import write_study_report
-        from shapechanger.transfer.report.verdict import findings
 
         traits = inspect_task(task)
         given = self.source_policy and policy_file(self.source_policy, task.source)
@@ -196,8 +198,6 @@ class Transfer:
         given: Path | None,
     ) -> Plan:
         """The plan of the study."""
-        from shapechanger.transfer.study import default_arms, make_plan
-
         try:
             map_text = read_text(self.map) if self.map else ""
         except (OSError, ValueError) as error:
@@ -257,8 +257,6 @@ def _name(env: EnvRef) -> str:
 
 def _way_on(plan: Plan, out: Path) -> str:
     """Tell how to resume an interrupted study; empty if it had not started."""
-    from shapechanger.transfer.study import is_folder_of, unfinished_runs
-
     if not is_folder_of(plan, out):
         return ""
     if len(unfinished_runs(plan, out)) == len(plan.runs()):

@@ -269,3 +269,14 @@ def _end_with_parent() -> None:
     if parent is not None:
         wait([parent.sentinel])
         os._exit(1)
+
+
+def use_one_thread() -> None:
+    """Limit PyTorch in this process to one thread.
+
+    Networks this small gain nothing from more, several runs share the machine, and sums in another
+    order are other sums.
+    """
+    import torch  # It takes seconds to load, and plans and reports need none of it.
+
+    torch.set_num_threads(1)

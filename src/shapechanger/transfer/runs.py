@@ -17,7 +17,7 @@ import msgspec
 from shapechanger.errors import CorruptStudy, ForeignStudy, StudyError
 from shapechanger.files import append_line, make_folder, read_json, write_json
 from shapechanger.identity import Identity
-from shapechanger.transfer.executor import ReportSteps
+from shapechanger.transfer.executor import ReportSteps, use_one_thread
 from shapechanger.transfer.learners import Learner, LearnerSettings, SharedFile
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
@@ -25,7 +25,6 @@ from shapechanger.transfer.learners.evaluation import (
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 from shapechanger.transfer.versions import differences, parts_of, require_planned

@@ -19,6 +19,7 @@ from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.envs.naming import driven, env_ref
 from shapechanger.errors import DemosError
+from shapechanger.transfer.executor import use_one_thread
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,6 @@ class RecordDemonstrations:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from shapechanger.transfer.learners.sb3 import use_one_thread
-
         require_seed(self.seed)
         for name, value in (("minutes", self.minutes), ("episode-s", self.episode_s)):
             if not 0.0 < value < float("inf"):

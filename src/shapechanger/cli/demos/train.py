@@ -13,9 +13,11 @@ import tyro
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import require_seed
+from shapechanger.demos.cloning.settings import settings_for
 from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import require_file, write_atomic
+from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.vehicles.cameras.rectify import CameraGeometry, CanonicalView
 from shapechanger.vehicles.waypoints import SteeringResponse, as_waypoints
@@ -70,9 +72,7 @@ class TrainClone:
         from shapechanger.demos.cloning.evaluation import duration_s, evaluate, outlook
         from shapechanger.demos.cloning.examples import evaluated_steps
         from shapechanger.demos.cloning.learn import learn
-        from shapechanger.demos.cloning.settings import settings_for
         from shapechanger.demos.cloning.shrinking import ShrunkFrames
-        from shapechanger.transfer.learners.sb3 import use_one_thread
 
         view = self._view()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))

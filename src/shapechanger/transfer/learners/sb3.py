@@ -260,15 +260,6 @@ class Sb3Learner(Learner[Sb3Settings]):
             )
 
 
-def use_one_thread() -> None:
-    """Limit PyTorch in this process to one thread.
-
-    Networks this small gain nothing from more, several runs share the machine, and sums in another
-    order are other sums.
-    """
-    torch.set_num_threads(1)
-
-
 def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] | None:
     """Raise standard deviations that have collapsed to `START_LOG_STD`.
 

@@ -13,7 +13,7 @@ from typing import Final, Literal
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from shapechanger.errors import StudyError
 
@@ -77,7 +77,7 @@ def estimate_difference(
     squares = np.array([arm.var(ddof=1) / arm.size, scratch.var(ddof=1) / scratch.size])
     shares = squares / squares.sum()
     freedom = 1.0 / float((shares**2 / np.array([arm.size - 1, scratch.size - 1])).sum())
-    half = float(stats.t.ppf(0.5 + confidence / 2.0, freedom)) * math.sqrt(float(squares.sum()))
+    half = float(stdtrit(freedom, 0.5 + confidence / 2.0)) * math.sqrt(float(squares.sum()))
     return Estimate(value, value - half, value + half, "Welch's t")
 
 

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics.intervals import CONFIDENCE, Estimate
@@ -40,6 +39,8 @@ def interquartile_mean(
     Raises:
         StudyError: If there are no runs.
     """
+    from scipy import stats  # It takes a second to load.
+
     _require_runs(scores)
     mean: Any = stats.trim_mean(np.concatenate(scores), _TRIMMED)
     drawn = np.concatenate([_drawn(group, n_resamples, rng) for group in scores], axis=1)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import ProfileError, WorldError, check_seed
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.expert.driver import PERIOD_S, CourseExpert
+from shapechanger.vehicles.expert import PERIOD_S
+from shapechanger.vehicles.expert.driver import CourseExpert
 from shapechanger.vehicles.waypoints import AHEAD_M, WIDEST_RAD
 from shapechanger.vehicles.world import MujocoWorld
 

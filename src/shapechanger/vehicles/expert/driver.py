@@ -26,11 +26,9 @@ from shapechanger.errors import WorldError
 from shapechanger.vehicles.bodies import VEHICLES, VehicleModel, vehicle_model
 from shapechanger.vehicles.courses.course import Course
 from shapechanger.vehicles.courses.geometry import ClearanceField
+from shapechanger.vehicles.expert import PERIOD_S
 from shapechanger.vehicles.expert.line import Spot
 from shapechanger.vehicles.expert.path import CoursePath, plan_path
-
-PERIOD_S: Final = 0.05
-"""Control period of the experts, s."""
 
 
 @dataclass(frozen=True, slots=True)
