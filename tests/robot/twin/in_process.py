@@ -27,8 +27,9 @@ from shapechanger.robot.link.card import card_of
 from shapechanger.robot.link.messages import Observation, Welcome
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.board import START_NS
-from shapechanger.robot.twin.hardware import BoardClient, SteadyClock, TwinHardware
+from shapechanger.robot.twin.hardware import SteadyClock, TwinHardware
 from shapechanger.robot.twin.pin_board import PinBoard
+from shapechanger.robot.twin.rpc import BoardClient
 from shapechanger.robot.twin.wiring import TwinWiring
 
 _log = logging.getLogger(__name__)

@@ -11,7 +11,8 @@ from contextlib import contextmanager
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Clock
-from shapechanger.robot.twin.hardware import BoardClient, GrantedClock, SteadyClock, TwinHardware
+from shapechanger.robot.twin.hardware import GrantedClock, SteadyClock, TwinHardware
+from shapechanger.robot.twin.rpc import BoardClient
 
 ACTIONS = (ActionPlan("steering"), ActionPlan("throttle", propels=True))
 

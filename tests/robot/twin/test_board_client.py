@@ -12,8 +12,8 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.twin import rpc
-from shapechanger.robot.twin.hardware import BoardClient, GrantedClock, SteadyClock
-from shapechanger.robot.twin.rpc import MAX_MESSAGE, Greeting, Reply, encode
+from shapechanger.robot.twin.hardware import GrantedClock, SteadyClock
+from shapechanger.robot.twin.rpc import MAX_MESSAGE, BoardClient, Greeting, Reply, encode
 
 
 def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:

@@ -13,8 +13,9 @@ from gpiozero import Motor
 from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
-from shapechanger.robot.twin.hardware import BoardClient, TwinHardware, connect
+from shapechanger.robot.twin.hardware import TwinHardware, connect
 from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.rpc import BoardClient
 from shapechanger.robot.twin.start import RunningBoard, start_board
 from tests.robot.twin.robots import BUMPER, CAR, ENCODER
 

@@ -23,6 +23,8 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.operator import Operator
 from shapechanger.robot.twin.start import BoardAt, end
 
+__all__ = ["Operator", "RunningRobot", "run_robot"]
+
 _READY: Final = "ready.json"
 """File that the daemon writes when it can be reached."""
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
