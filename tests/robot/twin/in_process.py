@@ -52,6 +52,7 @@ class LocalBoard(BoardClient):
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
         self._closed = False
+        self.clock = "twin"
         self.hardware = TwinHardware(self, cast("SteadyClock", _Clock(self)))
 
     @property
@@ -67,10 +68,6 @@ class LocalBoard(BoardClient):
                 self.levels[pin] = level
                 if self.on_edge is not None:
                     self.on_edge(pin, level, t)
-
-    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Refuse: the caller is the one who would have to advance the board."""
-        raise RobotError("The time of a board in this process advances only by `advance`.")
 
     def pass_ns(self, ns: int) -> None:
         """Advance time by some nanoseconds."""
@@ -91,9 +88,6 @@ class LocalBoard(BoardClient):
         takes_caller = "caller" in signature(called).parameters
         return called(self, *arguments) if takes_caller else called(*arguments)
 
-    def drain(self) -> None:
-        """Do nothing: edges arrive with `advance`."""
-
     def close(self) -> None:
         """Use the pins no more."""
         self._closed = True
@@ -107,7 +101,7 @@ class _Clock:
         return self._board._now_ns
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        return self._board.wait(readable, until_ns, at_most_s)
+        raise RobotError("The time of a board in this process advances only by `advance`.")
 
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Do nothing: a guard in this process has no supervisor."""

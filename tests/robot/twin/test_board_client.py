@@ -16,6 +16,10 @@ from shapechanger.robot.twin.hardware import GrantedClock, SteadyClock
 from shapechanger.robot.twin.rpc import MAX_MESSAGE, BoardClient, Greeting, Reply, encode
 
 
+def _reply(number: int, result: object) -> bytes:
+    return encode(Reply(number, msgspec.Raw(encode(result))))
+
+
 def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
     """Return a client and the board's end of its connection, which nobody reads."""
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -27,8 +31,7 @@ def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
     def greet() -> None:
         end, _ = listening.accept()
         end.recv(MAX_MESSAGE)
-        greeting = msgspec.Raw(msgspec.msgpack.encode(Greeting(clock="real", t=0)))
-        end.send(encode(Reply(id=1, result=greeting)))
+        end.send(_reply(1, Greeting(clock="real", t=0)))
         ends.append(end)
 
     with listening:
@@ -47,7 +50,7 @@ def test_a_late_reply_is_waited_for_with_heartbeats(tmp_path: Path, clock: str) 
 
     def beat() -> None:
         if next(beats) == 5:
-            board.send(encode(Reply(id=2, result=msgspec.Raw(msgspec.msgpack.encode(7)))))
+            board.send(_reply(2, 7))
 
     made = SteadyClock(client) if clock == "steady" else GrantedClock(client, "")
     made.keep_alive(beat)

@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from gpiozero import Motor
 
-from shapechanger.contract.plan import GuardPlan, SensorPlan
+from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
-from shapechanger.robot.twin.hardware import TwinHardware, connect
-from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.rpc import BoardClient
-from shapechanger.robot.twin.start import RunningBoard, start_board
+from shapechanger.robot.twin.operator import operator_functions
+from shapechanger.robot.twin.room import DrivingWorld
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import BUMPER, CAR, ENCODER
-
-pytestmark = pytest.mark.realtime
 
 _SINGLE = replace(ENCODER, settings={**ENCODER.settings, "b": -1})
 _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
@@ -28,66 +27,57 @@ _BATTERY = SensorPlan("battery", "ina219", "battery", {"bus": 1, "address": 0x40
 
 
 class _Rig:
-    """A car with one sensor on the twin's clock."""
+    """A car with one sensor, in this process."""
 
-    def __init__(self, board: RunningBoard, operator: Operator, sensor: SensorPlan) -> None:
-        self.hardware: TwinHardware = connect(board.socket_path)
-        self.operator = operator
-        self.motor = Motor(22, 27, pin_factory=self.hardware.pin_factory())
-        self.sensor: SensorDriver = open_sensor(sensor, self.hardware)
+    def __init__(self, sensor: SensorPlan) -> None:
+        plan = replace(CAR, sensors=(sensor,), enable_pin=None)
+        self.world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)
+        self.board = LocalBoard(TwinWiring(plan), self.world)
+        self.motor = Motor(22, 27, pin_factory=self.board.hardware.pin_factory())
+        self.sensor: SensorDriver = open_sensor(sensor, self.board.hardware)
+        functions = operator_functions(self.board.pins)
+        self.operator: Any = SimpleNamespace(**{one.__name__: one for one in functions})
         self.seen: dict[str, float] = {}
 
     def advance(self, seconds: float) -> dict[str, float]:
         """Advance the clock, deliver edges and read the sensor."""
         for _ in range(round(seconds * 100)):
-            now_ns = self.operator.advance(0.01)
-            board = self.hardware.board
-            assert isinstance(board, BoardClient)
-            board.drain()
-            board.dispatch()
-            board.now_ns = now_ns
-            self.seen |= self.sensor.read(now_ns, self.motor.value)
+            self.board.pass_ns(10_000_000)
+            self.seen |= self.sensor.read(self.board.t, self.motor.value)
         return self.seen
 
 
 @contextmanager
-def _rig(folder: Path, sensor: SensorPlan) -> Iterator[_Rig]:
-    plan: GuardPlan = replace(CAR, sensors=(sensor,), enable_pin=None)
-    with (
-        start_board(plan, "twin", folder, seed=1) as board,
-        Operator(board.socket_path) as operator,
-    ):
-        rig = _Rig(board, operator, sensor)
-        yield rig
-        rig.sensor.close()
-        rig.hardware.close()
+def _rig(sensor: SensorPlan) -> Iterator[_Rig]:
+    rig = _Rig(sensor)
+    yield rig
+    rig.sensor.close()
+    rig.board.hardware.close()
 
 
 @pytest.mark.parametrize("sensor", [ENCODER, _SINGLE])
 @pytest.mark.parametrize("throttle", [0.5, -0.5])
-def test_the_encoder_measures_the_speed(
-    tmp_path: Path, sensor: SensorPlan, throttle: float
-) -> None:
+def test_the_encoder_measures_the_speed(sensor: SensorPlan, throttle: float) -> None:
     """The driver computes the signed speed of the world from the edges."""
-    with _rig(tmp_path, sensor) as rig:
+    with _rig(sensor) as rig:
         rig.motor.value = throttle
         seen = rig.advance(0.6)
         assert seen["speed"] == pytest.approx(rig.operator.where().speed, rel=0.1)
         assert seen["speed"] * throttle > 0.0
 
 
-def test_the_encoder_counts_the_distance(tmp_path: Path) -> None:
+def test_the_encoder_counts_the_distance() -> None:
     """A wheel turn of 0.2 m gives 80 edges."""
     edges: list[int] = []
-    with _rig(tmp_path, ENCODER) as rig:
-        inner = rig.hardware.board.on_edge
+    with _rig(ENCODER) as rig:
+        inner = rig.board.on_edge
         assert inner is not None
 
         def count(pin: int, level: int, at_ns: int) -> None:
             edges.append(at_ns)
             inner(pin, level, at_ns)
 
-        rig.hardware.board.on_edge = count
+        rig.board.on_edge = count
         rig.motor.value = 1.0
         rig.advance(0.7)
         travelled = rig.operator.where().travelled_m
@@ -95,9 +85,9 @@ def test_the_encoder_counts_the_distance(tmp_path: Path) -> None:
         assert edges == sorted(edges)
 
 
-def test_the_bumper_is_pressed(tmp_path: Path) -> None:
+def test_the_bumper_is_pressed() -> None:
     """Operators and walls press the bumper."""
-    with _rig(tmp_path, BUMPER) as rig:
+    with _rig(BUMPER) as rig:
         assert rig.advance(0.02)["bump"] == 0.0
         rig.operator.press_bumper()
         assert rig.advance(0.02)["bump"] == 1.0
@@ -109,9 +99,9 @@ def test_the_bumper_is_pressed(tmp_path: Path) -> None:
         assert rig.advance(0.02)["bump"] == 1.0
 
 
-def test_the_distance_is_measured(tmp_path: Path) -> None:
+def test_the_distance_is_measured() -> None:
     """The echo gives the distance; an operator can override it; a dead sensor raises."""
-    with _rig(tmp_path, _DISTANCE) as rig:
+    with _rig(_DISTANCE) as rig:
         truth = rig.operator.where().distance_m
         assert rig.advance(0.2)["distance"] == pytest.approx(min(truth, 3.0), abs=0.01)
         rig.operator.set_distance(0.25)
@@ -123,9 +113,9 @@ def test_the_distance_is_measured(tmp_path: Path) -> None:
             rig.advance(2.0)
 
 
-def test_the_imu_measures_acceleration(tmp_path: Path) -> None:
+def test_the_imu_measures_acceleration() -> None:
     """The IMU measures the acceleration of the car, and a dead chip raises an error."""
-    with _rig(tmp_path, _IMU) as rig:
+    with _rig(_IMU) as rig:
         assert rig.advance(0.05)["acceleration_x"] == pytest.approx(0.0, abs=0.01)
         rig.motor.value = 1.0
         assert rig.advance(0.03)["acceleration_x"] > 3.0
@@ -134,9 +124,9 @@ def test_the_imu_measures_acceleration(tmp_path: Path) -> None:
             rig.advance(0.02)
 
 
-def test_the_battery_sags_and_runs_down(tmp_path: Path) -> None:
+def test_the_battery_sags_and_runs_down() -> None:
     """The voltage drops under load and follows an operator's setting."""
-    with _rig(tmp_path, _BATTERY) as rig:
+    with _rig(_BATTERY) as rig:
         idle = rig.advance(0.2)["battery"]
         rig.motor.value = 1.0
         assert 6.5 < rig.advance(0.2)["battery"] < idle - 0.2

@@ -29,7 +29,6 @@ from shapechanger.robot.twin.rpc import (
     LATER,
     BoardConnection,
     BoardServer,
-    Grant,
     OwnerGone,
     Slept,
 )
@@ -84,12 +83,11 @@ def run_board(settings: BoardSettings, owner_fd: int) -> None:
             clock.run(board, server)
 
 
-def _advance(board: PinBoard, server: BoardServer, now_ns: int) -> None:
+def _advance(board: PinBoard, now_ns: int) -> None:
     """Advance the world to a time, and take the picture that is due."""
-    edges = board.advance(now_ns)
-    for connection in [*server.connections.values()] if edges else ():
-        if own := [edge for edge in edges if board.reader(edge.pin) is connection]:
-            connection.send_edges(own)
+    for edge in board.advance(now_ns):
+        if (reader := board.reader(edge.pin)) is not None:
+            reader.add_edges([edge])
     if board.camera is not None and now_ns >= board.camera.next_ns:
         board.camera.take(now_ns)
 
@@ -97,7 +95,14 @@ def _advance(board: PinBoard, server: BoardServer, now_ns: int) -> None:
 class RealTime:
     """CLOCK_MONOTONIC; the world advances in steps of 10 ms, and for a picture."""
 
-    functions: Sequence[Callable[..., object]] = ()
+    def __init__(self) -> None:
+        self.functions: Sequence[Callable[..., object]] = (self.wait,)
+
+    def wait(self, caller: BoardConnection, until_ns: int) -> object:
+        """Reply once the client's inputs have edges."""
+        caller.waits = caller.call_id
+        caller.wake(self.now_ns(), always=False)
+        return LATER
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
@@ -111,7 +116,9 @@ class RealTime:
             server.serve(max(0, due_ns - self.now_ns()) / 1e9)
             now_ns = self.now_ns()
             if now_ns >= due_ns:
-                _advance(board, server, now_ns)
+                _advance(board, now_ns)
+                for connection in server.connections.values():
+                    connection.wake(now_ns, always=False)
                 step_ns = now_ns + _WORLD_STEP_NS if now_ns >= step_ns else step_ns
 
 
@@ -138,7 +145,6 @@ class TwinTime:
         self._sleepers: list[_Sleeper] = []
         self._sleeps = 0
         self._wanted_ns: dict[BoardConnection, int] = {}  # Next grant of each that takes part.
-        self._works: set[BoardConnection] = set()
         self.functions: Sequence[Callable[..., object]] = (self.sleep, self.wait)
 
     def now_ns(self) -> int:
@@ -155,7 +161,7 @@ class TwinTime:
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
         """Finish the grant of a client, which takes part from now on, until its next is due."""
         self._wanted_ns[caller] = until_ns
-        self._works.discard(caller)
+        caller.waits = caller.call_id
         return LATER
 
     def run(self, board: PinBoard, server: BoardServer) -> None:
@@ -188,13 +194,12 @@ class TwinTime:
         camera = board.camera
         picture_ns = grant_ns if camera is None else max(camera.next_ns, now_ns)
         self._now_ns = min(grant_ns, picture_ns)
-        _advance(board, server, self._now_ns)
+        _advance(board, self._now_ns)
         if self._now_ns < grant_ns:
             return
-        self._works = set(wanted)
         for connection in wanted:
-            connection.send(Grant(self._now_ns))
-        while any(not one.closed for one in self._works):
+            connection.wake(self._now_ns, always=True)
+        while any(one.waits is None and not one.closed for one in wanted):
             server.serve(None)
 
     def _next_tick_ns(self) -> int:

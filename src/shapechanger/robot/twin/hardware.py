@@ -8,17 +8,16 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from shapechanger.errors import RobotError, translate_errors
+from shapechanger.errors import translate_errors
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.twin.rpc import (
-    GONE,
     MAX_MESSAGE,
     BoardClient,
-    Reply,
     Slept,
-    decode_event,
+    board_gone,
+    decode_reply,
     encode_call,
 )
 
@@ -40,15 +39,20 @@ class SteadyClock:
         poll = select.poll()
         for fd in {*readable, board}:
             poll.register(fd, select.POLLIN)
+        self._take_edges()
         while True:
             left_ms = max(0.0, (latest_ns - time.monotonic_ns()) / 1e6)
-            ready = {fd for fd, _ in poll.poll(left_ms)}
-            if board in ready:
-                self._client.drain()
-            self._client.dispatch()
+            ready = {fd for fd, _ in poll.poll(left_ms)} - {board}
+            self._take_edges()
             now_ns = time.monotonic_ns()
-            if ready - {board} or now_ns >= latest_ns:
-                return bool(ready - {board}) or now_ns >= until_ns
+            if ready or now_ns >= latest_ns:
+                return bool(ready) or now_ns >= until_ns
+
+    def _take_edges(self) -> None:
+        """Dispatch the edges that have arrived, and have the board report further ones."""
+        while self._client.wait():
+            pass
+        self._client.dispatch()
 
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
@@ -70,7 +74,6 @@ class GrantedClock(SteadyClock):
     def __init__(self, client: BoardClient, path: str) -> None:
         super().__init__(client)
         self._path = path
-        self._waiting = False
 
     def now_ns(self) -> int:
         """Return the newest twin time that this process has received."""
@@ -81,10 +84,9 @@ class GrantedClock(SteadyClock):
 
         A grant arrives at each tick of the board, and at `until_ns` if that is earlier.
         """
-        if not self._waiting:
-            self._client.post("wait", until_ns)
-        self._waiting = not self._client.await_grant(at_most_s)
-        return not self._waiting
+        granted = self._client.wait(until_ns, at_most_s)
+        self._client.dispatch()
+        return granted
 
     async def sleep(self, seconds: float) -> int | None:
         """Let twin time advance, and return when the newest picture was taken."""
@@ -92,17 +94,14 @@ class GrantedClock(SteadyClock):
 
         loop = asyncio.get_running_loop()
         with (
-            translate_errors(OSError, to=lambda _: RobotError(GONE)),
+            translate_errors(OSError, to=board_gone),
             socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as connection,
         ):
             connection.setblocking(False)
             await loop.sock_connect(connection, self._path)
             call = encode_call("sleep", max(0, round(seconds * 1e9)), id=0)
             await loop.sock_sendall(connection, call)
-            data = await loop.sock_recv(connection, MAX_MESSAGE)
-        reply = decode_event(data) if data else None
-        if not isinstance(reply, Reply):
-            raise RobotError(GONE)
+            reply = decode_reply(await loop.sock_recv(connection, MAX_MESSAGE))
         slept = reply.decode(Slept)
         self._client.now_ns = max(self._client.now_ns, slept.t)
         return slept.captured_ns

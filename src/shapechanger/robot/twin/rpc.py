@@ -1,8 +1,8 @@
 """Calls from processes to the board: messages, the client's end and the server.
 
-A message is one MessagePack object per datagram, over a Unix socket of type `SOCK_SEQPACKET`, which
-keeps datagrams separate and in order. Arguments are decoded by the types of the called function.
-Times are nanoseconds of the run's clock.
+A client sends `Call`s and the board replies to them: one MessagePack object per datagram, over a
+Unix socket of type `SOCK_SEQPACKET`, which keeps datagrams separate and in order. Arguments are
+decoded by the types of the called function. Times are nanoseconds of the run's clock.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
 from typing import Any, Final, Literal, NamedTuple, get_origin, get_type_hints
 
@@ -31,11 +31,10 @@ LATER: Final = object()
 Role = Literal["hardware", "operator", "clock"]
 """A robot's process, a person next to the robot, or a connection that only sleeps."""
 
-GONE: Final = "The twin's board is gone."
+_GONE: Final = "The twin's board is gone."
 _HELD_UP_MS: Final = 10  # Between two calls while the board does not reply.
 _HELD_UP_S: Final = 10.0  # A board that does not reply for longer is broken.
-_MAX_OUTBOX: Final = 256  # Messages kept for a client that does not read, before edges are merged.
-_MAX_EDGES: Final = 500  # Most edges in one message, so that it stays below `MAX_MESSAGE`.
+_MAX_EDGES: Final = 500  # Kept for a client that does not wait for them, before they are merged.
 
 _log = logging.getLogger(__name__)
 
@@ -56,21 +55,7 @@ class Call(msgspec.Struct, frozen=True, omit_defaults=True):
     t: int = 0
 
 
-class Greeting(msgspec.Struct, frozen=True):
-    """Result of the first call: the kind of clock, and its time."""
-
-    clock: Literal["real", "twin"]
-    t: int
-
-
-class Slept(msgspec.Struct, frozen=True):
-    """Result of a sleep: the time, and when the newest frame was taken, if any was."""
-
-    t: int
-    captured_ns: int | None
-
-
-class Reply(msgspec.Struct, tag=True, frozen=True, omit_defaults=True):
+class Reply(msgspec.Struct, frozen=True, omit_defaults=True):
     """End of a call: an encoded result, or an error message or `errno`."""
 
     id: int
@@ -86,23 +71,30 @@ class Reply(msgspec.Struct, tag=True, frozen=True, omit_defaults=True):
         return msgspec.msgpack.decode(self.result, type=kind)
 
 
-class InputEdges(msgspec.Struct, tag=True, frozen=True):
-    """Edges of the inputs that the client has claimed, in order of time."""
+class Greeting(NamedTuple):
+    """Result of "greet": the kind of clock, and its time."""
 
-    edges: list[Edge]
-
-
-class Grant(msgspec.Struct, tag=True, frozen=True):
-    """Twin time until which the client may work; then it waits again."""
-
+    clock: Literal["real", "twin"]
     t: int
 
 
-Event = Reply | InputEdges | Grant
+class Slept(NamedTuple):
+    """Result of "sleep": the time, and when the newest frame was taken, if any was."""
+
+    t: int
+    captured_ns: int | None
+
+
+class Awake(NamedTuple):
+    """Result of "wait": the time, and the edges of the client's inputs since the last one."""
+
+    t: int
+    edges: list[Edge]
+
 
 encode = msgspec.msgpack.encode
-decode_event: Callable[[bytes], Event] = msgspec.msgpack.Decoder(Event).decode
 _decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
+_decode_reply: Callable[[bytes], Reply] = msgspec.msgpack.Decoder(Reply).decode
 
 
 def encode_call(function: str, *arguments: object, id: int | None = None) -> bytes:
@@ -110,13 +102,24 @@ def encode_call(function: str, *arguments: object, id: int | None = None) -> byt
     return encode(Call(function, msgspec.Raw(encode(arguments)), id, time.monotonic_ns()))
 
 
+def decode_reply(data: bytes) -> Reply:
+    """Return a reply; raise RobotError for the end of a connection."""
+    if not data:
+        raise RobotError(_GONE)
+    return _decode_reply(data)
+
+
+def board_gone(_: OSError) -> RobotError:
+    """Return the error for a connection that fails."""
+    return RobotError(_GONE)
+
+
 class BoardClient:
     """A connection to the board, to be used by one thread.
 
     Attributes:
         clock: Kind of clock, "real" or "twin".
-        now_ns: Newest twin time that the board has sent; with the clock "real", the time of the
-            connection.
+        now_ns: Newest twin time that the board has sent; with the clock "real", an earlier time.
         levels: Level of each pin that is claimed as an input.
         on_edge: Called by `dispatch` with pin, level and time of each edge.
         while_held_up: Called every 10 ms while the board is held up and neither takes a request nor
@@ -125,20 +128,23 @@ class BoardClient:
 
     def __init__(self, path: str, role: Role) -> None:
         self._last_id = 0
+        self._waits = 0  # Id of the "wait" without a reply; 0 for none.
+        self._replies: dict[int, Reply] = {}
         self._edges: deque[Edge] = deque()
-        self._grants: deque[int] = deque()
-        self._reply: Reply | None = None
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
         self.while_held_up: Callable[[], object] = lambda: None
         with ExitStack() as undo:
             self._socket = undo.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
-            with translate_errors(OSError, to=lambda error: _unanswered(path, error)):
+            with translate_errors(
+                OSError,
+                to=lambda error: RobotError(
+                    f"No twin's board answers at {path}: {error.strerror}."
+                ),
+            ):
                 self._socket.connect(path)
-            greeting = self.ask(Greeting, "greet", role, os.getpid())
+            self.clock, self.now_ns = self.ask(Greeting, "greet", role, os.getpid())
             undo.pop_all()
-        self.clock: Literal["real", "twin"] = greeting.clock
-        self.now_ns = greeting.t
 
     @property
     def closed(self) -> bool:
@@ -155,18 +161,33 @@ class BoardClient:
 
     def ask(self, kind: Any, function: str, *arguments: object) -> Any:
         """Call a function of the board and return its result."""
-        self._last_id += 1
-        self._send(encode_call(function, *arguments, id=self._last_id))
+        call_id = self._call(function, *arguments)
         until_s = time.monotonic() + _HELD_UP_S
-        while self._reply is None or self._reply.id != self._last_id:
+        while call_id not in self._replies:
             self._await(select.POLLIN, until_s)
             self._receive()
-        return self._reply.decode(kind)
+        return self._replies.pop(call_id).decode(kind)
 
-    def drain(self) -> None:
-        """Receive everything that has arrived, without waiting."""
-        while self._receive():
-            pass
+    def wait(self, until_ns: int = 0, at_most_s: float = 0.0) -> bool:
+        """Wait until the board reports edges, or grants twin time until the next wait.
+
+        Args:
+            until_ns: Time of the next grant, if no tick is earlier, ns.
+            at_most_s: Limit in real time, s.
+
+        Returns:
+            Whether it did, which updates `now_ns` and `levels`.
+        """
+        self._waits = self._waits or self._call("wait", until_ns)
+        while self._waits not in self._replies:
+            if not self._is_ready(select.POLLIN, max(0.0, at_most_s * 1e3)):
+                return False
+            self._receive()
+        self.now_ns, edges = self._replies.pop(self._waits).decode(Awake)
+        self._waits = 0
+        self.levels |= {edge.pin: edge.level for edge in edges}
+        self._edges.extend(edges)
+        return True
 
     def dispatch(self) -> None:
         """Call `on_edge` for all edges that have arrived."""
@@ -175,21 +196,33 @@ class BoardClient:
             if self.on_edge is not None:
                 self.on_edge(edge.pin, edge.level, edge.t)
 
-    def await_grant(self, at_most_s: float) -> bool:
-        """Wait for a grant, which sets `now_ns`, and dispatch the edges before it."""
-        while not self._grants and self._is_ready(select.POLLIN, max(0.0, at_most_s * 1e3)):
-            self.drain()
-        granted = bool(self._grants)
-        if granted:
-            self.now_ns = self._grants.popleft()
-        self.dispatch()
-        return granted
-
     def close(self) -> None:
         """Leave the board in order."""
         if not self.closed:
             with suppress(OSError), self._socket:  # The board may have ended first.
                 self._socket.send(encode_call("leave"))
+
+    def _call(self, function: str, *arguments: object) -> int:
+        self._last_id += 1
+        self._send(encode_call(function, *arguments, id=self._last_id))
+        return self._last_id
+
+    def _send(self, data: bytes) -> None:
+        until_s = time.monotonic() + _HELD_UP_S
+        while True:
+            try:
+                self._socket.send(data, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                self._await(select.POLLOUT, until_s)
+            except OSError as error:
+                raise board_gone(error) from error
+            else:
+                return
+
+    def _receive(self) -> None:
+        with translate_errors(OSError, to=board_gone):
+            reply = decode_reply(self._socket.recv(MAX_MESSAGE))
+        self._replies[reply.id] = reply
 
     def _is_ready(self, event: int, at_most_ms: float) -> bool:
         poll = select.poll()
@@ -201,49 +234,6 @@ class BoardClient:
         while not self._is_ready(event, _HELD_UP_MS):
             if time.monotonic() < until_s:
                 self.while_held_up()
-
-    def _send(self, data: bytes) -> None:
-        until_s = time.monotonic() + _HELD_UP_S
-        while True:
-            try:
-                self._socket.send(data, socket.MSG_DONTWAIT)
-            except BlockingIOError:
-                self._await(select.POLLOUT, until_s)
-            except OSError as error:
-                raise RobotError(GONE) from error
-            else:
-                return
-
-    def _receive(self) -> bool:
-        """Receive one message; False without one."""
-        data = _received(self._socket)
-        if data is None:
-            return False
-        if not data:
-            raise RobotError(GONE)
-        match decode_event(data):
-            case Grant(t=t):
-                self._grants.append(t)
-            case InputEdges(edges=edges):
-                self.levels |= {edge.pin: edge.level for edge in edges}
-                self._edges.extend(edges)
-            case Reply() as reply:
-                self._reply = reply
-        return True
-
-
-def _unanswered(path: str, error: OSError) -> RobotError:
-    return RobotError(f"No twin's board answers at {path}: {error.strerror}.")
-
-
-def _received(connected: socket.socket) -> bytes | None:
-    """Return the next message without waiting; b"" from an ended process, None without one."""
-    try:
-        return connected.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
-    except BlockingIOError:
-        return None
-    except OSError:
-        return b""
 
 
 class OwnerGone(Exception):
@@ -257,11 +247,11 @@ class BoardConnection:
 
     Attributes:
         socket: Its socket.
-        outbox: Messages that wait for the client to read.
         role: Kind of client.
         pid: Process at the other end.
         call_id: Id of the call that is executed; None if it waits for no reply.
         t: Time of that call, ns.
+        waits: Id of its "wait" without a reply; None if it works.
         executes: Whether its calls are being executed.
         has_left: Whether it ends in order.
     """
@@ -269,53 +259,50 @@ class BoardConnection:
     def __init__(self, connected: socket.socket) -> None:
         connected.setblocking(False)
         self.socket = connected
-        self.outbox: deque[Event] = deque()
         self.role: Role = "clock"
         self.pid = 0
         self.call_id: int | None = None
         self.t = 0
+        self.waits: int | None = None
         self.executes = self.has_left = False
+        self._edges: list[Edge] = []
 
     @property
     def closed(self) -> bool:
         """True once the client is gone."""
         return self.socket.fileno() < 0
 
-    def send(self, event: Event) -> None:
-        """Send a message, now or when the client reads."""
-        self.outbox.append(event)
-        self.flush()
+    def receive(self) -> bytes | None:
+        """Return the next message; b"" from a client that has ended, None without a message."""
+        try:
+            return self.socket.recv(MAX_MESSAGE)
+        except BlockingIOError:
+            return None
+        except OSError:
+            return b""
 
-    def reply(self, call_id: int | None, result: object) -> None:
-        """Send the result of a call, which msgspec can encode."""
+    def reply(self, call_id: int | None, result: object = None, error: str | int = "") -> None:
+        """Send the end of a call, whose result msgspec can encode, if the client waits for it."""
         if call_id is not None:
-            self.send(Reply(call_id, msgspec.Raw(encode(result))))
+            with suppress(OSError):  # The client is gone, which `receive` reports.
+                self.socket.send(encode(Reply(call_id, msgspec.Raw(encode(result)), error)))
 
-    def send_edges(self, edges: Sequence[Edge]) -> None:
-        """Send edges of the client's inputs, in order of time.
+    def add_edges(self, edges: Iterable[Edge]) -> None:
+        """Keep edges of the client's inputs, in order of time, until it is awake.
 
-        A client that does not read loses edges, as in the kernel, but never a reply or a grant:
-        beyond 256 messages, only the last of the waiting edges of each input is kept.
+        A client that does not wait for them loses edges, as in the kernel: beyond 500, only the
+        last edge of each input is kept.
         """
-        if len(self.outbox) >= _MAX_OUTBOX:
-            waiting = [one for one in self.outbox if isinstance(one, InputEdges)]
-            self.outbox = deque(one for one in self.outbox if not isinstance(one, InputEdges))
-            edges = [*(edge for one in waiting for edge in one.edges), *edges]
-            edges = sorted({edge.pin: edge for edge in edges}.values())
-        for start in range(0, len(edges), _MAX_EDGES):
-            self.send(InputEdges([*edges[start : start + _MAX_EDGES]]))
+        self._edges += edges
+        if len(self._edges) > _MAX_EDGES:
+            self._edges = sorted({edge.pin: edge for edge in self._edges}.values())
 
-    def flush(self) -> None:
-        """Send waiting messages as far as the client reads."""
-        while self.outbox:
-            try:
-                self.socket.send(encode(self.outbox[0]))
-            except BlockingIOError:
-                return
-            except OSError:
-                self.outbox.clear()  # The client is gone, which the next call of it reports.
-                return
-            self.outbox.popleft()
+    def wake(self, now_ns: int, *, always: bool) -> None:
+        """End the client's "wait" if there are edges, or always."""
+        if self.waits is not None and (self._edges or always):
+            waits, edges = self.waits, self._edges
+            self.waits, self._edges = None, []
+            self.reply(waits, Awake(now_ns, edges))
 
 
 class _Function(NamedTuple):
@@ -360,7 +347,6 @@ class BoardServer:
         functions: Iterable[Callable[..., object]],
         ended: Callable[[BoardConnection, bool], object],
     ) -> None:
-        listening.setblocking(False)
         self._listening = listening
         self._owner_fd = owner_fd
         self._clock: Literal["real", "twin"] = clock
@@ -373,23 +359,16 @@ class BoardServer:
     def serve(self, timeout_s: float | None) -> None:
         """Wait for calls and execute them."""
         poll = select.poll()
-        poll.register(self._listening, select.POLLIN)
-        poll.register(self._owner_fd, select.POLLIN)
-        for fd, connection in self.connections.items():
-            writing = select.POLLOUT if connection.outbox else 0
-            poll.register(fd, select.POLLIN | writing)
-        ready = dict(poll.poll(None if timeout_s is None else timeout_s * 1e3))
+        for fd in (self._listening.fileno(), self._owner_fd, *self.connections):
+            poll.register(fd, select.POLLIN)
+        ready = {fd for fd, _ in poll.poll(None if timeout_s is None else timeout_s * 1e3)}
         if self._owner_fd in ready:
             raise OwnerGone
-        for fd, events in ready.items():
-            if (connection := self.connections.get(fd)) is not None:
-                if events & select.POLLOUT:
-                    connection.flush()
-                if events & ~select.POLLOUT:
-                    self._execute_all(connection)
+        for connection in [one for fd, one in self.connections.items() if fd in ready]:
+            self._execute_all(connection)
         # Last, so that the successor of a process that died follows its end.
         if self._listening.fileno() in ready:
-            connected = self._listening.accept()[0]
+            connected, _ = self._listening.accept()
             self.connections[connected.fileno()] = BoardConnection(connected)
 
     def greet(self, caller: BoardConnection, role: Role, pid: int) -> Greeting:
@@ -402,35 +381,37 @@ class BoardServer:
         caller.has_left = True
 
     def close(self) -> None:
-        """Close all sockets."""
+        """Close the sockets of all clients."""
         for connection in self.connections.values():
             connection.socket.close()
-        self._listening.close()
 
     def _execute_all(self, connection: BoardConnection) -> None:
         """Execute all calls that have arrived from a client."""
-        if connection.executes:
+        if connection.executes or connection.closed:
             return
         connection.executes = True
         try:
-            while data := _received(connection.socket):
+            while data := connection.receive():
                 self._execute(connection, _decode_call(data))
         except msgspec.MsgspecError as error:
             _log.warning("process %d sends a malformed request: %s", connection.pid, error)
             data = b""
         connection.executes = False
         if data is not None:
-            self._forget(connection)
+            del self.connections[connection.socket.fileno()]
+            if connection.role == "hardware":
+                connection.t = self._now_ns()
+                self._ended(connection, not connection.has_left)
+            connection.socket.close()
 
     def _execute(self, connection: BoardConnection, call: Call) -> None:
         try:
             result = self._result(connection, call)
         except (ShapechangerError, OSError) as refusal:  # The board runs on.
-            error = (refusal.errno if isinstance(refusal, OSError) else None) or str(refusal)
             if call.id is None:
                 _log.warning("process %d: %s", connection.pid, refusal)
-            else:
-                connection.send(Reply(call.id, error=error))
+            number = refusal.errno if isinstance(refusal, OSError) else None
+            connection.reply(call.id, error=number or str(refusal))
         else:
             if result is not LATER:
                 connection.reply(call.id, result)
@@ -447,17 +428,10 @@ class BoardServer:
         # An operator acts after everything that processes have sent until now, and the owner of a
         # pin may have ended before another process claims it.
         if connection.role == "operator" or call.function == "claim":
-            for other in list(self.connections.values()):
+            for other in [*self.connections.values()]:
                 if other.role == "hardware":
                     self._execute_all(other)
         connection.call_id = call.id
         connection.t = self._now_ns() if self._clock == "twin" else call.t
         given = dict(zip(function.names, arguments, strict=True))
         return function.run(**given, **({"caller": connection} if function.takes_caller else {}))
-
-    def _forget(self, connection: BoardConnection) -> None:
-        del self.connections[connection.socket.fileno()]
-        if connection.role == "hardware":
-            connection.t = self._now_ns()
-            self._ended(connection, not connection.has_left)
-        connection.socket.close()
