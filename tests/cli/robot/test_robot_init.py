@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot import setup
 from shapechanger.cli.robot.setup import Init, Install
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile, shipped_profiles
+from shapechanger.robot.setup.install import Machine
 
 
 class _Terminal(io.StringIO):
@@ -93,7 +93,7 @@ def test_on_a_pi_the_fifth_question_installs(
     """No question is a sixth, and the next step is not one that is taken already."""
     questions, answers = asked
     installed: list[str] = []
-    monkeypatch.setattr(setup, "require_pi", lambda _: None)
+    monkeypatch.setattr(Machine, "require_pi", lambda _: None)
     monkeypatch.setattr(Install, "run", lambda self: installed.append(self.profile))
     answers += ["tank", "", "usb", "", "maybe", ""]
     Init().run()

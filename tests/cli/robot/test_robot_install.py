@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,47 +25,49 @@ def pi(tmp_path: Path) -> FakePi:
 
 @pytest.fixture
 def car(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Profile:
-    """A car that `init` made."""
+    """A car that `init` made, in a folder with a blank."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     make_credentials(tmp_path / "config/shapechanger/robots/rover", "rover")
-    return load_profile(write_profile("car", tmp_path / "home/rover.toml", "rover"))
+    return load_profile(write_profile("car", tmp_path / "my home/rover.toml", "rover"))
 
 
-def _said(
-    pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str], command: Install
-) -> list[str]:
-    command.install(car, pi.machine)
-    return capsys.readouterr().out.splitlines()
+Said = Callable[..., list[str]]
 
 
-def test_it_says_what_it_did(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def said(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> Said:
+    """Install the car with some options, and return the printed lines."""
+
+    def run(**options: bool) -> list[str]:
+        Install("rover.toml", **options).install(car, pi.machine)
+        return capsys.readouterr().out.splitlines()
+
+    return run
+
+
+def test_it_says_what_it_did(pi: FakePi, car: Profile, said: Said) -> None:
     """Once done, everything is there already, and nothing has to follow."""
-    command = Install("rover.toml")
-    said = _said(pi, car, capsys, command)
+    lines = said()
     unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
-    assert "did      group gpio: pi is in the group gpio." in said
-    assert f"did      service: {unit} is the unit next to the profile." in said
-    assert any(line.startswith("Restart the computer") for line in said)
+    assert "did      group gpio: pi is in the group gpio." in lines
+    assert f"did      service: {unit} is the unit next to the profile." in lines
+    assert any(line.startswith("Restart the computer") for line in lines)
     # Which logs in again, too.
-    assert not any(line.startswith("Log out and in") for line in said)
-    assert any("sudo systemctl start shapechanger-rover" in line for line in said)
-    assert f"robot serve {car.path} " in f"{unit.read_text()} ".replace("\n", " ")
-    again = _said(pi, car, capsys, command)
-    assert [line for line in again if line.startswith("did")] == []
-    assert not any(line.startswith("Restart the computer") for line in again)
+    assert not any(line.startswith("Log out and in") for line in lines)
+    assert any("sudo systemctl start shapechanger-rover" in line for line in lines)
+    assert f'robot serve "{car.path}"\n' in unit.read_text()
+    assert not any(line.startswith(("did", "Restart the computer")) for line in said())
 
 
-def test_a_dry_run_needs_the_unit_only(
-    pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
     """It writes nothing, so the unit of `init` has to be there."""
     with pytest.raises(RobotError, match="it is written without --dry-run"):
-        Install("rover.toml", dry_run=True).install(car, pi.machine)
-    _said(pi, car, capsys, Install("rover.toml"))
+        said(dry_run=True)
+    said()
     pi.ran.clear()
     (pi.root / "etc/systemd/system/shapechanger-rover.service").unlink()
-    said = _said(pi, car, capsys, Install("rover.toml", dry_run=True))
-    assert any(line.startswith("would    service: sudo install -m 644 ") for line in said)
+    lines = said(dry_run=True)
+    assert any(line.startswith("would    service: sudo install -m 644 ") for line in lines)
     assert pi.ran == []
 
 
@@ -79,27 +82,12 @@ def test_a_failure_is_counted(pi: FakePi, car: Profile, capsys: pytest.CaptureFi
     assert "could not be done." in said
 
 
-def test_new_groups_alone_need_a_login(
-    pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_new_groups_alone_need_a_login(pi: FakePi, said: Said) -> None:
     """Without a line of config.txt, no restart is asked for."""
     pi.write("boot/firmware/config.txt", "dtparam=strict_gpiod\ncamera_auto_detect=1\n")
-    said = _said(pi, car, capsys, Install("rover.toml"))
-    assert any(line.startswith("Log out and in") for line in said)
-    assert not any(line.startswith("Restart the computer") for line in said)
-
-
-def test_a_path_with_blanks_is_one_word(
-    pi: FakePi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """In the unit, and for the install that reads it."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    make_credentials(tmp_path / "config/shapechanger/robots/rover", "rover")
-    car = load_profile(write_profile("car", tmp_path / "my robots/rover.toml", "rover"))
-    _said(pi, car, capsys, Install("rover.toml"))
-    unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
-    assert f'robot serve "{car.path}"\n' in unit.read_text()
-    _said(pi, car, capsys, Install("rover.toml"))
+    lines = said()
+    assert any(line.startswith("Log out and in") for line in lines)
+    assert not any(line.startswith("Restart the computer") for line in lines)
 
 
 def test_the_profile_of_this_folder_is_named(
@@ -114,40 +102,33 @@ def test_the_profile_of_this_folder_is_named(
         Install("car").run()
 
 
-def test_it_is_removed(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_is_removed(pi: FakePi, said: Said) -> None:
     """The service is gone; groups stay."""
-    _said(pi, car, capsys, Install("rover.toml"))
-    said = _said(pi, car, capsys, Install("rover.toml", remove=True))
-    assert len(said) == 1
-    assert said[0].startswith("did      service: ")
+    said()
+    (line,) = said(remove=True)
+    assert line.startswith("did      service: ")
     assert not list((pi.root / "etc/systemd").rglob("shapechanger*"))
     assert "gpio:x:1:pi" in (pi.root / "etc/group").read_text()
 
 
-def test_who_is_refused(pi: FakePi, car: Profile) -> None:
-    """Root, another computer, a robot without its key, and a unit of another profile."""
-    command = Install("rover.toml")
+def test_who_is_refused(pi: FakePi, car: Profile, said: Said, tmp_path: Path) -> None:
+    """Root, a unit of another profile or user, a robot without its key, and another computer."""
     with pytest.raises(RobotError, match="without sudo"):
-        command.install(car, replace(pi.machine, user="root"))
+        Install("rover.toml").install(car, replace(pi.machine, user="root"))
     unit = car.path.with_name("shapechanger-rover.service")
     unit.write_text("[Service]\n")
     with pytest.raises(RobotError, match=r"does not name .*rover\.toml: remove it"):
-        command.install(car, pi.machine)
+        said()
     unit.unlink()
-    command.install(car, pi.machine)
+    said()
     unit.write_text(unit.read_text().replace("User=pi", "User=root"))
     pi.ran.clear()
     with pytest.raises(RobotError, match="does not run the robot as pi"):
-        command.install(car, pi.machine)
-    shutil.rmtree(pi.root / "run/systemd")
-    with pytest.raises(RobotError, match="not run by systemd"):
-        Install("rover.toml", remove=True).install(car, pi.machine)
-    assert pi.ran == []
-
-
-def test_a_robot_without_its_key_is_refused(pi: FakePi, car: Profile, tmp_path: Path) -> None:
-    """Its service could not serve it."""
+        said()
     shutil.rmtree(tmp_path / "config")
     with pytest.raises(RobotError, match="Run `shapechanger robot init`"):
-        Install("rover.toml").install(car, pi.machine)
+        said()
+    shutil.rmtree(pi.root / "run/systemd")
+    with pytest.raises(RobotError, match="not run by systemd"):
+        said(remove=True)
     assert pi.ran == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gpiozero.pins.mock import MockFactory, MockPWMPin
+from gpiozero.pins.mock import MockFactory, MockPin, MockPWMPin
 
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.load import find_profile, load_profile
@@ -19,9 +19,9 @@ def shipped(kind: str) -> Profile:
 class HeldPins(Hardware):
     """gpiozero's mock pins, which stay as they are when they are closed."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: type[MockPin] = MockPWMPin) -> None:
         super().__init__()
-        self.factory: Any = MockFactory(pin_class=MockPWMPin)
+        self.factory: Any = MockFactory(pin_class=kind)
 
     def pin_factory(self) -> Any:
         return self.factory

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
-from gpiozero.pins.mock import MockConnectedPin, MockFactory
+from gpiozero.pins.mock import MockConnectedPin
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
@@ -18,7 +17,6 @@ from shapechanger.robot.check.pins import (
     probed_pin,
 )
 from shapechanger.robot.check.report import Finding
-from shapechanger.robot.hardware import Hardware
 from tests.robot.check.held_pins import HeldPins, shipped
 
 _PLAN = GuardPlan(
@@ -31,23 +29,20 @@ _PLAN = GuardPlan(
 )
 
 
-class _Joined(Hardware):
-    """gpiozero's mock pins; 20 and 21 are joined, 20 and 16 are not."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.factory: Any = MockFactory()
-        joined = self.factory.pin(21, pin_class=MockConnectedPin)
-        joined.input_pin = self.factory.pin(20)
-
-    def pin_factory(self) -> Any:
-        return self.factory
+@pytest.fixture
+def pins() -> Iterator[HeldPins]:
+    made = HeldPins()
+    yield made
+    made.factory.close()
 
 
-def test_only_joined_pins_pass() -> None:
-    assert "20 followed pin 21" in check_jumper(21, 20, _PLAN, _Joined())
+def test_only_joined_pins_pass(pins: HeldPins, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shapechanger.robot.check.pins.Hardware", lambda: pins)
+    joined = pins.factory.pin(21, pin_class=MockConnectedPin)
+    joined.input_pin = pins.factory.pin(20)
+    assert "20 followed pin 21" in check_jumper(21, 20, _PLAN)
     with pytest.raises(RobotError, match="is the wire between them"):
-        check_jumper(21, 16, _PLAN, _Joined())
+        check_jumper(21, 16, _PLAN)
 
 
 @pytest.mark.parametrize(
@@ -81,13 +76,6 @@ def test_probes_that_cannot_measure(kind: str, probe: int, words: str) -> None:
     with pytest.raises(RobotError, match=words):
         probed_pin(shipped(kind), probe)
     assert probed_pin(shipped("tank"), 20) == 17
-
-
-@pytest.fixture
-def pins() -> Iterator[HeldPins]:
-    made = HeldPins()
-    yield made
-    made.factory.close()
 
 
 def _lit(kind: str, pins: HeldPins, ask: Callable[[str], bool | None]) -> dict[str, Finding]:

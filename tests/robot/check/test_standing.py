@@ -9,21 +9,22 @@ from pathlib import Path
 from typing import Any, Self
 
 import pytest
-from gpiozero.pins.mock import MockFactory, MockPin
+from gpiozero.pins.mock import MockPin
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.check import standing
 from shapechanger.robot.check.report import Finding
 from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
-from shapechanger.robot.hardware import Hardware, RealClock
+from shapechanger.robot.hardware import RealClock
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.setup.systemd import unit_name
+from shapechanger.robot.setup.install import unit_name
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
-from tests.robot.check.held_pins import shipped
+from tests.robot.check.held_pins import HeldPins, shipped
 from tests.robot.profile.texts import finger_text, read
 from tests.robot.twin.in_process import LocalBoard
 from tests.robots import write_profile
@@ -77,14 +78,11 @@ def test_strict_gpiod_is_read_from_the_boot_configuration(
 
 
 def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path, car: Profile) -> None:
-    found = _on(tmp_path, car)
+    """No setting of a computer adds pins to it."""
+    found = _on(tmp_path, replace(car, sensors=()))
     assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
     assert "--twin" in found["computer"].sentence
-    # No setting of a computer adds pins to it.
-    assert (
-        "only a computer with GPIO pins"
-        in _on(tmp_path, replace(car, sensors=()))["devices"].sentence
-    )
+    assert "only a computer with GPIO pins" in found["devices"].sentence
 
 
 @pytest.mark.parametrize(
@@ -111,10 +109,18 @@ def test_the_systemd_unit_must_restart_and_make_safe(
 
 
 def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> None:
-    """A servo board without OE and motors without a one-shot are reported."""
+    """Servo boards need OE, and motors and servos without a watchdog the one-shot and its pins."""
     found = _on(tmp_path, replace(car, outputs=(_SERVO,), enable_pin=None))
     assert {found["enable line"].level, found["output enable"].level} == {"bad"}
     assert _on(tmp_path, car)["enable line"].level == "good"
+    _write(tmp_path, "dev/ttyUSB0")
+    rig = replace(read(finger_text("Feetech")), camera=None)
+    found = _found(StandingRobot(rig, root=tmp_path))
+    ((level, sentence),) = found["enable line"]
+    assert (level, "as servos without a watchdog must" in sentence) == ("good", True)
+    assert any("gpiochip0 does not exist" in sentence for _, sentence in found["devices"])
+    bare = _on(tmp_path, replace(rig, enable_pin=None))["enable line"]
+    assert (bare.level, "Fit the one-shot" in bare.sentence) == ("bad", True)
 
 
 def test_only_the_devices_of_the_robot_are_checked(tmp_path: Path, car: Profile) -> None:
@@ -129,12 +135,6 @@ def test_only_the_devices_of_the_robot_are_checked(tmp_path: Path, car: Profile)
     assert "raspi-config" in found[1][1]
 
 
-def test_a_port_in_use_is_reported(tmp_path: Path, car: Profile) -> None:
-    with socket.create_server(("", 0)) as taken:
-        found = _on(tmp_path, car, port=taken.getsockname()[1])
-    assert found["port"].level == "bad"
-
-
 def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
     """A latency timer of 16 ms would make answers late."""
     rig = replace(shipped("finger"), camera=None)
@@ -147,20 +147,6 @@ def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
         found = _on(tmp_path, rig)
         assert found["latency timer"].level == level
     assert found["devices"].level == found["enable line"].level == "good"
-
-
-def test_servos_without_a_watchdog_need_a_power_switch(tmp_path: Path) -> None:
-    """They require the one-shot, and the pins that feed it."""
-    rig = replace(read(finger_text("Feetech")), camera=None)
-    _write(tmp_path, "dev/ttyUSB0")
-    found = _found(StandingRobot(rig, root=tmp_path))
-    ((level, sentence),) = found["enable line"]
-    assert level == "good"
-    assert "as servos without a watchdog must" in sentence
-    assert any("gpiochip0 does not exist" in sentence for _, sentence in found["devices"])
-    bare = _on(tmp_path, replace(rig, enable_pin=None))["enable line"]
-    assert bare.level == "bad"
-    assert "Fit the one-shot" in bare.sentence
 
 
 class _Stuck:
@@ -238,23 +224,15 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
     """Each check has a deadline, its failure is a finding, and all others are made."""
     limit_s = 0.05 if error is None else 5.0
     for name in ("CHECK_S", "_CAMERA_S"):
-        monkeypatch.setattr(f"shapechanger.robot.check.standing.{name}", limit_s)
+        monkeypatch.setattr(standing, name, limit_s)
     for name in ("dev/gpiochip0", "dev/i2c-1"):
         _write(tmp_path, name)
     profile = replace(car, camera=CameraPlan("pattern"), outputs=(*car.outputs, _SERVO))
 
     def findings(stuck: Any) -> list[Finding]:
-        return list(
-            examine(
-                StandingRobot(
-                    profile,
-                    root=tmp_path,
-                    look=stuck.open,
-                    hardware=lambda: stuck,
-                    motors_off=True,
-                )
-            )
-        )
+        monkeypatch.setattr(standing, "open_camera", stuck.open)
+        robot = StandingRobot(profile, root=tmp_path, hardware=lambda: stuck, motors_off=True)
+        return list(examine(robot))
 
     found = findings(_Stuck(where, error, freed))
     assert any(re.search(words, one.sentence) for one in found if one.level == "bad")
@@ -398,24 +376,11 @@ class _High(MockPin):
         return True
 
 
-class _Pins(Hardware):
-    """gpiozero's mock pins, some of them held."""
-
-    def __init__(self, held: dict[int, type[MockPin]]) -> None:
-        super().__init__()
-        self.factory: Any = MockFactory()
-        for pin, kind in held.items():
-            self.factory.pin(pin, pin_class=kind)
-
-    def pin_factory(self) -> Any:
-        return self.factory
-
-
 @pytest.mark.parametrize(
     ("kind", "held", "expected"),
     [
         ("car", {22: _Low}, "good: GPIO22, drive forward, is pulled down."),
-        ("car", {27: _High}, "bad: GPIO27, drive backward: something holds it high"),
+        ("car", {27: _High}, "bad: GPIO27, drive backward, is held high: fit 10 kOhm to ground"),
         ("car", {}, "bad: GPIO4, steer forward, has no pull-down: fit 10 kOhm to ground"),
         ("cat", {}, "bad: GPIO25, OE of the servo board, has no pull-up: fit 10 kOhm to 3.3 V"),
         ("cat", {25: _Low}, "bad: GPIO25, OE of the servo board, is held low: fit 10 kOhm to"),
@@ -425,7 +390,10 @@ def test_missing_and_wrong_resistors(
     kind: str, held: dict[int, type[MockPin]], expected: str
 ) -> None:
     """A pin that follows the Pi's own resistor has none; one that is held high is dangerous."""
-    found = _wired(shipped(kind), _Pins(held))["resistors"]
+    pins = HeldPins(MockPin)
+    for pin, holding in held.items():
+        pins.factory.pin(pin, pin_class=holding)
+    found = _wired(shipped(kind), pins)["resistors"]
     assert any(f"{level}: {sentence}".startswith(expected) for level, sentence in found)
 
 
@@ -446,5 +414,5 @@ def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: Profile) -> N
     assert wiring & without_pins.keys() == {"resistors"}
     with socket.create_server(("", 0)) as taken:
         found = checks(taken.getsockname()[1])
-    assert "wiring" in found
+    assert (found["port"].level, "wiring" in found) == ("bad", True)
     assert not wiring & found.keys()

@@ -57,7 +57,7 @@ class FakePi:
         path.write_text(text)
 
     def run(self, command: RootCommand) -> str:
-        """Run a command as root; see `Runner`."""
+        """Run a command as root; see `Machine.run`."""
         self.ran.append(str(command))
         if command.arguments[0] == self.refuses:
             return f"{self.refuses}: permission denied"

@@ -1,17 +1,18 @@
 """Changes of a profile from a calibration."""
 
+from dataclasses import replace
+
 import pytest
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.pulse import PulseRange
 from shapechanger.robot.setup.calibration import (
-    JogResult,
     motor_changes,
     pulse_changes,
     reading,
     wheel_changes,
-    with_widest_pulses,
+    widest_pulses,
 )
 
 _SERVO = OutputPlan(
@@ -26,24 +27,23 @@ _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full":
 @pytest.mark.parametrize(("left_us", "right_us"), [(1100, 1900), (1900, 1100)])
 def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
     """Works for reversed servos too."""
-    settings = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
-    wide = with_widest_pulses(OutputPlan("steer", "servo", settings=settings))
-    seen = JogResult(-0.5, 0.1, 0.4)
-    changes = pulse_changes(wide, seen)
-    low_us, high_us = (float(str(wide.settings[k])) for k in ("left_us", "right_us"))
+    narrow = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
+    servo = OutputPlan("steer", "servo", settings=narrow)
+    wide = replace(servo, settings=narrow | widest_pulses(servo))
+    low_us, high_us = (wide.settings[key] for key in ("left_us", "right_us"))
+    assert sorted((low_us, high_us)) == [600, 2400]
+    assert (low_us < high_us) == (left_us < right_us)
     pulses = PulseRange(low_us, 1500.0, high_us)
-    assert changes == {
+    assert pulse_changes(wide, (-0.5, 0.1, 0.4)) == {
         "output.steer.left_us": round(pulses.width_us(-0.5)),
         "output.steer.centre_us": round(pulses.width_us(0.1)),
         "output.steer.right_us": round(pulses.width_us(0.4)),
     }
-    assert (low_us < high_us) == (left_us < right_us)
 
 
 def test_a_middle_outside_the_ends_is_refused() -> None:
-    """Three equal positions raise an error."""
     with pytest.raises(RobotError, match="must lie between"):
-        pulse_changes(_SERVO, JogResult(0.2, 0.2, 0.2))
+        pulse_changes(_SERVO, (0.2, 0.2, 0.2))
 
 
 def test_a_motor_that_turned_backward_gets_a_negative_mix() -> None:

@@ -19,10 +19,10 @@ from shapechanger.robot.setup.install import (
     changes_to_install,
     changes_to_remove,
     make_changes,
-    require_pi,
     run_as_root,
+    unit_word,
+    write_unit,
 )
-from shapechanger.robot.setup.systemd import write_unit
 from tests.robot.setup.fake_pi import FakePi
 
 _CAMERA = CameraPlan("picamera2")
@@ -88,13 +88,9 @@ def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
 def test_a_dry_run_changes_nothing(pi: FakePi) -> None:
     """Each sentence is the command."""
     found = _install(pi, _plan("car"), _CAMERA, dry=True)
-    assert pi.ran == []
-    assert found["group gpio"] == (
-        "would",
-        "sudo usermod -aG gpio pi",
-    )
+    assert found["group gpio"] == ("would", "sudo usermod -aG gpio pi")
     assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
-    assert not (pi.root / _UNIT).exists()
+    assert pi.ran == []
 
 
 @pytest.mark.parametrize("raspi_config", [True, False])
@@ -179,16 +175,11 @@ def test_without_groups_and_config(tmp_path: Path) -> None:
     assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
 
 
-def test_an_older_unit_is_replaced(pi: FakePi) -> None:
-    """The unit next to the profile, which a person may edit, is the one that counts."""
+def test_the_service_is_removed(pi: FakePi) -> None:
+    """An older one is replaced; once removed, nothing of it is left."""
     pi.write(_UNIT, "old")
     assert _install(pi, _plan("car"))["service"][0] == "did"
     assert "safe-pins" in (pi.root / _UNIT).read_text()
-
-
-def test_the_service_is_removed(pi: FakePi) -> None:
-    """Nothing of it is left, and removing it again says so."""
-    _install(pi, _plan("car"))
     for level in ("did", "already"):
         changes = changes_to_remove("shapechanger-car.service", pi.root)
         assert [outcome.level for outcome in make_changes(changes, pi.run)] == [level]
@@ -202,10 +193,10 @@ def test_the_service_is_removed(pi: FakePi) -> None:
 )
 def test_other_machines_are_refused(pi: FakePi, missing: str, words: str) -> None:
     """The error names what is needed."""
-    require_pi(pi.root)
+    pi.machine.require_pi()
     (pi.root / missing).rename(pi.root / "away")
     with pytest.raises(RobotError, match=f"{words}.*Raspberry Pi OS"):
-        require_pi(pi.root)
+        pi.machine.require_pi()
 
 
 def test_commands_run_as_root(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,3 +221,40 @@ def test_a_typed_command_does_the_same(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
     subprocess.run(str(command), shell=True, check=True, capture_output=True)
     assert (tmp_path / "made").read_text() == command.text
+
+
+def test_the_unit_names_profile_program_and_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All placeholders are replaced, and what systemd would split or expand is quoted."""
+    monkeypatch.setattr("shutil.which", lambda _: "/opt/venv/bin/shapechanger")
+    profile = tmp_path / "@USER@ 1" / "a\nUser=root.toml"
+    path, is_new = write_unit("my car", profile, tmp_path, "pi")
+    assert (path, is_new) == (profile.parent / "shapechanger-my-car.service", True)
+    text = path.read_text()
+    word = f'"{tmp_path}/@USER@ 1/a\\nUser=root.toml"'
+    start = f"ExecStart=/opt/venv/bin/shapechanger robot serve {word} --credentials {tmp_path}\n"
+    assert start in text
+    assert [line for line in text.splitlines() if line.startswith("User=")] == ["User=pi"]
+    assert "Description=Shapechanger robot my-car\n" in text
+    path.write_text("mine")
+    assert write_unit("my car", profile) == (path, False)
+    assert path.read_text() == "mine"
+
+
+def test_words_of_a_unit_are_quoted() -> None:
+    assert unit_word("/home/pi/car-2.toml") == "/home/pi/car-2.toml"
+    assert unit_word("/my robots/100%.toml") == '"/my robots/100%%.toml"'
+    assert unit_word('/a"b\\c$d\ne') == '"/a\\"b\\\\c$$d\\ne"'
+
+
+@pytest.mark.parametrize("folder", ["robots", "my robots"])
+def test_the_check_accepts_the_unit_of_init(pi: FakePi, folder: str) -> None:
+    """The written unit passes its check, unless it is for another profile."""
+    car = replace(load_profile(find_profile("car")), camera=None)
+    unit, _ = write_unit("car", pi.root / folder / "car.toml")
+    pi.write(_UNIT, unit.read_text())
+    for name, level in (("car.toml", "good"), ("other.toml", "bad")):
+        robot = StandingRobot(replace(car, path=unit.with_name(name)), root=pi.root)
+        finding = next(one for one in examine(robot) if one.check == "systemd")
+        assert (finding.level, "for another profile" in finding.sentence) == (level, level == "bad")

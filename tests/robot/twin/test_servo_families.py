@@ -25,7 +25,7 @@ from shapechanger.robot.guard.outputs import Switches, make_safe
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
-from shapechanger.robot.setup.zeros import find_zeros
+from shapechanger.robot.setup.calibration import find_zeros
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring

@@ -6,6 +6,7 @@ import getpass
 import sys
 import time
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -36,17 +37,17 @@ from shapechanger.robot.profile.load import (
 )
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import robot_at
+from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
 from shapechanger.robot.setup.install import (
     Machine,
     Outcome,
     changes_to_install,
     changes_to_remove,
     make_changes,
-    require_pi,
-    require_systemd,
+    unit_name,
+    unit_word,
+    write_unit,
 )
-from shapechanger.robot.setup.systemd import unit_name, unit_word, write_unit
-from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,7 @@ class Init:
 def _is_pi() -> bool:
     """Return whether a robot can be installed on this machine."""
     try:
-        require_pi(Path("/"))
+        Machine("").require_pi()
     except RobotError:
         return False
     return True
@@ -240,18 +241,14 @@ class Home:
         plan = load_profile(path).guard_plan()
         if not self.straight:
             input("All tendons pull gently. Hold the finger straight, and press Enter. ")
-        hardware = connect(REAL, "")
-        try:
+        with closing(connect(REAL, "")) as hardware:
             zeros = find_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
             joints = find_joint_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
-        finally:
-            hardware.close()
         found = {f"output.{name}.zero": zero for name, zero in zeros.items()}
         found |= {f"sensor.{name}.zero": zero for name, zero in joints.items()}
         change_profile(path, found)
 
 
-_OUTCOMES = {"did": "did    ", "already": "already", "would": "would  ", "failed": "FAILED "}
 _AFTERWARDS = {
     "restart": "Restart the computer, which sets up groups, pins and buses: sudo reboot",
     "log in": "Log out and in again, so that this user has the new groups.",
@@ -279,10 +276,10 @@ class Install:
     def install(self, profile: Profile, machine: Machine) -> None:
         """Make the changes on a machine."""
         if self.remove:
-            require_systemd(machine.root)
+            machine.require_systemd()
             changes = changes_to_remove(unit_name(profile.name), machine.root)
         else:
-            require_pi(machine.root)
+            machine.require_pi()
             if machine.user == "root":
                 raise RobotError(
                     "Install it as the user that is to run the robot, without sudo, which is "
@@ -294,7 +291,8 @@ class Install:
             changes = changes_to_install(profile.guard_plan(), profile.camera, unit, machine)
         outcomes: list[Outcome] = []
         for outcome in make_changes(changes, machine.run, dry=self.dry_run):
-            say(f"{_OUTCOMES[outcome.level]}  {outcome.change.name}: {outcome.sentence}")
+            level = "FAILED" if outcome.level == "failed" else outcome.level
+            say(f"{level:7}  {outcome.change.name}: {outcome.sentence}")
             outcomes.append(outcome)
         then = {outcome.change.then for outcome in outcomes if outcome.level in {"did", "would"}}
         # A restart logs the user in again, too.
@@ -350,11 +348,8 @@ class SafePins:
         """Put the outputs at rest and print failures."""
         plan = load_profile(find_profile(self.profile)).guard_plan()
         require_pins(plan)
-        hardware = connect(REAL, "")
-        try:
+        with closing(connect(REAL, "")) as hardware:
             failures = make_safe(plan, hardware)
-        finally:
-            hardware.close()
         if failures:
             raise RobotError(
                 "Not everything is at rest: take the battery off. " + " ".join(failures)

@@ -16,7 +16,7 @@ from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
 from shapechanger.robot.guard.outputs import enable_device
 from shapechanger.robot.hardware import Hardware
-from shapechanger.robot.setup.computer import needs_pins
+from shapechanger.robot.setup.install import needs_pins
 
 _TOGGLES: Final = 50
 _SETTLES_S: Final = 0.002
@@ -76,16 +76,13 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
     raise RobotError("A probe needs a motor on an H-bridge: pulses of a servo go on at rest.")
 
 
-def check_jumper(
-    output: int, sensed: int, plan: GuardPlan, hardware: Hardware | None = None
-) -> str:
+def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:
     """Toggle an output and check the input that is wired to it.
 
     Args:
         output: BCM pin to drive, unused by the robot.
         sensed: BCM pin to read, unused by the robot.
         plan: The robot.
-        hardware: Its pins; the pins of this machine by default.
 
     Returns:
         Description of the result.
@@ -96,19 +93,18 @@ def check_jumper(
         _require_free_pin(pin, plan)
     if output == sensed:
         raise RobotError(f"A jumper joins two pins, got {output} twice.")
-    with closing(hardware or Hardware()) as pins:
-        factory = pins.pin_factory()
-        with (
-            DigitalOutputDevice(output, pin_factory=factory) as driven,
-            DigitalInputDevice(sensed, pull_up=False, pin_factory=factory) as read,
-        ):
-            for n in range(_TOGGLES):
-                driven.value = n % 2
-                time.sleep(_SETTLES_S)
-                if read.value != n % 2:
-                    raise RobotError(
-                        f"Pin {sensed} does not follow pin {output}: is the wire between them?"
-                    )
+    with (
+        closing(Hardware()) as pins,
+        DigitalOutputDevice(output, pin_factory=pins.pin_factory()) as driven,
+        DigitalInputDevice(sensed, pull_up=False, pin_factory=pins.pin_factory()) as read,
+    ):
+        for n in range(_TOGGLES):
+            driven.value = n % 2
+            time.sleep(_SETTLES_S)
+            if read.value != n % 2:
+                raise RobotError(
+                    f"Pin {sensed} does not follow pin {output}: is the wire between them?"
+                )
     return f"pin {sensed} followed pin {output} {_TOGGLES} times."
 
 

@@ -9,21 +9,23 @@ import re
 import socket
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import monotonic
 from typing import Final, Literal, NamedTuple
 
-from shapechanger.errors import OutputError, ShapechangerError
+from shapechanger.errors import OutputError, ShapechangerError, translate_errors
+from shapechanger.files import cannot_write
 from shapechanger.robot.profile.profile import Profile
 
 Level = Literal["good", "bad", "unknown"]
 
-Results = Iterator[tuple[Level, str]]
-"""A check: a generator of its results, each a level and a sentence."""
+Results = Iterable[tuple[Level, str]]
+"""A check: its results, each a level and a sentence, which are found when they are asked for."""
 
 Checks = Iterable[tuple[str, Results]]
 """Checks with their names; each begins when the one before has ended."""
@@ -147,15 +149,23 @@ def write_report(
         Whether no finding was bad.
     """
     if path is not None:
-        path = next(one for one in _numbered(path) if not one.exists())
-        _append(path, "\n".join(["Check of a robot", "", *head]))
-    counts = dict.fromkeys(MARKS, 0)
+        names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+        path = next(one for one in chain([path], names) if not one.exists())
+
+    def write(text: str) -> None:
+        if path is None:
+            return
+        with translate_errors(OSError, to=partial(cannot_write, path)):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("a", encoding="utf-8") as file:
+                file.write(f"{text}\n")
 
     def tell(line: str) -> None:
-        if path is not None:
-            _append(path, anonymous(line))
+        write(anonymous(line))
         say(line)
 
+    counts = dict.fromkeys(MARKS, 0)
+    write("\n".join(["Check of a robot", "", *head]))
     try:
         for part, findings in parts:
             tell(f"\n{part}")
@@ -164,28 +174,13 @@ def write_report(
                 counts[level] += 1
     except BaseException as error:
         # Also after Ctrl-C, a report is worth sending.
+        why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
+        with suppress(OutputError):
+            write(anonymous(f"\nIt ended early: {why or type(error).__name__}"))
         if path is not None:
-            why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
-            with suppress(OutputError):
-                _append(path, anonymous(f"\nIt ended early: {why or type(error).__name__}"))
             say(f"\n{path} has what was checked so far.")
         raise
     tell(f"\n{counts['good']} good, {counts['bad']} bad, {counts['unknown']} not measured.")
     if path is not None:
         say(f"wrote {path}: it holds no key, no network and no name of this computer")
     return not counts["bad"]
-
-
-def _numbered(path: Path) -> Iterator[Path]:
-    yield path
-    for number in count(2):
-        yield path.with_stem(f"{path.stem}-{number}")
-
-
-def _append(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(f"{text}\n")
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error

@@ -11,7 +11,7 @@ import os
 import re
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from shapechanger.contract.plan import GuardPlan, SensorPlan, driven_pins
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
+from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.check.pins import outside_level, pin_level
 from shapechanger.robot.check.report import (
     Checks,
@@ -36,15 +36,14 @@ from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.setup.computer import (
+from shapechanger.robot.setup.install import (
     FAST_HZ,
-    boot_config,
-    boot_lines,
-    boot_rates,
+    BootConfig,
     device_groups,
-    sets_parameter,
+    servo_devices,
+    unit_name,
+    unit_word,
 )
-from shapechanger.robot.setup.systemd import unit_name, unit_word
 
 # Time for each check, s; a bus whose servos are all silent needs the longest, some seconds.
 CHECK_S: Final = 10.0
@@ -59,7 +58,6 @@ class StandingRobot:
         profile: The robot.
         port: Port of its server.
         root: Root of the file system.
-        look: Opens the camera.
         hardware: Opens its pins and buses.
         motors_off: Whether the motors have no supply, so that their resistors can be tested.
         installed: Whether it is installed on its computer, and not on a bench with LEDs.
@@ -70,7 +68,6 @@ class StandingRobot:
     profile: Profile
     port: int = 0
     root: Path = Path("/")
-    look: Callable[[CameraPlan], Camera] = open_camera
     hardware: Callable[[], Hardware] = Hardware
     motors_off: bool = False
     installed: bool = True
@@ -125,62 +122,58 @@ def _checks(robot: StandingRobot) -> Checks:
         yield from _wiring_checks(robot)
     yield "wiring", _close(robot)
     if robot.installed and not robot.on_twin:
-        yield "port", _port(robot)
+        otherwise = f"Port {robot.port} cannot be used ({robot.port_error}). Is the robot served?"
+        yield "port", [judged(not robot.port_error, f"Port {robot.port} is free.", otherwise)]
 
 
 def _computer_checks(robot: StandingRobot) -> Checks:
-    profile = robot.profile
+    profile, config = robot.profile, BootConfig(robot.root)
     if robot.installed:
-        yield "profile", _profile(profile)
+        yield "profile", [("good", f"{profile.path} is valid.")]
         yield "credentials", _credentials(robot)
-        yield "calibration", _calibration(profile)
+        if profile.calibrated is None:
+            remedy = f"Never calibrated: shapechanger robot calibrate {profile.path}"
+            yield "calibration", [("unknown", remedy)]
         yield "systemd", _unit(robot)
     yield "computer", _computer(robot)
-    yield "strict_gpiod", _strict_gpiod(robot)
+    yield "strict_gpiod", _strict_gpiod(config)
     yield "enable line", _enable_line(profile)
     yield "output enable", _output_enable(profile)
     yield "latency timer", _latency_timers(robot)
     yield "devices", _devices(robot)
-    yield "packages", _packages(robot)
+    yield "packages", _packages(profile)
     if (camera := profile.camera) is not None:
-        yield "camera", _camera(robot, camera)
+        yield "camera", _camera(camera)
         yield "camera's geometry", _geometry(camera)
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        yield "I2C speed", _bus_speed(robot)
+        yield "I2C speed", _bus_speed(config)
 
 
 def _wiring_checks(robot: StandingRobot) -> Checks:
-    if driven_pins(robot.profile) or _servo_enables(robot.profile):
+    profile = robot.profile
+    if driven_pins(profile) or _servo_enables(profile):
         yield "resistors", _resistors(robot)
-    if robot.has_pins and robot.profile.stop_pin is not None:
-        yield "emergency button", _button(robot, robot.profile.stop_pin)
-    for bus, address in sorted({(one["bus"], one["address"]) for one in _boards(robot.profile)}):
+    if robot.has_pins and profile.stop_pin is not None:
+        yield "emergency button", _button(robot, profile.stop_pin)
+    for bus, address in sorted({(one["bus"], one["address"]) for one in _boards(profile)}):
         if robot.has_bus(bus):
             yield "servo board", _servo_board(robot, bus, address)
-    readable = [plan for plan in robot.profile.sensors if robot.can_read(plan)]
-    for plan in readable:
-        if plan.driver not in {"as5600", DRIVER}:  # They have separate checks.
-            read = _speed_pins if plan.measures == "speed" else _sensor
-            yield "sensor", read(robot, plan)
-    yield "servo bus", _servo_bus(robot)
-    for plan in readable:
+    encoders: list[SensorPlan] = []
+    for plan in filter(robot.can_read, profile.sensors):
         if plan.driver == "as5600":
-            for joint in plan.settings["joints"]:
-                yield "encoders", _encoder(robot, plan, joint)
-
-
-def _profile(profile: Profile) -> Results:
-    yield "good", f"{profile.path} is valid."
+            encoders.append(plan)
+        elif plan.driver != DRIVER:  # The servos are checked themselves.
+            yield "sensor", (_speed_pins if plan.measures == "speed" else _sensor)(robot, plan)
+    if any(output.driver == DRIVER for output in profile.outputs):
+        yield "servo bus", _servo_bus(robot)
+    for plan in encoders:
+        for joint in plan.settings["joints"]:
+            yield "encoders", _encoder(robot, plan, joint)
 
 
 def _credentials(robot: StandingRobot) -> Results:
     folder = load_credentials(robot.credentials or credentials_folder(robot.profile.name))
     yield "good", f"Key and certificate: {folder.key_file.parent}."
-
-
-def _calibration(profile: Profile) -> Results:
-    if profile.calibrated is None:
-        yield "unknown", f"Never calibrated: shapechanger robot calibrate {profile.path}"
 
 
 def _computer(robot: StandingRobot) -> Results:
@@ -191,16 +184,15 @@ def _computer(robot: StandingRobot) -> Results:
         yield "unknown", "This is not a Raspberry Pi: `serve --twin` runs on simulated pins here."
 
 
-def _strict_gpiod(robot: StandingRobot) -> Results:
-    path = boot_config(robot.root)
-    if path is None:
+def _strict_gpiod(config: BootConfig) -> Results:
+    if config.path is None:
         yield "unknown", "This machine has no Raspberry Pi config.txt."
     else:
         yield judged(
-            sets_parameter(boot_lines(path), "strict_gpiod"),
-            f"{path} sets it: the pins of a process that dies go low.",
+            config.sets("strict_gpiod"),
+            f"{config.path} sets it: the pins of a process that dies go low.",
             "A pin keeps its level when the process that set it dies: add "
-            f"`dtparam=strict_gpiod` to {path} and restart the computer.",
+            f"`dtparam=strict_gpiod` to {config.path} and restart the computer.",
         )
 
 
@@ -215,14 +207,11 @@ def _unit(robot: StandingRobot) -> Results:
             f"safe: {remedy}.",
         )
         return
-    text, name = path.read_text(), re.escape(unit_word(str(profile)))
-    needed = {
-        "Restart=always": r"^Restart=always\s*$",
-        "ExecStopPost=… robot safe-pins": r"^ExecStopPost=.*robot safe-pins",
-        f"`robot serve {profile}`": rf"^Exec\w+=.*robot serve {name}(\s|$)",
-        f"`robot safe-pins {profile}`": rf"^Exec\w+=.*robot safe-pins {name}(\s|$)",
-    }
-    lacks = [what for what, line in needed.items() if not re.search(line, text, re.MULTILINE)]
+    text, word = path.read_text(), unit_word(str(profile))
+    needed = ["Restart=always", f"ExecStart=…robot serve {word}"]
+    needed.append(f"ExecStopPost=…robot safe-pins {word}")
+    patterns = {one: re.escape(one).replace("…", ".*") for one in needed}
+    lacks = [one for one in needed if not re.search(rf"(?m)^{patterns[one]}(\s|$)", text)]
     yield judged(
         not lacks,
         f"{path} restarts the robot and makes its pins safe.",
@@ -255,7 +244,7 @@ def _output_enable(guard: GuardPlan) -> Results:
 
 def _latency_timers(robot: StandingRobot) -> Results:
     """Check that the adapters pass on the servos' answers at once."""
-    for device in {o.settings["device"] for o in robot.profile.outputs if o.driver == DRIVER}:
+    for device in servo_devices(robot.profile):
         path = robot.root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
         if not path.exists():
             yield "unknown", f"{device} reports no latency timer; if it has one, it must be 1 ms."
@@ -290,15 +279,14 @@ def _devices(robot: StandingRobot) -> Results:
         yield judged(can_open, f"{path} can be opened.", otherwise)
 
 
-def _packages(robot: StandingRobot) -> Results:
-    guard, camera = robot.profile, robot.profile.camera
+def _packages(profile: Profile) -> Results:
     remedies = {"gpiozero": "pip install 'shapechanger[robot]'"}
     remedies["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
-    if any("bus" in plan.settings for plan in (*guard.outputs, *guard.sensors)):
-        remedies["smbus2"] = "pip install 'shapechanger[robot]'"
-    if any(output.driver == DRIVER for output in guard.outputs):
+    if any("bus" in plan.settings for plan in (*profile.outputs, *profile.sensors)):
+        remedies["smbus2"] = remedies["gpiozero"]
+    if servo_devices(profile):
         remedies["dynamixel_sdk"] = "pip install 'shapechanger[robot,finger]'"
-    if camera is not None and camera.driver == "picamera2":
+    if profile.camera is not None and profile.camera.driver == "picamera2":
         remedies["picamera2"] = (
             "sudo apt install python3-picamera2, and make the virtual environment with "
             "--system-site-packages"
@@ -308,14 +296,13 @@ def _packages(robot: StandingRobot) -> Results:
         yield judged(is_there, f"{name} is installed.", f"{name} is not installed: {remedy}.")
 
 
-def _camera(robot: StandingRobot, plan: CameraPlan) -> Results:
-    with closing(robot.look(plan)) as camera:  # Also ends a `read` that still waits.
+def _camera(plan: CameraPlan) -> Results:
+    def frame() -> Results:
+        yield "good", f"{plan.driver} sent a frame of {len(camera.read().jpeg)} bytes."
+
+    with closing(open_camera(plan)) as camera:  # Also ends a `read` that still waits.
         late = f"{plan.driver} sent no frame within {_CAMERA_S:g} s."
-        yield from finish_in_time(_frame(plan, camera), _CAMERA_S, late)
-
-
-def _frame(plan: CameraPlan, camera: Camera) -> Results:
-    yield "good", f"{plan.driver} sent a frame of {len(camera.read().jpeg)} bytes."
+        yield from finish_in_time(frame(), _CAMERA_S, late)
 
 
 def _geometry(plan: CameraPlan) -> Results:
@@ -328,24 +315,17 @@ def _geometry(plan: CameraPlan) -> Results:
         yield "good", view + "top to bottom; `shapechanger robot camera` draws it."
 
 
-def _bus_speed(robot: StandingRobot) -> Results:
+def _bus_speed(config: BootConfig) -> Results:
     """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
-    config = boot_config(robot.root)
-    if config is None:
+    if config.path is None:
         yield "unknown", f"The bus should have {FAST_HZ} bits per second; it cannot be read here."
         return
-    rate = (boot_rates(config) or [0])[-1]
     yield judged(
-        rate >= FAST_HZ,
-        f"{config} sets {rate} bits per second.",
+        config.i2c_hz() >= FAST_HZ,
+        f"{config.path} sets {config.i2c_hz()} bits per second.",
         f"Four encoders take 3 of every 10 ms at the default of 100000 bits per second: add "
-        f"`dtparam=i2c_arm_baudrate={FAST_HZ}` to {config} and restart the computer.",
+        f"`dtparam=i2c_arm_baudrate={FAST_HZ}` to {config.path} and restart the computer.",
     )
-
-
-def _port(robot: StandingRobot) -> Results:
-    otherwise = f"Port {robot.port} cannot be used ({robot.port_error}). Is the robot served?"
-    yield judged(not robot.port_error, f"Port {robot.port} is free.", otherwise)
 
 
 def _close(robot: StandingRobot) -> Results:
@@ -384,26 +364,19 @@ def _resistors(robot: StandingRobot) -> Results:
         lacks = "take the motors' supply off, and add --motors-off"
         yield "unknown", f"Not tested: {lacks if robot.has_pins else 'this computer has no pins'}."
         return
-    for pin, use in driven_pins(robot.profile).items():
-        level = outside_level(pin, robot.pins)
-        if level == 1:
-            reason = "something holds it high, and it must be low while no program drives it"
-            yield "bad", f"GPIO{pin}, {use}: {reason}."
-            continue
+    may_run = "it may run while no program holds the pin"
+    pulses = "the board sends pulses while no program holds it"
+    down = ("low", "high", "pull-down", "ground", may_run)
+    up = ("high", "low", "pull-up", "3.3 V", pulses)
+    pins = [(pin, use, down) for pin, use in driven_pins(robot.profile).items()]
+    pins += [(pin, "OE of the servo board", up) for pin in _servo_enables(robot.profile)]
+    for pin, use, (wanted, wrong, pull, place, reason) in pins:
+        level = {0: "low", 1: "high", None: ""}[outside_level(pin, robot.pins)]
+        problem = f"is held {wrong}" if level else f"has no {pull}"
         yield judged(
-            level == 0,
-            f"GPIO{pin}, {use}, is pulled down.",
-            f"GPIO{pin}, {use}, has no pull-down: fit 10 kOhm to ground, because it may run "
-            "while no program holds the pin.",
-        )
-    for pin in _servo_enables(robot.profile):
-        level = outside_level(pin, robot.pins)
-        lacks = "has no pull-up" if level is None else "is held low"
-        yield judged(
-            level == 1,
-            f"GPIO{pin}, OE of the servo board, is pulled up.",
-            f"GPIO{pin}, OE of the servo board, {lacks}: fit 10 kOhm to 3.3 V, or the board "
-            "sends pulses while no program holds it.",
+            level == wanted,
+            f"GPIO{pin}, {use}, is pulled {'down' if wanted == 'low' else 'up'}.",
+            f"GPIO{pin}, {use}, {problem}: fit 10 kOhm to {place}, because {reason}.",
         )
 
 
@@ -467,16 +440,13 @@ def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
 def _servo_bus(robot: StandingRobot) -> Results:
     """Check that every servo of the bus answers and is the right one, without torque."""
     servos = tuple(output for output in robot.profile.outputs if output.driver == DRIVER)
-    if not servos:
-        return
     if not all(map(stops_itself, servos)):
         yield "unknown", "Not asked: these servos have power only while the enable line has it."
         return
-    bank = OutputBank(replace(robot.profile, outputs=servos), robot.pins)
-    try:
+    with ExitStack() as opened:
+        bank = OutputBank(replace(robot.profile, outputs=servos), robot.pins)
+        opened.callback(lambda: bank.close(robot.pins.clock.now_ns()))
         bank.release()
-    finally:
-        bank.close(robot.pins.clock.now_ns())
     yield "good", f"All {len(servos)} servos answer."
 
 

@@ -1,56 +1,50 @@
-"""Calibration: profile changes from a person's findings while jogging an output."""
+"""Calibration of a robot: pulses, motors and wheels, and the zeros of joints and tendons."""
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from typing import Any, Final, Literal
 
-from shapechanger.contract.plan import OutputPlan
+from shapechanger.contract.plan import GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
 from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.pulse import PulseRange
+from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
+from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_settings
+from shapechanger.robot.guard.outputs import Switches
+from shapechanger.robot.hardware import Hardware
 
 # A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
 # full range of standard servos, and 900 to 2100 us as what most of them reach.
-_NARROWEST_US: Final = 600
-_WIDEST_US: Final = 2400
+_WIDEST_US: Final = (600, 2400)
 
 
-@dataclass(frozen=True, slots=True)
-class JogResult:
-    """Values that a person found by jogging a servo or a motor controller."""
-
-    low: float
-    middle: float
-    high: float
-
-
-def with_widest_pulses(output: OutputPlan) -> OutputPlan:
-    """Return a servo or controller with the widest pulse range, for jogging; its middle stays."""
+def widest_pulses(output: OutputPlan) -> dict[str, int]:
+    """Return the settings for the widest pulses of a servo or controller, to jog it."""
     low, _, high = OUTPUTS[output.driver].pulses
     turned = output.settings[low] > output.settings[high]
-    ends = (_WIDEST_US, _NARROWEST_US) if turned else (_NARROWEST_US, _WIDEST_US)
-    settings = {**output.settings, low: ends[0], high: ends[1]}
-    return dataclasses.replace(output, settings=settings)
+    return dict(zip((high, low) if turned else (low, high), _WIDEST_US, strict=True))
 
 
 def reading(output: OutputPlan, value: float) -> str:
-    """Describe an output at a value, in the unit of its settings.
-
-    Args:
-        output: A servo, a motor controller or a motor.
-        value: -1 to 1.
-    """
+    """Describe a servo, controller or motor at a value, -1 to 1, in the unit of its settings."""
     if OUTPUTS[output.driver].pulses:
         return f"{PulseRange.of(output).width_us(value):.0f} µs"
     return f"duty {abs(value) * output.settings['full']:.2f}"
 
 
-def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
-    """Return the changes for a jogged output, whole microseconds by dotted name."""
+def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
+    """Return the changes for a jogged output, whole microseconds by dotted name.
+
+    Args:
+        output: The output, with the settings for jogging.
+        found: Values of its low end, middle and high end, -1 to 1.
+    """
     keys, jogged = OUTPUTS[output.driver].pulses, PulseRange.of(output)
-    widths = [round(jogged.width_us(v)) for v in (found.low, found.middle, found.high)]
+    widths = [round(jogged.width_us(value)) for value in found]
     PulseRange(*map(float, widths))  # Checks the order.
     return {f"output.{output.name}.{key}": us for key, us in zip(keys, widths, strict=True)}
 
@@ -95,3 +89,147 @@ def wheel_changes(
             "swap its pins `a` and `b` if it counts backward."
         )
     return {f"sensor.{sensor}.wheel_m": round(wheel_m * pushed_m / measured_m, 4)}
+
+
+_START_TICKS: Final = 50  # Half a second, in which servos start that get their power now.
+_READINGS: Final = 50  # Half a second; single readings differ by a count or two.
+# Chosen: half a percent of the longest excursion of a finger's tendon.
+_STILL_M: Final = 0.2e-3
+
+
+def find_joint_zeros(
+    plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]
+) -> dict[str, int]:
+    """Average the encoder readings while a person holds the joints straight.
+
+    Args:
+        plan: Settings of the robot.
+        hardware: Gives access to its buses.
+        wait: Waits for about 10 ms.
+
+    Returns:
+        Counts of each encoder, 0 to 4095, by the names of sensor and joint, such as
+        `joints.MCP_flexion`; empty for a robot without encoders.
+    """
+    zeros: dict[str, int] = {}
+    for sensor in (one for one in plan.sensors if one.driver == "as5600"):
+        with closing(connect_encoders(sensor, hardware)) as opened:
+            for encoder in opened.encoders:
+                turns: list[float] = []
+                for _ in range(_READINGS):
+                    turns.append(opened.counts(encoder) * 2.0 * math.pi / COUNTS_PER_TURN)
+                    wait()
+                # The mean direction: the mean of counts around 0 would be half a turn.
+                mean = math.atan2(sum(map(math.sin, turns)), sum(map(math.cos, turns)))
+                counts = round(mean * COUNTS_PER_TURN / (2.0 * math.pi)) % COUNTS_PER_TURN
+                zeros[f"{sensor.name}.{encoder.joint}"] = counts
+    return zeros
+
+
+def require_homing(settings: BusSettings) -> None:
+    """Refuse a homing tension below the gears' measured friction.
+
+    Its servo would stand still at once, with its tendon slack.
+    """
+    for servo in settings.servos:
+        gears, pull = servo.known.gears, servo.homing_n
+        friction = gears.friction_nm / servo.spool_radius_m
+        if gears.is_measured and pull <= friction:
+            raise RobotError(
+                f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
+                f"about {friction:.1f} N. Set homing_n, to {1.5 * friction:.1f} N for example."
+            )
+
+
+def home(
+    settings: BusSettings,
+    cycle: Callable[[Mapping[str, float]], BusState],
+    *,
+    still_ms: int = 300,
+    within_ms: int = 10_000,
+    travel_m: float = 0.06,
+) -> dict[str, int]:
+    """Pull all tendons of a held bus until nothing moves, so that they hold a known posture.
+
+    Slack tendons are taken up meanwhile.
+
+    Args:
+        settings: The bus.
+        cycle: Sends the tension of each tendon, N, and returns the state of the bus.
+        still_ms: Time for which no servo may move, ms.
+        within_ms: Time limit, ms.
+        travel_m: Limit of winding in, m.
+
+    Returns:
+        Position of each servo at the zero of its tendon, in counts, by name.
+
+    Raises:
+        RobotError: If a servo fails, or winds in too far or for too long.
+    """
+    servos = {servo.name: servo for servo in settings.servos}
+    tensions = {name: servo.homing_n for name, servo in servos.items()}
+    starts: dict[str, int] = {}
+    zeros: dict[str, int] = {}
+    moved: dict[str, tuple[int, int]] = {}  # Position and time at which each last moved.
+    began_ns: int | None = None
+    while True:
+        state = cycle(tensions)
+        if state.faults:
+            raise RobotError(f"No zero: {state.reason}")
+        now_ns = state.at_ns
+        began_ns = now_ns if began_ns is None else began_ns
+        for name, reading in state.servos.items():
+            servo, at = servos[name], reading.position
+            zeros[name] = at
+            wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
+            if wound_m > travel_m:
+                reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
+                raise RobotError(f"{servo.words} has no zero: {reason}. Its tendon has come off.")
+            was_at, _ = moved.setdefault(name, (at, now_ns))
+            if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
+                moved[name] = at, now_ns
+        still_ns = now_ns - still_ms * 1_000_000
+        moving = [name for name in servos if name not in moved or moved[name][1] > still_ns]
+        if not moving:
+            return zeros
+        if now_ns - began_ns > within_ms * 1_000_000:
+            seconds = within_ms / 1e3
+            raise RobotError(f"No zero: {', '.join(moving)} still moved after {seconds:g} s.")
+
+
+def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:
+    """Pull all tendons gently until nothing moves, and release them.
+
+    A person holds the finger straight, and no other process may have the bus open.
+
+    Args:
+        plan: Settings of the robot.
+        hardware: Gives access to its bus.
+        wait: Waits for about 10 ms.
+
+    Returns:
+        Position of each servo, counts, by the name of its output.
+    """
+    outputs = [output for output in plan.outputs if output.driver == DRIVER]
+    if not outputs:
+        raise RobotError(f"{plan.name} has no tendons on a servo bus.")
+    settings = bus_settings(outputs)
+    require_homing(settings)
+    with (
+        closing(Switches(plan, hardware)) as switches,
+        closing(ServoBus(settings, hardware.servo_port(settings))) as bus,
+    ):
+
+        def cycle(tensions: Mapping[str, float]) -> BusState:
+            switches.toggle()
+            bus.send(tensions)
+            state = bus.cycle(hardware.clock.now_ns())
+            wait()
+            return state
+
+        for _ in range(_START_TICKS if plan.enable_pin is not None else 0):
+            switches.toggle()
+            wait()
+        bus.set_up(switches.toggle)
+        bus.hold()
+        return home(settings, cycle)

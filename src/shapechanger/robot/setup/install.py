@@ -6,28 +6,31 @@ without an effect is reported. Commands run as root, by one function that tests 
 
 from __future__ import annotations
 
+import getpass
 import os
+import re
 import shlex
+import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
+from shapechanger.files import cannot_write, write_new
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.settings import DRIVER
-from shapechanger.robot.setup.computer import (
-    FAST_HZ,
-    boot_config,
-    boot_lines,
-    boot_rates,
-    device_groups,
-    needs_pins,
-    sets_parameter,
-)
 
+FAST_HZ: Final = 400_000
+"""Speed of the I2C bus that encoders at joints need, bits per second."""
+
+_ARM_BUS: Final = 1  # The I2C bus of the header's pins 3 and 5.
+_UARTS: Final = ("serial", "ttyAMA", "ttyS")  # Serial ports of the header.
 _UNITS: Final = "etc/systemd/system"
 _WANTED: Final = f"{_UNITS}/multi-user.target.wants"
 _UDEV: Final = "etc/udev/rules.d/99-shapechanger-latency.rules"
@@ -35,8 +38,133 @@ _LATENCY: Final = (
     'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"\n'
 )
 _MODULES: Final = "etc/modules-load.d/i2c-dev.conf"
-_ARM_BUS: Final = 1  # The I2C bus of the header's pins 3 and 5.
-_UARTS: Final = ("serial", "ttyAMA", "ttyS")  # Serial ports of the header.
+# Overlays of Raspberry Pi's cameras, for those that are not detected.
+_CAMERA_OVERLAYS: Final = tuple(f"dtoverlay={chip}" for chip in ("imx", "ov5647", "ov9281"))
+
+
+class BootConfig:
+    """The config.txt of a Raspberry Pi.
+
+    Args:
+        root: Root of the file system.
+
+    Attributes:
+        path: The file; None on other machines.
+    """
+
+    def __init__(self, root: Path) -> None:
+        paths = [root / name for name in ("boot/firmware/config.txt", "boot/config.txt")]
+        self.path = next((path for path in paths if path.exists()), None)
+
+    def lines(self) -> list[str]:
+        """Return the lines that apply to every model, without filtered ones."""
+        lines: list[str] = []
+        section = "all"
+        for line in _text(self.path).splitlines():
+            if match := re.match(r"\s*\[([^\]]*)\]", line):
+                section = match[1]
+            elif section == "all":
+                lines.append(line.partition("#")[0].replace(" ", ""))
+        return lines
+
+    def parameters(self) -> dict[str, str]:
+        """Return the value of each device tree parameter; "on" if a line only names it."""
+        tree = [
+            line.removeprefix("dtparam=") for line in self.lines() if line.startswith("dtparam=")
+        ]
+        pairs = [one.partition("=") for line in tree for one in line.split(",")]
+        # The bus of the header has two names.
+        return {name.replace("i2c_arm", "i2c"): value or "on" for name, _, value in pairs}
+
+    def sets(self, parameter: str) -> bool:
+        """Return whether it switches a device tree parameter on, such as "i2c"."""
+        return self.parameters().get(parameter) in {"on", "1", "true", "yes"}
+
+    def i2c_hz(self) -> int:
+        """Return the speed of the I2C bus that it sets, bits per second; 0 without one."""
+        speed = self.parameters().get("i2c_baudrate", "")
+        return int(speed) if speed.isdecimal() else 0
+
+
+def _text(path: Path | None) -> str:
+    """Return the content of a file; "" without one."""
+    return path.read_text(encoding="utf-8", errors="replace") if path and path.exists() else ""
+
+
+def needs_pins(guard: GuardPlan) -> bool:
+    """Return True if a robot needs its computer's own pins, to move or to stop."""
+    return guard.enable_pin is not None or any(
+        output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
+        for output in guard.outputs
+    )
+
+
+def device_groups(guard: GuardPlan) -> dict[str, str]:
+    """Return the group that may open each device file of a robot's outputs and sensors."""
+    groups: dict[str, str] = {}
+    if needs_pins(guard):
+        groups["/dev/gpiochip0"] = "gpio"
+    for plan in (*guard.outputs, *guard.sensors):
+        if "bus" in plan.settings and plan.settings.get("over", "pca9685") == "pca9685":
+            groups[f"/dev/i2c-{plan.settings['bus']}"] = "i2c"
+    return groups | dict.fromkeys(servo_devices(guard), "dialout")
+
+
+def servo_devices(guard: GuardPlan) -> list[str]:
+    """Return the serial ports of a robot's servos."""
+    return sorted({one.settings["device"] for one in guard.outputs if one.driver == DRIVER})
+
+
+def unit_name(robot: str) -> str:
+    """Return the name of a robot's systemd unit; one computer may serve several robots."""
+    return f"shapechanger-{_plain(robot)}.service"
+
+
+def _plain(robot: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", robot)
+
+
+def unit_word(text: str) -> str:
+    """Return a word of a command line, in quotes if it needs them (systemd.service(5))."""
+    if re.fullmatch(r"[A-Za-z0-9_./+:@,=-]+", text):
+        return text
+    escapes = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "%": "%%", "$": "$$"}
+    return f'"{text.translate(str.maketrans(escapes))}"'
+
+
+def write_unit(
+    robot: str, profile: Path, credentials: Path | None = None, user: str = ""
+) -> tuple[Path, bool]:
+    """Write the unit next to a profile; an existing file stays.
+
+    Args:
+        robot: Name of the robot.
+        profile: Its profile, which need not exist yet.
+        credentials: Folder of its key and certificate; None for the default.
+        user: User that runs it, a member of the groups of its devices; "" for the one of this
+            process.
+
+    Returns:
+        The file, and True if it was written now.
+    """
+    path = profile.absolute().parent / unit_name(robot)
+    values = {
+        "UNIT": path.stem,
+        "ROBOT": _plain(robot),
+        "PROFILE": unit_word(str(profile.absolute())),
+        "PROGRAM": unit_word(shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"),
+        "USER": user or getpass.getuser(),
+        "OPTIONS": f" --credentials {unit_word(str(credentials.absolute()))}"
+        if credentials
+        else "",
+    }
+    template = (Path(__file__).parent / "robot.service").read_text(encoding="utf-8")
+    # At once, because a path may hold what looks like another placeholder.
+    text = re.sub("@([A-Z]+)@", lambda match: values[match[1]], template)
+    with translate_errors(OSError, to=partial(cannot_write, path)), suppress(FileExistsError):
+        write_new(path, text.encode())
+        return path, True
+    return path, False
 
 
 class RootCommand(NamedTuple):
@@ -48,19 +176,12 @@ class RootCommand(NamedTuple):
     def __str__(self) -> str:
         """Return it as a person types it."""
         typed = f"sudo {shlex.join(self.arguments)}"
-        return f"printf '%b' {_quoted(self.text)} | {typed}" if self.text else typed
-
-
-def _quoted(text: str) -> str:
-    return shlex.quote(text.replace("\\", "\\\\").replace("\n", "\\n"))
-
-
-Runner = Callable[[RootCommand], str]
-"""Runs a command as root, and returns why it failed; empty if it did not."""
+        quoted = shlex.quote(self.text.replace("\\", "\\\\").replace("\n", "\\n"))
+        return f"printf '%b' {quoted} | {typed}" if self.text else typed
 
 
 def run_as_root(command: RootCommand) -> str:
-    """Run a command with sudo, which may ask for a password at the terminal; see `Runner`."""
+    """Run a command with sudo, which may ask for a password at the terminal; see `Machine.run`."""
     arguments = command.arguments if os.geteuid() == 0 else ("sudo", *command.arguments)
     try:
         done = subprocess.run(
@@ -76,11 +197,40 @@ def run_as_root(command: RootCommand) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The computer on which a robot is put in place."""
+    """The computer on which a robot is put in place.
+
+    Attributes:
+        user: User that is to run the robot.
+        root: Root of the file system.
+        run: Runs a command as root, and returns why it failed; empty if it did not.
+    """
 
     user: str
     root: Path = Path("/")
-    run: Runner = run_as_root
+    run: Callable[[RootCommand], str] = run_as_root
+
+    def require_systemd(self) -> None:
+        """Refuse a machine that systemd does not manage (sd_booted(3))."""
+        if not (self.root / "run/systemd/system").is_dir():
+            raise RobotError(
+                "This machine is not run by systemd, which starts a robot and makes its pins safe: "
+                "installing needs Raspberry Pi OS; `shapechanger robot serve` runs it by hand."
+            )
+
+    def require_pi(self) -> None:
+        """Refuse a machine that is not a Raspberry Pi with systemd."""
+        self.require_systemd()
+        if "Raspberry Pi" not in _text(self.root / "proc/device-tree/model"):
+            raise RobotError(
+                "This machine is not a Raspberry Pi: installing needs one with Raspberry Pi OS; "
+                "`shapechanger robot serve --twin` runs the robot on simulated pins here."
+            )
+
+    def by_raspi_config(self, *call: str) -> tuple[RootCommand, ...]:
+        """Return a call of raspi-config, which supports all models, if it exists."""
+        if not (self.root / "usr/bin/raspi-config").exists():
+            return ()
+        return (RootCommand(("raspi-config", "nonint", *call)),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +254,7 @@ class SystemChange:
     instead: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(NamedTuple):
     """Result of one change."""
 
     change: SystemChange
@@ -114,13 +263,13 @@ class Outcome:
 
 
 def make_changes(
-    changes: Iterable[SystemChange], run: Runner, *, dry: bool = False
+    changes: Iterable[SystemChange], run: Callable[[RootCommand], str], *, dry: bool = False
 ) -> Iterator[Outcome]:
     """Make each change that is not made yet, in order.
 
     Args:
         changes: The changes; a generator sees the effect of those before.
-        run: Runs commands as root.
+        run: Runs commands as root; see `Machine.run`.
         dry: Whether to say only what would be done.
     """
     for change in changes:
@@ -139,60 +288,6 @@ def make_changes(
             yield Outcome(change, "failed" if why else "did", sentence)
 
 
-def require_systemd(root: Path) -> None:
-    """Refuse a machine that systemd does not manage (sd_booted(3))."""
-    if not (root / "run/systemd/system").is_dir():
-        raise RobotError(
-            "This machine is not run by systemd, which starts a robot and makes its pins safe: "
-            "installing needs Raspberry Pi OS; `shapechanger robot serve` runs it by hand."
-        )
-
-
-def require_pi(root: Path) -> None:
-    """Refuse a machine that is not a Raspberry Pi with systemd."""
-    require_systemd(root)
-    model = root / "proc/device-tree/model"
-    if not model.exists() or "Raspberry Pi" not in model.read_text(errors="replace"):
-        raise RobotError(
-            "This machine is not a Raspberry Pi: installing needs one with Raspberry Pi OS; "
-            "`shapechanger robot serve --twin` runs the robot on simulated pins here."
-        )
-
-
-def changes_to_install(
-    guard: GuardPlan, camera: CameraPlan | None, unit: Path, machine: Machine
-) -> Iterator[SystemChange]:
-    """Yield what puts a robot in place; each change is planned when those before are made.
-
-    Args:
-        guard: Outputs and sensors of the robot.
-        camera: Its camera; None without one.
-        unit: Its systemd unit, next to the profile.
-        machine: The computer.
-    """
-    groups = {*device_groups(guard).values(), *(["video"] if camera is not None else [])}
-    for group in sorted(groups):
-        yield _group(group, machine)
-    config = boot_config(machine.root)
-    for change in _boot_changes(guard, camera, machine, config):
-        yield change if config else _without_config(change)
-    if camera is not None and camera.driver == "picamera2":
-        package = machine.root / "usr/lib/python3/dist-packages/picamera2"
-        install = RootCommand(("apt-get", "install", "-y", "python3-picamera2"))
-        yield SystemChange(
-            "picamera2", "python3-picamera2 is installed.", package.is_dir, (install,)
-        )
-    yield from _serial(guard, machine, config)
-    yield _service(unit, machine.root)
-    link = machine.root / _WANTED / unit.name
-    yield SystemChange(
-        "start",
-        "The robot starts with the computer, not armed.",
-        lambda: os.path.lexists(link),
-        (RootCommand(("systemctl", "enable", unit.name)),),
-    )
-
-
 def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
     """Yield what removes a robot's service; groups and interfaces stay."""
     path = root / _UNITS / unit_name
@@ -208,9 +303,44 @@ def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
     )
 
 
-def _service(unit: Path, root: Path) -> SystemChange:
-    path = root / _UNITS / unit.name
-    return SystemChange(
+def changes_to_install(
+    guard: GuardPlan, camera: CameraPlan | None, unit: Path, machine: Machine
+) -> Iterator[SystemChange]:
+    """Yield what puts a robot in place; each change is planned when those before are made.
+
+    Args:
+        guard: Outputs and sensors of the robot.
+        camera: Its camera; None without one.
+        unit: Its systemd unit, next to the profile.
+        machine: The computer.
+    """
+    config = BootConfig(machine.root)
+    groups = {*device_groups(guard).values(), *(["video"] if camera is not None else [])}
+    for group in sorted(groups):
+        yield _group(group, machine)
+    yield from _interfaces(guard, camera, machine, config)
+    if camera is not None and camera.driver == "picamera2":
+        package = machine.root / "usr/lib/python3/dist-packages/picamera2"
+        install = RootCommand(("apt-get", "install", "-y", "python3-picamera2"))
+        yield SystemChange(
+            "picamera2", "python3-picamera2 is installed.", package.is_dir, (install,)
+        )
+    rule = machine.root / _UDEV
+    for device in servo_devices(guard):
+        if Path(device).name.startswith(_UARTS):
+            yield from _serial_port(device, machine, config)
+        else:
+            yield SystemChange(
+                "latency timer",
+                "USB adapters that are plugged in from now on pass on answers within 1 ms.",
+                lambda: _text(rule) == _LATENCY,
+                (
+                    RootCommand(("tee", str(rule)), _LATENCY),
+                    RootCommand(("udevadm", "control", "--reload")),
+                ),
+            )
+    path = machine.root / _UNITS / unit.name
+    yield SystemChange(
         "service",
         f"{path} is the unit next to the profile.",
         lambda: path.exists() and path.read_bytes() == unit.read_bytes(),
@@ -219,141 +349,97 @@ def _service(unit: Path, root: Path) -> SystemChange:
             RootCommand(("systemctl", "daemon-reload")),
         ),
     )
+    yield SystemChange(
+        "start",
+        "The robot starts with the computer, not armed.",
+        lambda: os.path.lexists(machine.root / _WANTED / unit.name),
+        (RootCommand(("systemctl", "enable", unit.name)),),
+    )
 
 
 def _group(group: str, machine: Machine) -> SystemChange:
-    path = machine.root / "etc/group"
-
     def members() -> list[str] | None:
-        for line in path.read_text(errors="replace").splitlines():
-            name, *rest = line.split(":")
-            if name == group:
-                return rest[-1].split(",") if rest else []
-        return None
+        line = re.search(rf"^{group}:.*:(.*)$", _text(machine.root / "etc/group"), re.MULTILINE)
+        return line and line[1].split(",")
 
-    exists = path.exists() and members() is not None
+    exists = members() is not None
     return SystemChange(
         f"group {group}",
         f"{machine.user} is in the group {group}.",
-        lambda: path.exists() and machine.user in (members() or ()),
+        lambda: machine.user in (members() or ()),
         (RootCommand(("usermod", "-aG", group, machine.user)),) if exists else (),
         then="log in",
         instead=f"There is no group {group} here, which Raspberry Pi OS has.",
     )
 
 
-def _boot_changes(
-    guard: GuardPlan, camera: CameraPlan | None, machine: Machine, config: Path | None
+def _interfaces(
+    guard: GuardPlan, camera: CameraPlan | None, machine: Machine, config: BootConfig
 ) -> Iterator[SystemChange]:
     """Yield the lines that config.txt needs."""
 
-    def lines() -> list[str]:
-        return boot_lines(config) if config else []
-
-    def line(name: str, state: str, text: str, is_made: Callable[[], bool]) -> SystemChange:
+    def line(
+        name: str, state: str, text: str, is_made: Callable[[], bool], *more: RootCommand
+    ) -> SystemChange:
         # After a filter, such as [pi4], the line would apply to one model only.
-        added = RootCommand(("tee", "-a", str(config)), f"\n[all]\n{text}\n")
-        return SystemChange(name, state, is_made, (added,), "restart", text)
+        added = RootCommand(("tee", "-a", str(config.path)), f"\n[all]\n{text}\n")
+        commands = (added, *more) if config.path else ()
+        words = f"There is no config.txt of Raspberry Pi OS here; it would need {text}."
+        return SystemChange(name, state, is_made, commands, "restart", words)
 
     if needs_pins(guard):
-        yield line(
-            "strict_gpiod",
-            "The pins of a process that dies go low.",
-            "dtparam=strict_gpiod",
-            lambda: sets_parameter(lines(), "strict_gpiod"),
-        )
-    devices = device_groups(guard)
-    for device in (name for name, group in devices.items() if group == "i2c"):
+        state = "The pins of a process that dies go low."
+        is_strict = partial(config.sets, "strict_gpiod")
+        yield line("strict_gpiod", state, "dtparam=strict_gpiod", is_strict)
+    for device in (name for name, group in device_groups(guard).items() if group == "i2c"):
         bus = int(device.rpartition("-")[2])
-        state = f"I2C bus {bus} is on."
-        if bus != _ARM_BUS:
-            words = f"Bus {bus} needs an overlay that depends on its pins, as dtoverlay=i2c{bus}"
-            node = machine.root / device.lstrip("/")
-            yield SystemChange(f"I2C bus {bus}", state, node.exists, instead=f"{words}.")
-            continue
-        change = line(
-            "I2C",
-            state,
-            "dtparam=i2c_arm=on",
-            lambda: sets_parameter(lines(), "i2c_arm") or sets_parameter(lines(), "i2c"),
-        )
-        module = RootCommand(("tee", str(machine.root / _MODULES)), "i2c-dev\n")
-        change = replace(change, commands=(*change.commands, module))
-        yield _by_raspi_config(change, machine.root, ("do_i2c", "0"))
+        if bus == _ARM_BUS:
+            is_on = partial(config.sets, "i2c")
+            module = RootCommand(("tee", str(machine.root / _MODULES)), "i2c-dev\n")
+            change = line("I2C", f"I2C bus {bus} is on.", "dtparam=i2c_arm=on", is_on, module)
+            by_raspi_config = machine.by_raspi_config("do_i2c", "0")
+            yield replace(change, commands=by_raspi_config or change.commands)
+        else:
+            yield SystemChange(
+                f"I2C bus {bus}",
+                f"I2C bus {bus} is on.",
+                (machine.root / device.lstrip("/")).exists,
+                instead=f"Bus {bus} needs an overlay that depends on its pins, as "
+                f"dtoverlay=i2c{bus}.",
+            )
     if any(sensor.driver == "as5600" for sensor in guard.sensors):
         yield line(
             "I2C speed",
             f"The I2C bus has {FAST_HZ} bits per second.",
             f"dtparam=i2c_arm_baudrate={FAST_HZ}",
-            lambda: config is not None and max(boot_rates(config)[-1:], default=0) >= FAST_HZ,
+            lambda: config.i2c_hz() >= FAST_HZ,
         )
     if camera is not None and camera.driver == "picamera2":
+        finds = ("camera_auto_detect=1", *_CAMERA_OVERLAYS)
         yield line(
             "camera",
             "The camera on the ribbon cable is detected.",
             "camera_auto_detect=1",
-            lambda: any(
-                text.replace(" ", "").startswith(("camera_auto_detect=1", *_CAMERA_OVERLAYS))
-                for text in lines()
-            ),
+            lambda: any(text.startswith(finds) for text in config.lines()),
         )
 
 
-# Overlays of Raspberry Pi's cameras, for those that are not detected.
-_CAMERA_OVERLAYS: Final = tuple(f"dtoverlay={chip}" for chip in ("imx", "ov5647", "ov9281"))
-
-
-def _by_raspi_config(change: SystemChange, root: Path, call: tuple[str, str]) -> SystemChange:
-    """Return a change made by raspi-config, if it exists: it supports all models."""
-    if not (root / "usr/bin/raspi-config").exists():
-        return change
-    return replace(change, commands=(RootCommand(("raspi-config", "nonint", *call)),))
-
-
-def _without_config(change: SystemChange) -> SystemChange:
-    """Return a change that only a person can make, because there is no config.txt."""
-    words = f"There is no config.txt of Raspberry Pi OS here; it would need {change.instead}."
-    return replace(change, commands=(), instead=words)
-
-
-def _serial(guard: GuardPlan, machine: Machine, config: Path | None) -> Iterator[SystemChange]:
-    """Yield the changes for the port of a servo bus: the header's own, or a USB adapter's."""
-    rule = machine.root / _UDEV
-    cmdline = config.with_name("cmdline.txt") if config else None
-
-    def is_on() -> bool:
-        lines = boot_lines(config) if config else []
-        return "enable_uart=1" in lines or sets_parameter(lines, "uart0")
-
-    def has_console() -> bool:
-        return cmdline is None or "console=serial0" in cmdline.read_text()
-
-    devices = {o.settings["device"] for o in guard.outputs if o.driver == DRIVER}
-    for device in sorted(devices):
-        if not Path(device).name.startswith(_UARTS):
-            yield SystemChange(
-                "latency timer",
-                "USB adapters that are plugged in from now on pass on answers within 1 ms.",
-                lambda: rule.exists() and rule.read_text() == _LATENCY,
-                (
-                    RootCommand(("tee", str(rule)), _LATENCY),
-                    RootCommand(("udevadm", "control", "--reload")),
-                ),
-            )
-            continue
-        port = SystemChange(
-            "serial port",
-            f"{device} is on.",
-            is_on,
-            then="restart",
-            instead="Add enable_uart=1 to config.txt.",
-        )
-        console = SystemChange(
-            "serial console",
-            f"No console uses {device}.",
-            lambda: not has_console(),
-            then="restart",
-            instead="Remove console=serial0,115200 from cmdline.txt.",
-        )
-        yield _by_raspi_config(port, machine.root, ("do_serial_hw", "0"))
-        yield _by_raspi_config(console, machine.root, ("do_serial_cons", "1"))
+def _serial_port(device: str, machine: Machine, config: BootConfig) -> Iterator[SystemChange]:
+    """Yield the changes for servos at the header's own serial port."""
+    yield SystemChange(
+        "serial port",
+        f"{device} is on.",
+        lambda: "enable_uart=1" in config.lines() or config.sets("uart0"),
+        machine.by_raspi_config("do_serial_hw", "0"),
+        then="restart",
+        instead="Add enable_uart=1 to config.txt.",
+    )
+    command_line = config.path and config.path.with_name("cmdline.txt")
+    yield SystemChange(
+        "serial console",
+        f"No console uses {device}.",
+        lambda: bool(command_line) and "console=serial0" not in _text(command_line),
+        machine.by_raspi_config("do_serial_cons", "1"),
+        then="restart",
+        instead="Remove console=serial0,115200 from cmdline.txt.",
+    )

@@ -3,7 +3,7 @@
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.setup.zeros import home, require_homing
+from shapechanger.robot.setup.calibration import home, require_homing
 from tests.robot.drivers.servos.rigs import NAMES, Rig, servo, settings
 
 

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.keys import KeyMistake
-from shapechanger.robot.setup.zeros import home
+from shapechanger.robot.setup.calibration import home
 from tests.robot.drivers.servos.rigs import CYCLE_NS, NAMES, Rig, servo, settings
 
 _MOST = dict.fromkeys(NAMES, 20.0)

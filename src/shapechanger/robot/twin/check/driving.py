@@ -47,15 +47,9 @@ class _DrivenRobot:
         """Leave the robot."""
         self.client.close()
 
-    def look(self) -> Observation:
-        """Return the newest observation."""
-        newest = self.client.newest
-        self.client.acknowledge()
-        return self.client.observation(newest.message.seq if newest else 0).message
-
     def push(self, seconds: float = _PUSH_S) -> Observation:
         """Drive forward for some seconds and return the last observation."""
-        seen = self.look()
+        seen = self.client.ask().message
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:
             self.client.command(self._forward, answers=seen.seq, scale=self._cap)
@@ -66,7 +60,7 @@ class _DrivenRobot:
         """Wait for an observation that satisfies `done`; None on timeout."""
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:
-            if done(seen := self.look()):
+            if done(seen := self.client.ask().message):
                 return seen
         return None
 
@@ -131,7 +125,7 @@ def _stops(driven: _DrivenRobot, limit_ms: float) -> Iterator[Finding]:
         sentence = "It did not stop."
     yield Finding("stops by silence", *judged(stopped_ms <= limit_ms, sentence))
 
-    if driven.speed(driven.look()) is None:
+    if driven.speed(driven.client.ask().message) is None:
         yield Finding("wheels stand", "unknown", "No encoder measures the wheels.")
     else:
         begin_s = time.monotonic()
@@ -164,5 +158,5 @@ def _stops(driven: _DrivenRobot, limit_ms: float) -> Iterator[Finding]:
     driven.robot.await_restart()
     driven.connect()
     sentence = "The daemon was killed; the robot started afresh and stands still, not armed."
-    good = driven.stands(driven.look())
+    good = driven.stands(driven.client.ask().message)
     yield Finding("disarmed after a crash", *judged(good, sentence))

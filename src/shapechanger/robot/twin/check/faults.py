@@ -111,15 +111,7 @@ class BadNetwork:
 
 
 class NotTried(RobotError):
-    """A fault could not be tried, which may succeed with a new robot.
-
-    Attributes:
-        attempts: After how many failed attempts to give up.
-    """
-
-    def __init__(self, message: str, attempts: int) -> None:
-        super().__init__(message)
-        self.attempts = attempts
+    """A fault could not be tried, which may succeed with a new robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +176,6 @@ class Fault:
 
 # Longest duration of an instantaneous fault; a longer one means that the machine was paused.
 _AT_ONCE_MS: Final = 5.0
-# Unlike a broken robot, a busy machine recovers.
-_UNTIMELY_ATTEMPTS: Final = 10
 
 
 def _at_once(act: Callable[[], object]) -> int:
@@ -194,8 +184,7 @@ def _at_once(act: Callable[[], object]) -> int:
     act()
     took_ms = (time.monotonic_ns() - at_ns) / 1e6
     if took_ms > _AT_ONCE_MS:
-        message = f"It took {took_ms:.0f} ms to let the fault happen."
-        raise NotTried(message, _UNTIMELY_ATTEMPTS)
+        raise NotTried(f"It took {took_ms:.0f} ms to let the fault happen.")
     return at_ns
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -67,9 +67,7 @@ class _BoardWatcher(Watcher):
         levels = self._operator.levels()
         if lamp.pin is not None:
             return levels.duties.get(lamp.pin, 0.0) > 0.0
-        if lamp.output is None:
-            return None
-        settings = lamp.output.settings
+        settings = lamp.output.settings if lamp.output else {}
         channel = PwmChannel(*(settings[key] for key in ("bus", "address", "channel")))
         return channel in levels.channels and levels.channels[channel].us > 0.0
 
@@ -219,7 +217,10 @@ class Bench:
         return "" if has.get(need, True) else f"This robot has no {need}."
 
 
-_ATTEMPTS: Final = 3
+# A supervisor gives up after five restarts within a minute, which would count as a kept promise.
+_MOST_RESTARTS: Final = 4
+# A busy machine can make a robot restart, or pause while a fault is made.
+_ATTEMPTS: Final = 5
 # Retries of a trial in which the robot was not moving before the fault.
 _MORE_TRIES: Final = 2
 _COMMANDS: Final = 4
@@ -230,8 +231,6 @@ _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
 # Tolerance beyond the deadline of a command.
 _LATE_MS: Final = 20.0
-# A supervisor gives up after five restarts within a minute, which would count as a kept promise.
-_MOST_RESTARTS: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,16 +264,13 @@ def run_trial(bench: Bench, fault: Fault) -> TrialResult:
     A robot that cannot be driven, because a busy machine made it restart, is replaced first; so is
     one whose fault has an unknown time.
     """
-    attempt = 0
-    while True:
-        attempt += 1
-        try:
+    for _ in range(_ATTEMPTS - 1):
+        with suppress(NotTried):
             result = _try(bench, fault)
             break
-        except NotTried as error:
-            _replace(bench)
-            if attempt >= error.attempts:
-                raise
+        _replace(bench)
+    else:
+        result = _try(bench, fault)
     if fault.then == "starts afresh":
         bench.robot().await_restart()
         bench.restarts += 1
@@ -308,7 +304,7 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
                 _arm_for_program(robot)
             driver.await_commands(_COMMANDS)
         except ShapechangerError as error:
-            raise NotTried(str(error), _ATTEMPTS) from error
+            raise NotTried(str(error)) from error
         _await_drive(watcher)
         drove = watcher.moves() is not False
         if fault.then == "starts afresh":
@@ -441,15 +437,6 @@ def _moving(bench: Bench, fault: Fault) -> TrialResult:
 
 
 CheckLevel = Literal["wiring", "plain", "leds", "faults"]
-Part = Literal["wiring", "LEDs", "driving", "faults"]
-
-_PARTS: Final[dict[CheckLevel, tuple[Part, ...]]] = {
-    "wiring": ("wiring",),
-    "plain": ("wiring", "driving"),
-    "leds": ("wiring", "LEDs", "driving", "faults"),
-    "faults": ("faults",),
-}
-"""Parts of each level. Nothing moves in the first part; all others drive outputs."""
 
 
 def require_level(level: CheckLevel, bench: Bench) -> None:
@@ -463,8 +450,10 @@ def require_level(level: CheckLevel, bench: Bench) -> None:
 
 def check_robot(
     level: CheckLevel, bench: Bench, standing: StandingRobot, *, cap: float, trials: int = 1
-) -> Iterator[tuple[Part, Iterator[Finding]]]:
+) -> Iterator[tuple[str, Iterator[Finding]]]:
     """Yield each part of a level, and its findings, before its first question.
+
+    Nothing moves in the part "wiring"; all others drive outputs.
 
     Args:
         level: The level.
@@ -485,14 +474,15 @@ def check_robot(
             yield from check_driving(served, bench.profile, cap)
 
     faults = [fault for fault in FAULTS.values() if level == "faults" or fault.on_pins]
-    parts: dict[Part, Iterator[Finding]] = {
-        "wiring": examine(standing),
-        "LEDs": light_lamps(),
-        "driving": drive(),
-        "faults": (Finding(one.name, *fault_finding(bench, one, trials)) for one in faults),
-    }
-    for part in _PARTS[level]:
-        yield part, _leaving_at_rest(bench, parts[part])
+    tried = (Finding(one.name, *fault_finding(bench, one, trials)) for one in faults)
+    if level != "faults":
+        yield "wiring", _leaving_at_rest(bench, examine(standing))
+    if level == "leds":
+        yield "LEDs", _leaving_at_rest(bench, light_lamps())
+    if level in {"plain", "leds"}:
+        yield "driving", _leaving_at_rest(bench, drive())
+    if level in {"leds", "faults"}:
+        yield "faults", _leaving_at_rest(bench, tried)
 
 
 def _leaving_at_rest(bench: Bench, findings: Iterator[Finding]) -> Iterator[Finding]:

@@ -1,10 +1,11 @@
-"""Zeros and checks of joint encoders."""
+"""Zeros of joint encoders and tendon servos, and the checks of encoders."""
 
 from __future__ import annotations
 
 import socket
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,19 +13,19 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.setup.zeros import find_joint_zeros
+from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.check.held_pins import shipped
 from tests.robot.twin.in_process import LocalBoard
 
-_PROFILE = replace(shipped("finger"), camera=None)
-_PLAN = _PROFILE.guard_plan()
+_RIG = replace(shipped("finger"), camera=None)
+_CAR = replace(shipped("car"), camera=None)
 _ZEROS = [1234, 4095, 0, 2]
 
 
 class _Straight(DrivingWorld):
-    """Joints held straight by hand, with a tremor."""
+    """Joints held straight by hand, with a tremor; springs replace the finger."""
 
     def __init__(self, tremble: float = 0.0) -> None:
         super().__init__({"tendon"}, (160, 120), seed=0)
@@ -35,19 +36,22 @@ class _Straight(DrivingWorld):
         return self._tremble
 
 
-def _board(tremble: float = 0.0) -> LocalBoard:
-    """Encoders whose true zeros are `_ZEROS`."""
-    sensors = tuple(
-        replace(s, settings={**s.settings, "zeros": _ZEROS}) if s.driver == "as5600" else s
-        for s in _PLAN.sensors
-    )
-    return LocalBoard(TwinWiring(replace(_PLAN, sensors=sensors)), _Straight(tremble))
+def _board(tremble: float = 0.0, servo_zero: int = 0) -> LocalBoard:
+    """Encoders whose true zeros are `_ZEROS`, and servos with a true zero."""
+
+    def changed(one: Any, **settings: object) -> Any:
+        return replace(one, settings={**one.settings, **settings})
+
+    sensors = [changed(s, zeros=_ZEROS) if s.driver == "as5600" else s for s in _RIG.sensors]
+    outputs = [changed(output, zero=servo_zero) for output in _RIG.outputs]
+    plan = replace(_RIG.guard_plan(), sensors=tuple(sensors), outputs=tuple(outputs))
+    return LocalBoard(TwinWiring(plan), _Straight(tremble))
 
 
 @pytest.mark.parametrize("tremble", [0.0, 0.02])
 def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
     """Zeros are keyed by joint, and averaged correctly around count 0."""
-    zeros = find_joint_zeros(_PLAN, _board(tremble).hardware, lambda: None)
+    zeros = find_joint_zeros(_RIG, _board(tremble).hardware, lambda: None)
     names = ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"]
     assert zeros == {f"joints.{n}": zero for n, zero in zip(names, _ZEROS, strict=True)}
 
@@ -57,13 +61,33 @@ def test_a_missing_magnet_is_an_error() -> None:
     board = _board()
     board.pins.encoder("DIP_flexion").set_magnet("gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
-        find_joint_zeros(_PLAN, board.hardware, lambda: None)
-    car = shipped("car").guard_plan()
-    assert find_joint_zeros(car, board.hardware, lambda: None) == {}
+        find_joint_zeros(_RIG, board.hardware, lambda: None)
+    assert find_joint_zeros(_CAR, board.hardware, lambda: None) == {}
+
+
+def test_zeros_are_measured_with_taut_tendons() -> None:
+    """All servos are released afterwards."""
+    board = _board(servo_zero=5000)
+    zeros = find_zeros(_RIG, board.hardware, lambda: board.pass_ns(10_000_000))
+    # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
+    assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
+    assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
+    assert not any(servo.has_torque for servo in board.pins.require_rig().bus.servos.values())
+
+
+def test_a_loose_tendon_is_an_error() -> None:
+    """The error names the tendon, and all servos are released; a car has no tendons."""
+    board = _board()
+    board.pins.require_rig().break_servo("EIP", "snapped")
+    with pytest.raises(RobotError, match="EIP"):
+        find_zeros(_RIG, board.hardware, lambda: board.pass_ns(10_000_000))
+    assert not any(servo.has_torque for servo in board.pins.require_rig().bus.servos.values())
+    with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
+        find_zeros(_CAR, board.hardware, lambda: None)
 
 
 def _found(
-    root: Path, board: LocalBoard, port: int = 0, profile: Profile = _PROFILE
+    root: Path, board: LocalBoard, port: int = 0, profile: Profile = _RIG
 ) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     robot = StandingRobot(profile, port, root, hardware=lambda: board.hardware)
@@ -134,5 +158,4 @@ def test_the_bus_speed_is_checked(root: Path, config: str, expected: str) -> Non
     """The check applies only to robots with encoders."""
     (root / "boot/config.txt").write_text(config)
     assert _found(root, _board())["I2C speed"][0].startswith(expected)
-    car = replace(shipped("car"), camera=None)
-    assert "I2C speed" not in _found(root, _board(), profile=car)
+    assert "I2C speed" not in _found(root, _board(), profile=_CAR)
