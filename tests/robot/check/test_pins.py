@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from gpiozero.pins.mock import MockConnectedPin
+from gpiozero.pins.mock import MockConnectedPin, MockPin
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
@@ -36,7 +36,8 @@ def pins() -> Iterator[HeldPins]:
     made.factory.close()
 
 
-def test_only_joined_pins_pass(pins: HeldPins, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_joined_pins_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    pins = HeldPins(MockPin)
     monkeypatch.setattr("shapechanger.robot.check.pins.Hardware", lambda: pins)
     joined = pins.factory.pin(21, pin_class=MockConnectedPin)
     joined.input_pin = pins.factory.pin(20)

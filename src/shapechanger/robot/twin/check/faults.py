@@ -22,7 +22,8 @@ from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.link.messages import Role
 from shapechanger.robot.twin.check.driver import FAILURES, Driver
-from shapechanger.robot.twin.robot import Operator, RunningRobot
+from shapechanger.robot.twin.operator import Operator
+from shapechanger.robot.twin.robot import RunningRobot
 
 _POLL_S: Final = 0.001
 _MOST_BYTES: Final = 65536

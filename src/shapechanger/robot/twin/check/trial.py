@@ -25,7 +25,8 @@ from shapechanger.robot.twin.check.driving import check_driving
 from shapechanger.robot.twin.check.faults import FAULTS, BadNetwork, Fault, NotTried, Scene
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.judge import Interval, propelled, time_to_rest, unauthorised
-from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
+from shapechanger.robot.twin.operator import Operator
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import BoardAt, start_board
 from shapechanger.robot.twin.wiring import TwinWiring
@@ -377,11 +378,11 @@ def _judged(
     """Judge a trial on a twin by its ledger."""
     profile, ledger = bench.profile, read_ledger(bench.board().ledger_path)
     if fault.needs in {"camera", "bumper", "button"}:
-        # It begins with its line of the ledger. Until then the request waits for this process and
-        # the board, neither of which is part of a robot.
+        # It begins with its line of the ledger, which of a switch is its edge. Until then the
+        # request waits for this process and the board, neither of which is part of a robot.
         switches = [one.settings["pins"] for one in profile.sensors if one.driver == "switch"]
         pins = [profile.stop_pin, *(pin for pins in switches for pin in pins)]
-        begins = {("fault", None), *(("input", pin) for pin in pins)}
+        begins = {("fault", None)} if fault.needs == "camera" else {("input", pin) for pin in pins}
         made = (one.t for one in ledger if one.t >= at_ns and (one.kind, one.pin) in begins)
         at_ns = next(made, at_ns)
     # A fault of the guard itself has its own promised time.
