@@ -78,18 +78,21 @@ def require_file(path: Path) -> None:
     make_folder(path.parent)
 
 
-def write_atomic(path: Path, content: bytes) -> None:
+def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
     """Write a file completely and flush it to disk, or leave the old one in place.
 
     Args:
-        path: The file; an existing one keeps its permissions.
+        path: The file.
         content: Its new content.
+        mode: Its permissions from the start; None for those of the old one.
 
     Raises:
         OutputError: If it cannot be written, for instance because the disk is full.
     """
     with translate_errors(OSError, to=lambda error: cannot_write(path, error)):
-        _write(path, content, path.stat().st_mode & 0o7777 if path.exists() else None)
+        if mode is None and path.exists():
+            mode = path.stat().st_mode & 0o7777
+        _write(path, content, mode)
 
 
 def write_new(path: Path, content: bytes, mode: int | None = None) -> None:

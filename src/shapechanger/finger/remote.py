@@ -25,7 +25,8 @@ from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
-from shapechanger.robot.client.env import KNOWN_ROBOT, RemoteVehicleEnv
+from shapechanger.robot.client.env import RemoteVehicleEnv
+from shapechanger.robot.client.known_robots import KNOWN_ROBOT
 from shapechanger.robot.link.messages import Pace
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot

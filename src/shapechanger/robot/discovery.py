@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import logging
 import socket
@@ -64,16 +65,12 @@ def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
     def changed(name: str, state_change: ServiceStateChange, **_: Any) -> None:
         (names.discard if state_change is ServiceStateChange.Removed else names.add)(name)
 
-    own = zeroconf or Zeroconf()
-    try:
+    with contextlib.ExitStack() as stack:
+        own = zeroconf or stack.enter_context(Zeroconf())
         browser = ServiceBrowser(own, SERVICE, handlers=[changed])
         threading.Event().wait(timeout_s)
         browser.cancel()  # It waits for the browser's thread.
-        found = [_resolved(own, name, timeout_s) for name in names]
-    finally:
-        if zeroconf is None:
-            own.close()
-    robots = [robot for robot in found if robot is not None]
+        robots = [robot for name in names if (robot := _resolved(own, name, timeout_s))]
     return sorted(robots, key=lambda robot: (robot.name, str(robot.address)))
 
 

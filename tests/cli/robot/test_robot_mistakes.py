@@ -175,7 +175,7 @@ def test_help(run: Run, command: str) -> None:
         ("stop nobody", "No known robot matches 'nobody'"),
         ("forget nobody", "No known robot matches 'nobody'"),
         ("remember one 127.0.0.1 --fingerprint zz", "64 hexadecimal digits"),
-        ("remember one 127.0.0.1:99999 --fingerprint insecure", "must be a port"),
+        ("remember one 127.0.0.1:99999 --fingerprint insecure", "a port from 1 to 65535"),
         ("remember ../one 127.0.0.1 --fingerprint insecure", "robot's name has up to 64"),
         ("find --seconds 0", "more than 0 s"),
     ],

@@ -41,6 +41,18 @@ STATE = (
 )
 
 
+def observation(**fields: Any) -> m.Observation:
+    """Return an observation in which all other fields are empty."""
+    empty: dict[str, Any] = {
+        name: 0 for name in m.Observation.__struct_fields__ if name.endswith(("seq", "_ns"))
+    }
+    empty |= dict.fromkeys(("state", "action_applied", "commanded", "suggested"), ())
+    empty |= dict.fromkeys(("stop_reason", "holder", "holder_role", "suggested_by"), "")
+    empty |= dict.fromkeys(("armed", "emergency", "mine"), False)
+    empty |= dict.fromkeys(("applied_seq", "applied_ns", "command_ns", "frame"))
+    return m.Observation(**{**empty, "sources": {}, "emergencies": 0, **fields})
+
+
 def eventually(is_true: Callable[[], bool], within_s: float = 5.0) -> None:
     """Wait for a condition."""
     until = time.monotonic() + within_s

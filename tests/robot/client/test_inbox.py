@@ -9,30 +9,12 @@ import pytest
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation
 from shapechanger.robot.client.connection import Inbox
 from shapechanger.robot.link.messages import Observation
+from tests.robot.client.robot import observation
 
 
 def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observation:
-    """Build an observation with a number and a frame."""
-    return Observation(
-        seq=seq,
-        captured_ns=0,
-        state_ns=0,
-        sent_ns=0,
-        frame=frame,
-        frame_seq=frame_seq,
-        state=(),
-        sources={},
-        action_applied=(),
-        applied_seq=None,
-        applied_ns=None,
-        command_ns=None,
-        stop_reason="",
-        armed=False,
-        emergency=False,
-        emergencies=0,
-        holder="",
-        mine=False,
-    )
+    """Return an observation with a number and a frame."""
+    return observation(seq=seq, frame_seq=frame_seq, frame=frame)
 
 
 def test_the_inbox_holds_only_the_newest_observation() -> None:

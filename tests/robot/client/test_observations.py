@@ -12,8 +12,8 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client import observations
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.observations import RobotSpaces, resize_picture
-from shapechanger.robot.link.messages import Observation, Welcome
-from tests.robot.client.robot import picture
+from shapechanger.robot.link.messages import Welcome
+from tests.robot.client.robot import observation, picture
 
 sides = st.integers(1, 12)
 
@@ -72,26 +72,7 @@ def spaces() -> RobotSpaces:
 
 def seen(frame_seq: int, jpeg: bytes | None) -> Received:
     """Return an observation with a frame."""
-    message = Observation(
-        seq=frame_seq,
-        captured_ns=0,
-        state_ns=0,
-        sent_ns=0,
-        frame=jpeg,
-        frame_seq=frame_seq,
-        state=(),
-        sources={},
-        action_applied=(),
-        applied_seq=None,
-        applied_ns=None,
-        command_ns=None,
-        stop_reason="",
-        armed=False,
-        emergency=False,
-        emergencies=0,
-        holder="",
-        mine=False,
-    )
+    message = observation(seq=frame_seq, frame_seq=frame_seq, frame=jpeg)
     return Received(message, 0.0, jpeg)
 
 

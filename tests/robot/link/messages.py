@@ -1,175 +1,51 @@
-"""Hypothesis strategies for every message of the link."""
+"""Hypothesis strategies for every message of the link, made from the types of its fields."""
 
 from __future__ import annotations
 
+from typing import Any
+
 from hypothesis import strategies as st
+from msgspec import inspect
 
-from shapechanger.robot.link.messages import (
-    Acknowledge,
-    Arm,
-    Browse,
-    Challenge,
-    ClientMessage,
-    Command,
-    Disarm,
-    EmergencyStop,
-    EpisodeSummary,
-    Event,
-    Fetch,
-    Hello,
-    Judge,
-    Lease,
-    Mark,
-    Observation,
-    Piece,
-    Ping,
-    PolicyState,
-    Pong,
-    Record,
-    RecorderState,
-    Recordings,
-    Refused,
-    Release,
-    RobotMessage,
-    RunPolicy,
-    Suggest,
-    Take,
-    Undo,
-    Welcome,
-)
+from shapechanger.robot.link.messages import ClientMessage, RobotMessage
 
-_texts = st.text(max_size=40)
-_counts = st.integers(0, 2**53)
-_times = st.integers(-(2**63), 2**63 - 1)
-_numbers = st.floats(allow_nan=False)
-_rates = st.floats(0.0, 100_000.0, exclude_min=True)
-_vectors = st.lists(_numbers, max_size=8).map(tuple)
-_episodes = st.from_regex(r"^[0-9A-Za-z][0-9A-Za-z._-]{0,30}\Z")
-_summaries = st.builds(
-    EpisodeSummary,
-    id=_episodes,
-    steps=_counts,
-    kept=_counts,
-    seconds=_numbers,
-    closed=st.booleans(),
-    created=_texts,
-    driver=_texts,
-    outcome=_texts,
-)
+
+def strategy(kind: inspect.Type) -> st.SearchStrategy[Any]:
+    """Return a strategy for the values of a type."""
+    match kind:
+        case inspect.StructType(cls=cls, fields=fields):
+            return st.builds(cls, **{field.name: strategy(field.type) for field in fields})
+        case inspect.UnionType(types=types):
+            return st.one_of(map(strategy, types))
+        case inspect.IntType(ge=least, le=most):
+            least = -(2**63) if least is None else least
+            return st.integers(least, 2**63 - 1 if most is None else most)
+        case inspect.FloatType(ge=least, gt=above, le=most):
+            low = above if least is None else least
+            return st.floats(low, most, exclude_min=above is not None, allow_nan=False)
+        case inspect.StrType(pattern=str(pattern)):
+            return st.from_regex(pattern).filter(lambda text: len(text) <= 40)
+        case inspect.StrType(min_length=least):
+            return st.text(min_size=least or 0, max_size=40)
+        case inspect.BytesType():
+            return st.binary(max_size=64)
+        case inspect.VarTupleType(item_type=item):
+            return st.lists(strategy(item), max_size=4).map(tuple)
+        case inspect.TupleType(item_types=items):
+            return st.tuples(*map(strategy, items))
+        case inspect.DictType(key_type=key, value_type=value):
+            return st.dictionaries(strategy(key), strategy(value), max_size=4)
+        case inspect.LiteralType(values=values):
+            return st.sampled_from(values)
+        case inspect.BoolType():
+            return st.booleans()
+        case _:
+            return st.none()
+
 
 client_messages: st.SearchStrategy[ClientMessage] = st.one_of(
-    st.builds(
-        Hello,
-        version=_times,
-        proof=st.binary(max_size=64),
-        name=_texts,
-        role=st.sampled_from(("person", "program")),
-        pace=st.sampled_from(("realtime", "lockstep")),
-        frames=st.booleans(),
-    ),
-    st.builds(
-        Command,
-        seq=_counts,
-        answers=_counts,
-        values=_vectors,
-        ttl_ms=st.integers(1, 60_000),
-        scale=st.floats(0.0, 1.0),
-    ),
-    st.builds(Acknowledge, seq=_counts),
-    st.builds(Take),
-    st.builds(Release),
-    st.builds(Arm, answers=_counts, emergency=_counts),
-    st.builds(Disarm),
-    st.builds(EmergencyStop, reason=_texts),
-    st.builds(Ping, token=_counts),
-    st.builds(Suggest, seq=_counts, answers=_counts, values=_vectors),
-    st.builds(Record, on=st.booleans(), name=_texts),
-    st.builds(Mark, text=_texts),
-    st.builds(Undo, seconds=st.floats(0.0, 3_600.0, exclude_min=True)),
-    st.builds(Browse, before=st.just("") | _episodes),
-    st.builds(Fetch, episode=_episodes, first=_counts, count=st.integers(1, 100_000)),
-    st.builds(Judge, episode=_episodes, first=_counts, last=_counts, keep=st.booleans()),
-    st.builds(RunPolicy, policy=_texts),
+    strategy(inspect.type_info(kind)) for kind in ClientMessage.__subclasses__()
 )
-
 robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
-    st.builds(Challenge, version=_counts, nonce=st.binary(max_size=64), robot=_texts),
-    st.builds(
-        Welcome,
-        robot=st.text(min_size=1, max_size=40),
-        body=_texts,
-        action_layout=_texts,
-        state_layout=_texts,
-        image_size=st.none() | st.tuples(_counts, _counts),
-        control_hz=_rates,
-        tick_hz=_rates,
-        slew_per_s=_vectors,
-        slew_down_per_s=_vectors,
-        deadline_ms=st.integers(1, 2**53),
-        max_observation_age_ms=st.integers(1, 2**53),
-        reward=st.dictionaries(_texts, _numbers, max_size=4),
-        reset=st.lists(st.tuples(_vectors, _numbers), max_size=3).map(tuple),
-        arming=st.sampled_from(("person", "anyone")),
-        clock=st.sampled_from(("real", "twin")),
-        session=_counts,
-        can_record=st.booleans(),
-        camera_pitch_deg=st.none() | _numbers,
-        camera_fovy_deg=st.none() | _numbers,
-        turning=st.none() | st.tuples(_numbers, _numbers),
-    ),
-    st.builds(Refused, reason=_texts, seq=st.none() | _counts, fatal=st.booleans()),
-    st.builds(
-        Observation,
-        seq=_counts,
-        captured_ns=_times,
-        state_ns=_times,
-        sent_ns=_times,
-        frame=st.none() | st.binary(max_size=200),
-        frame_seq=_counts,
-        state=_vectors,
-        sources=st.dictionaries(_texts, _texts, max_size=4),
-        action_applied=_vectors,
-        applied_seq=st.none() | _counts,
-        applied_ns=st.none() | _times,
-        command_ns=st.none() | _times,
-        stop_reason=_texts,
-        armed=st.booleans(),
-        emergency=st.booleans(),
-        emergencies=_counts,
-        holder=_texts,
-        mine=st.booleans(),
-        holder_role=st.sampled_from(("", "person", "program")),
-        commanded=_vectors,
-        suggested=_vectors,
-        suggested_by=_texts,
-    ),
-    st.builds(
-        RecorderState,
-        episode=st.just("") | _episodes,
-        recording=st.booleans(),
-        steps=_counts,
-        dropped=_counts,
-        seconds=_numbers,
-        marks=_counts,
-        text=_texts,
-    ),
-    st.builds(
-        PolicyState,
-        names=st.lists(_texts, max_size=3).map(tuple),
-        running=_texts,
-        text=_texts,
-    ),
-    st.builds(Recordings, episodes=st.lists(_summaries, max_size=3).map(tuple), more=st.booleans()),
-    st.builds(
-        Piece,
-        episode=_episodes,
-        first=_counts,
-        total=_counts,
-        lines=st.lists(_texts, max_size=3).map(tuple),
-        frames=st.lists(st.none() | st.binary(max_size=99), max_size=3).map(tuple),
-        header=_texts,
-    ),
-    st.builds(Lease, mine=st.booleans(), holder=_texts, reason=_texts),
-    st.builds(Event, name=_texts, text=_texts, at_ns=_times),
-    st.builds(Pong, token=_counts, now_ns=_times),
+    strategy(inspect.type_info(kind)) for kind in RobotMessage.__subclasses__()
 )

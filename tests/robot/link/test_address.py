@@ -29,32 +29,17 @@ def test_addresses_are_parsed(text: str, address: Address) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text",
     [
-        ("", "is empty"),
-        ("car local", "not a valid address"),
-        ("https://car.local", "not a valid address"),
-        ("user@car", "not a valid address"),
-        ("-car", "not a valid address"),
-        ("300.1.1.1", "not a valid address"),
-        ("1.2.3", "not a valid address"),
-        ("car:", "must be a port"),
-        ("car:0", "must be a port"),
-        ("car:65536", "must be a port"),
-        ("car:000080", "must be a port"),
-        ("car:٣", "must be a port"),
-        ("car:12:13", "must be a port"),
-        ("[::1", "brackets"),
-        ("[car]:5000", "brackets"),
-        ("[::1]5000", "brackets"),
-        ("[::1]:", "must be a port"),
-        ("x" * 64, "not a valid address"),
+        *("", "car local", "https://car.local", "user@car", "-car", "x" * 64, "a." * 127),
+        *("300.1.1.1", "1.2.3", "[::1", "[car]:5000", "[::1]5000", "::1]", "[]:80"),
+        *("car:", "car:0", "car:65536", "car:000080", "car:٣", "car:12:13", "[::1]:"),
     ],
 )
-def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> None:
-    with pytest.raises(LinkError, match=words) as refused:
+def test_an_invalid_address_is_an_error_with_examples(text: str) -> None:
+    with pytest.raises(LinkError, match=r"not a valid address.*192\.168\.42\.1:5000") as refused:
         parse_address(text)
-    assert "192.168.42.1:5000" in str(refused.value)
+    assert repr(text) in str(refused.value)
 
 
 @given(text=st.text(max_size=30))

@@ -26,20 +26,10 @@ from tests.robot.link.messages import client_messages, robot_messages
 DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
 
 
-@given(message=client_messages)
-def test_client_messages_round_trip(message: ClientMessage) -> None:
-    assert decode_client_message(encode(message)) == message
-
-
-@given(message=robot_messages)
-def test_robot_messages_round_trip(message: RobotMessage) -> None:
-    assert decode_robot_message(encode(message)) == message
-
-
-def test_every_message_has_a_strategy() -> None:
-    for base, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
-        tried = {kind.__name__ for kind in base.__subclasses__()}
-        assert all(f"{name}" in repr(strategy) for name in tried)
+@given(asked=client_messages, answer=robot_messages)
+def test_messages_round_trip(asked: ClientMessage, answer: RobotMessage) -> None:
+    assert decode_client_message(encode(asked)) == asked
+    assert decode_robot_message(encode(answer)) == answer
 
 
 @pytest.mark.parametrize("side", DECODERS)

@@ -57,11 +57,6 @@ class RobotClient(Inbox):
     All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
     the robot refuses.
 
-    Args:
-        robot: The robot.
-        hello: The client's first message, without a proof.
-        timeout_s: Time limit of the handshake, and of silence before the link is lost, s.
-
     Attributes:
         welcome: Description of the robot.
         pace: Whether the clocks or the client set the pace.

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.drive import DriveReward
 from shapechanger.errors import LinkError, RenderError, RobotRefused, StaleObservation, UnknownName
-from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received
-from shapechanger.robot.client.known_robots import KnownRobot, known_names, recall
+from shapechanger.robot.client.known_robots import known_names, recall
 from shapechanger.robot.client.observations import RobotSpaces, StepMeter, View
 from shapechanger.robot.client.operator import Preparation, Takeover, interruption
 from shapechanger.robot.link.messages import Observation, Pace, Role, Welcome
@@ -29,10 +28,6 @@ OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], obje
 LATE: Final = 0.5
 """Delay of a step up to which its deadline is met, as a share of the control period."""
 
-KNOWN_ROBOT: Final = "known robot"
-"""Kind of the name of a robot, in errors."""
-
-_SERVE_A_TWIN: Final = "`shapechanger robot serve PROFILE --twin` serves a twin and makes it known."
 _WAYS_TO_RESET: Final = ("operator", "person", "routine")
 _LOCKSTEP_S: Final = 10.0  # Time limit of a step in lockstep, where a robot waits for the env.
 _NS_PER_S: Final = 1e9
@@ -103,6 +98,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         name: Display name of the client.
         render_mode: "rgb_array" makes `render` return the newest frame at the camera's size.
 
+    Attributes:
+        action_layout: Layout of an action.
+        observation_layout: Layout of an observation; a picture is the one block `camera/image`.
+        record_clock: Source of the times in `info`, "real" or "twin".
+
     Raises:
         UnknownName: If a robot, a weight or a way to reset is unknown.
         LinkError: If the robot cannot be reached, or is not trusted.
@@ -136,10 +136,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
         if not callable(on_reset) and on_reset not in _WAYS_TO_RESET:
             raise UnknownName("way to reset", on_reset, _WAYS_TO_RESET)
-        self._robot = _resolve(robot)
+        is_address = "." in robot or ":" in robot or robot == "localhost"
+        self._known_as = "" if is_address and robot not in known_names() else robot
         self._open = partial(
             RobotClient.connect,
-            self._robot,
+            recall(robot) if self._known_as else robot,
             key=key,
             fingerprint=fingerprint,
             role=role,
@@ -171,6 +172,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             opened.pop_all()
         self.observation_space = self._spaces.observation_space
         self.action_space = self._spaces.action_space
+        self.observation_layout = self._spaces.observation_layout
+        self.action_layout = self._spaces.action_layout
+        self.record_clock = welcome.clock
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
         self._patience_s = max_observation_age_s or welcome.max_observation_age_ms / 1e3
         if pace == "lockstep":
@@ -190,21 +194,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         """JPEG of the newest observation's frame, as the robot sent it; None without one."""
         return None if self._last is None or not self._spaces.has_image else self._last.jpeg
 
-    @property
-    def record_clock(self) -> Literal["real", "twin"]:
-        """Source of the times in `info`."""
-        return self.welcome.clock
-
-    @property
-    def action_layout(self) -> Layout:
-        """Layout of an action."""
-        return self._spaces.action_layout
-
-    @property
-    def observation_layout(self) -> Layout:
-        """Layout of an observation; a picture is the one block `camera/image`."""
-        return self._spaces.observation_layout
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -219,8 +208,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             LinkError: If the robot cannot be reached in time.
         """
         super().reset(seed=seed)
-        known_as = self._robot.name if isinstance(self._robot, KnownRobot) else ""
-        ready = Preparation(self._reset_timeout_s, self._on_waiting, known_as)
+        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._known_as)
         if not self._client.alive:
             self._client = ready.connect(self._connect)
             self._spaces.reconnect()
@@ -458,12 +446,3 @@ def latencies(
     if seen.command_ns is not None and seen.applied_ns is not None:
         known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
     return known
-
-
-def _resolve(robot: str) -> KnownRobot | str:
-    """Return the known robot of this name, or the address."""
-    if robot in known_names():
-        return recall(robot)
-    if "." in robot or ":" in robot or robot == "localhost":
-        return robot
-    raise UnknownName(KNOWN_ROBOT, robot, known_names(), _SERVE_A_TWIN)

@@ -8,6 +8,7 @@ person who compares the fingerprints can.
 
 from __future__ import annotations
 
+import contextlib
 import html
 import json
 import os
@@ -22,7 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from shapechanger.errors import LinkError, OutputError, UnknownName
+from shapechanger.errors import LinkError, UnknownName, translate_errors
+from shapechanger.files import cannot_write, read_text, write_atomic
 from shapechanger.robot.link.address import Address, parse_address
 from shapechanger.robot.link.authentication import (
     fingerprint_hex,
@@ -32,12 +34,16 @@ from shapechanger.robot.link.authentication import (
     parse_key,
 )
 
+KNOWN_ROBOT: Final = "known robot"
+"""Kind of the name of a robot, in errors."""
+
 INSECURE: Final = "insecure"
 """Instead of a fingerprint: no encryption, and no proof of the robot's identity."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _FIELDS: Final = ("address", "key", "fingerprint")
-_OTHERS: Final = 0o077
+_OPENED_WITHIN_S: Final = 10.0
+_LOOK_EVERY_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,24 +110,14 @@ def remember(robot: KnownRobot) -> Path:
     Raises:
         OutputError: If it cannot be written; an existing file is unchanged.
     """
-    folder = known_folder()
+    path = known_folder() / f"{robot.name}.toml"
     # JSON strings are TOML strings, but for one character, which no field contains.
     lines = [
         f"{field} = {json.dumps(getattr(robot, field), ensure_ascii=False)}\n" for field in _FIELDS
     ]
-    path = folder / f"{robot.name}.toml"
-    written: Path | None = None
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        # Only the user can read a temporary file.
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=folder, delete=False) as file:
-            written = Path(file.name)
-            file.writelines(lines)
-        written.replace(path)
-    except OSError as error:
-        if written is not None:
-            written.unlink(missing_ok=True)
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from None
+    with translate_errors(OSError, to=lambda error: cannot_write(path, error)):
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    write_atomic(path, "".join(lines).encode(), mode=0o600)
     return path
 
 
@@ -133,12 +129,10 @@ def recall(name: str) -> KnownRobot:
         LinkError: If its file is invalid, or other users can read it.
     """
     path = _file(name)
-    if os.name == "posix" and path.stat().st_mode & _OTHERS:
+    if os.name == "posix" and path.stat().st_mode & 0o077:
         raise LinkError(f"Other users can read the key in {path}: run `chmod 600 {path}`.")
-    try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise LinkError(f"Cannot read {path}: {error}.") from None
+    with translate_errors(ValueError, to=lambda error: LinkError(f"Cannot read {path}: {error}.")):
+        fields = tomllib.loads(read_text(path))
     if set(fields) != set(_FIELDS) or not all(isinstance(v, str) for v in fields.values()):
         raise LinkError(f"{path} must have the strings {', '.join(_FIELDS)}.")
     return KnownRobot(name, **fields)
@@ -172,10 +166,11 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
     Raises:
         LinkError: If no server shows a certificate.
     """
-    try:
+    with translate_errors(
+        OSError,
+        to=lambda error: LinkError(f"No server shows a certificate at {address}: {error}."),
+    ):
         shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
-    except OSError as error:
-        raise LinkError(f"No server shows a certificate at {address}: {error}.") from None
     fingerprint = fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
     digits = fingerprint_hex(fingerprint)
     return LinkError(
@@ -189,24 +184,19 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
 def _file(name: str) -> Path:
     names = known_names()
     if name not in names:
-        raise UnknownName("known robot", name, names)
+        serve = "`shapechanger robot serve PROFILE --twin` serves a twin and makes it known."
+        raise UnknownName(KNOWN_ROBOT, name, names, serve)
     return known_folder() / f"{name}.toml"
-
-
-_SCREENS: Final = ("DISPLAY", "WAYLAND_DISPLAY")
-_OPENED_WITHIN_S: Final = 10.0
-_LOOK_EVERY_S: Final = 0.1
 
 
 def can_open() -> bool:
     """Return whether there is a display and a browser."""
-    if sys.platform != "darwin" and not any(os.environ.get(name) for name in _SCREENS):
+    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform != "darwin" and not screen:
         return False
-    try:
-        webbrowser.get()
-    except webbrowser.Error:
-        return False
-    return True
+    with contextlib.suppress(webbrowser.Error):
+        return bool(webbrowser.get())
+    return False
 
 
 def console_address(robot: KnownRobot) -> str:
@@ -220,21 +210,22 @@ def open_console(robot: KnownRobot) -> str:
 
     The key is in the fragment of the address, which browsers do not send, and passes through a file
     that only its owner can read, because command lines are visible to all users. The file is
-    deleted once the browser has read it, or after some seconds.
+    deleted once the browser has read it, or after 10 s.
 
     Returns:
         The address without the key.
     """
     address = console_address(robot)
     there = html.escape(f"{address}#key={robot.key}", quote=True)
-    fd, name = tempfile.mkstemp(prefix="shapechanger-console-", suffix=".html")
-    with os.fdopen(fd, "w", encoding="utf-8") as file:
+    with tempfile.NamedTemporaryFile(
+        "w", encoding="utf-8", prefix="shapechanger-console-", suffix=".html"
+    ) as file:
         file.write(
             f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;'
             f'url={there}"><title>{html.escape(robot.name)}</title><a href="{there}">Console</a>'
         )
-    page = Path(name)
-    try:
+        file.flush()
+        page = Path(file.name)
         if not webbrowser.open(page.as_uri()):
             raise LinkError(
                 f"No browser opens here: open {address} in one, or drive with --terminal."
@@ -243,6 +234,4 @@ def open_console(robot: KnownRobot) -> str:
         written_ns, until_s = page.stat().st_atime_ns, time.monotonic() + _OPENED_WITHIN_S
         while page.stat().st_atime_ns == written_ns and time.monotonic() < until_s:
             time.sleep(_LOOK_EVERY_S)
-    finally:
-        page.unlink(missing_ok=True)
     return address

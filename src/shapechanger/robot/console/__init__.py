@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 
 ENTRY: Final = "index.html"
 """Name of the page."""
@@ -26,14 +26,13 @@ def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
     Raises:
         RobotError: If they cannot be read, as after a failed installation.
     """
-    try:
+    failed = f"Cannot read the console in {folder}"
+    with translate_errors(OSError, to=lambda error: RobotError(f"{failed}: {error}.")):
         files = {
             path.name: (_KINDS[path.suffix], path.read_bytes())
             for path in sorted(folder.iterdir())
             if path.suffix in _KINDS
         }
-    except OSError as error:
-        raise RobotError(f"Cannot read the console in {folder}: {error}.") from error
     if ENTRY not in files:
         raise RobotError(f"{folder} has no {ENTRY}: install shapechanger again.")
     return files

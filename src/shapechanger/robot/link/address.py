@@ -16,9 +16,9 @@ SERVICE: Final = "_shapechanger._tcp.local."
 """DNS-SD service type of robots."""
 
 _LABEL: Final = r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)"
-_HOST_NAME: Final = re.compile(rf"{_LABEL}(\.{_LABEL})*\.?")
-_LONGEST_NAME: Final = 253  # RFC 1035.
-_EXAMPLES: Final = "Examples: car.local, 192.168.42.1:5000, [fe80::1]:5000."
+# Numbers and dots are an IPv4 address; names have at most 253 characters (RFC 1035).
+_HOST_NAME: Final = re.compile(rf"(?=.{{1,253}}\Z)(?![0-9.]+\Z){_LABEL}(\.{_LABEL})*\.?")
+_PARTS: Final = re.compile(r"(?:\[([^\]]*)\]|([^:\[\]]*))(?::([0-9]{1,5}))?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,21 +45,18 @@ def parse_address(text: str) -> Address:
         LinkError: If the text has none of these forms.
     """
     text = text.strip()
-    if not text:
-        raise LinkError(f"The address is empty. {_EXAMPLES}")
-    if "/" in text or "@" in text:
-        raise LinkError(f"{text!r} is not a valid address. {_EXAMPLES}")
-    if text.startswith("["):
-        host, closed, rest = text[1:].partition("]")
-        if not closed or not _is_ip(host, 6) or (rest and not rest.startswith(":")):
-            raise LinkError(f"{text!r} is not an IPv6 address in brackets. {_EXAMPLES}")
-        return Address(host, _port(rest[1:], text) if rest else DEFAULT_PORT)
     if _is_ip(text, 6):
         return Address(text)
-    host, colon, port = text.partition(":")
-    if len(host) > _LONGEST_NAME or not _HOST_NAME.fullmatch(host) or _is_broken_ip(host):
-        raise LinkError(f"{text!r} is not a valid address. {_EXAMPLES}")
-    return Address(host, _port(port, text) if colon else DEFAULT_PORT)
+    if parts := _PARTS.fullmatch(text):
+        bracketed, host, port = parts[1] or "", parts[2] or "", int(parts[3] or DEFAULT_PORT)
+        named = _is_ip(host, 4) or _HOST_NAME.fullmatch(host)
+        if (_is_ip(bracketed, 6) or named) and 1 <= port <= 65535:
+            return Address(bracketed or host, port)
+    raise LinkError(
+        f"{text!r} is not a valid address, which is HOST or HOST:PORT, with an IPv6 address in "
+        "brackets and a port from 1 to 65535. Examples: car.local, 192.168.42.1:5000, "
+        "[fe80::1]:5000."
+    )
 
 
 def is_loopback(host: str) -> bool:
@@ -71,18 +68,7 @@ def is_loopback(host: str) -> bool:
 
 
 def _is_ip(text: str, version: int) -> bool:
-    try:
-        return ipaddress.ip_address(text).version == version
+    try:  # Python takes any text as the zone after a "%".
+        return ipaddress.ip_address(text).version == version and not {"/", "@"} & set(text)
     except ValueError:
         return False
-
-
-def _is_broken_ip(host: str) -> bool:
-    """Return True for numbers and dots that do not form an IPv4 address."""
-    return bool(re.fullmatch(r"[0-9.]+", host)) and not _is_ip(host, 4)
-
-
-def _port(text: str, whole: str) -> int:
-    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:6]) <= 65535 and len(text) < 6):
-        raise LinkError(f"{text!r} in {whole!r} must be a port from 1 to 65535. {_EXAMPLES}")
-    return int(text)

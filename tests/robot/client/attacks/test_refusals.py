@@ -6,12 +6,13 @@ import math
 import os
 import ssl
 from collections.abc import Callable
+from typing import Any, Final
 
 import msgspec.msgpack
 import pytest
 
 from tests.robot.client.attacks.scene import FULL, Scene, settle
-from tests.robot.client.attacks.stranger import BINARY, PING, TEXT, frame, header, proof
+from tests.robot.client.attacks.stranger import BINARY, PING, TEXT, Stranger, frame, header, proof
 
 pytestmark = [pytest.mark.system, pytest.mark.realtime]
 
@@ -29,49 +30,47 @@ def refused(words: str) -> Callable[[Attack], Attack]:
     return register
 
 
+def passed_on(
+    scene: Scene,
+    made_as: str,
+    said: str = "person",
+    certificate: bytes | None = None,
+    size: int = 32,
+) -> Stranger:
+    """Say hello with a proof that an honest client has made, for its role and certificate."""
+    stranger = scene.stranger()
+    seen = stranger.certificate if certificate is None else certificate
+    made = proof(scene.key, stranger.challenge(), seen, made_as)[:size]
+    stranger.send("hello", version=1, proof=made, role=said)
+    return stranger
+
+
 # Without the key.
 
-
-@refused("Wrong key")
-def no_proof(scene: Scene) -> str:
-    """Leave the proof empty."""
-    return scene.knock(proof=b"")
-
-
-@refused("Wrong key")
-def wrong_key(scene: Scene) -> str:
-    """Prove another key."""
-    return scene.knock()
-
-
-@refused("Wrong key")
-def truncated_proof(scene: Scene) -> str:
-    """Send the first half of a right proof."""
-    stranger = scene.stranger()
-    known = proof(scene.key, stranger.challenge(), stranger.certificate, "program")
-    stranger.send("hello", version=1, proof=known[:16], role="program")
-    return stranger.refusal()
-
-
-@refused("Not a valid message")
-def long_proof(scene: Scene) -> str:
-    """Send more bytes than a proof may have."""
-    return scene.knock(proof=bytes(65))
-
-
-@refused("Wrong key")
-def role_swap(scene: Scene) -> str:
-    """Change the role of an honest program's hello on the way."""
-    stranger = scene.stranger()
-    known = proof(scene.key, stranger.challenge(), stranger.certificate, "program")
-    stranger.send("hello", version=1, proof=known, role="person")
-    return stranger.refusal()
-
-
-@refused("Not a valid message")
-def unknown_role(scene: Scene) -> str:
-    """Claim a role that does not exist."""
-    return scene.knock(scene.key, "root")
+ATTACKS |= {
+    "no_proof": (lambda scene: scene.knock(proof=b""), "Wrong key"),
+    "wrong_key": (lambda scene: scene.knock(), "Wrong key"),
+    "long_proof": (lambda scene: scene.knock(proof=bytes(65)), "Not a valid message"),
+    "unknown_role": (lambda scene: scene.knock(scene.key, "root"), "Not a valid message"),
+    "other_version": (lambda scene: scene.knock(scene.key, version=0), "version"),
+    "version_of_another_type": (
+        lambda scene: scene.knock(scene.key, version=[1]),
+        "Not a valid message",
+    ),
+    "truncated_proof": (
+        lambda scene: passed_on(scene, "program", "program", size=16).refusal(),
+        "Wrong key",
+    ),
+    "role_swap": (lambda scene: passed_on(scene, "program").refusal(), "Wrong key"),
+    "man_in_the_middle": (
+        lambda scene: passed_on(scene, "person", certificate=b"\x01" * 32).refusal(),
+        "Wrong key",
+    ),
+    "proof_of_no_certificate": (
+        lambda scene: passed_on(scene, "person", certificate=b"").refusal(),
+        "Wrong key",
+    ),
+}
 
 
 @refused("Wrong key")
@@ -86,27 +85,8 @@ def replayed_hello(scene: Scene) -> str:
     return stranger.refusal()
 
 
-@refused("Wrong key")
-def man_in_the_middle(scene: Scene) -> str:
-    """Pass on a proof that an honest client made for another certificate."""
-    stranger = scene.stranger()
-    known = proof(scene.key, stranger.challenge(), b"\x01" * 32, "person")
-    stranger.send("hello", version=1, proof=known, role="person")
-    return stranger.refusal()
-
-
-@refused("Wrong key")
-def proof_of_no_certificate(scene: Scene) -> str:
-    """Pass on a proof that an honest client made without TLS."""
-    stranger = scene.stranger()
-    known = proof(scene.key, stranger.challenge(), b"", "person")
-    stranger.send("hello", version=1, proof=known, role="person")
-    return stranger.refusal()
-
-
 @refused("must be a hello")
 def command_before_hello(scene: Scene) -> str:
-    """Command, without an introduction."""
     stranger = scene.stranger()
     stranger.challenge()
     stranger.send("command", seq=2**50, answers=scene.operator.seen["seq"], values=FULL)
@@ -124,30 +104,16 @@ def emergency_stop_before_hello(scene: Scene) -> str:
     return reason
 
 
-@refused("version")
-def other_version(scene: Scene) -> str:
-    """Speak a version of the link with other rules."""
-    return scene.knock(scene.key, version=0)
-
-
-@refused("Not a valid message")
-def fields_of_another_type(scene: Scene) -> str:
-    """Send a list for the version."""
-    return scene.knock(scene.key, version=[1])
-
-
 # Below the link.
 
 
 @refused("closed")
 def plain_http(scene: Scene) -> str:
-    """Ask without TLS."""
     return scene.stranger(version=None).upgrade() or "closed"
 
 
 @refused("closed")
 def old_tls(scene: Scene) -> str:
-    """Offer TLS 1.2 at most."""
     with pytest.raises((ssl.SSLError, ConnectionResetError)):
         scene.stranger(version=ssl.TLSVersion.TLSv1_2)
     return "closed"
@@ -155,30 +121,22 @@ def old_tls(scene: Scene) -> str:
 
 @refused("closed")
 def garbage_for_tls(scene: Scene) -> str:
-    """Send random bytes instead of a handshake."""
     stranger = scene.stranger(version=None)
     stranger.write(os.urandom(4096))
     stranger.read(2**16)
     return "closed" if not stranger.read(1) else "open"
 
 
-@refused("403")
-def foreign_origin(scene: Scene) -> str:
-    """Open the link from a web page of another server."""
-    return scene.stranger().upgrade(Origin="https://evil.example")
+def page_of(origin: str) -> Attack:
+    """Return an attack that opens the link from a web page of another server."""
+    return lambda scene: scene.stranger().upgrade(Origin=origin.format(scene.port + 1))
 
 
-@refused("403")
-def null_origin(scene: Scene) -> str:
-    """Open the link from a local file or a sandboxed frame."""
-    return scene.stranger().upgrade(Origin="null")
-
-
-@refused("403")
-def origin_of_another_port(scene: Scene) -> str:
-    """Open the link from another server of the robot's computer."""
-    return scene.stranger().upgrade(Origin=f"https://127.0.0.1:{scene.port + 1}")
-
+ATTACKS |= {
+    "foreign_origin": (page_of("https://evil.example"), "403"),
+    "null_origin": (page_of("null"), "403"),  # A local file, or a sandboxed frame.
+    "origin_of_another_port": (page_of("https://127.0.0.1:{}"), "403"),
+}
 
 PATHS = (
     "/../credentials/key",
@@ -204,7 +162,6 @@ def paths(scene: Scene) -> str:
 
 @refused("405")
 def methods(scene: Scene) -> str:
-    """Write, delete and configure."""
     found = {
         scene.stranger().request(f"{method} {path} HTTP/1.1", Content_Length="0")
         for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE")
@@ -248,62 +205,21 @@ def framed(scene: Scene, *frames: bytes) -> str:
     return ends[0] if ends[0] == ends[1] else " | ".join(ends)
 
 
-@refused("closed")
-def huge_claim(scene: Scene) -> str:
-    """Announce a message of 2^62 bytes."""
-    return framed(scene, header(2**62), bytes(1000))
-
-
-@refused("larger than")
-def large_message(scene: Scene) -> str:
-    """Send a message above the limit of 64 KiB."""
-    return framed(scene, frame(bytes(64 * 1024 + 1)))
-
-
-@refused("closed")
-def endless_fragments(scene: Scene) -> str:
-    """Send fragments of one message until the robot gives up."""
-    parts = [frame(bytes(1024), BINARY if not n else 0, end=False) for n in range(1024)]
-    return framed(scene, *parts)
-
-
-@refused("closed")
-def interleaved_fragments(scene: Scene) -> str:
-    """Begin a message within another."""
-    return framed(scene, frame(b"\x81", end=False), frame(b"\x81", end=False))
-
-
-@refused("closed")
-def continuation_of_nothing(scene: Scene) -> str:
-    """Continue a message that was not begun."""
-    return framed(scene, frame(b"\x81", 0))
-
-
-@refused("closed")
-def reserved_bits(scene: Scene) -> str:
-    """Send a frame as if compression had been agreed on."""
-    return framed(scene, frame(b"\x81", flags=0x40))
-
-
-@refused("closed")
-def unknown_opcode(scene: Scene) -> str:
-    """Send a frame of an undefined kind."""
-    return framed(scene, frame(b"\x81", 3))
-
-
-@refused("closed")
-def large_ping(scene: Scene) -> str:
-    """Send a control frame above the limit of RFC 6455."""
-    return framed(scene, frame(bytes(126), PING))
-
-
-@refused("binary messages")
-def text_message(scene: Scene) -> str:
-    """Send JSON."""
-    return framed(scene, frame(b'{"kind":"emergencystop"}', TEXT))
-
-
-BODIES = {
+FRAMES: Final[dict[str, tuple[str, list[bytes]]]] = {
+    "huge_claim": ("closed", [header(2**62), bytes(1000)]),
+    "large_message": ("larger than", [frame(bytes(64 * 1024 + 1))]),
+    "endless_fragments": (
+        "closed",
+        [frame(bytes(1024), 0 if n else BINARY, end=False) for n in range(1024)],
+    ),
+    "interleaved_fragments": ("closed", [frame(b"\x81", end=False)] * 2),
+    "continuation_of_nothing": ("closed", [frame(b"\x81", 0)]),
+    "compressed_without_agreement": ("closed", [frame(b"\x81", flags=0x40)]),
+    "unknown_opcode": ("closed", [frame(b"\x81", 3)]),
+    "large_ping": ("closed", [frame(bytes(126), PING)]),
+    "text_message": ("binary messages", [frame(b'{"kind":"emergencystop"}', TEXT)]),
+}
+BODIES: Final = {
     "array_that_claims_4_billion": b"\xdd\xff\xff\xff\xff",
     "map_that_claims_4_billion": b"\xdf\xff\xff\xff\xff",
     "text_that_claims_4_gib": b"\x81\xa4kind\xdb\xff\xff\xff\xff",
@@ -315,16 +231,46 @@ BODIES = {
 }
 
 
-def body(name: str) -> Attack:
-    """Return an attack that sends a malformed message."""
-    return lambda scene: framed(scene, frame(BODIES[name]))
-
-
-for malformed in BODIES:
-    ATTACKS[malformed] = body(malformed), "Not a valid message"
+FRAMES.update({name: ("Not a valid message", [frame(body)]) for name, body in BODIES.items()})
+ATTACKS.update(
+    {
+        name: (lambda scene, sent=sent: framed(scene, *sent), words)
+        for name, (words, sent) in FRAMES.items()
+    }
+)
 
 
 # With the key, against a person who has control.
+
+
+def by_a_thief(kind: str, role: str = "program", **fields: Any) -> Attack:
+    """Return an attack that sends one message with the key."""
+
+    def attack(scene: Scene) -> str:
+        thief = scene.inside(role)
+        if kind == "command":
+            thief.drive(2**50, *FULL, **fields)
+        else:
+            thief.send(kind, **fields)
+        return thief.refusal()
+
+    return attack
+
+
+INJECTED: Final = {"session": 1, "mine": True, "holder": "Grace", "lease": 1, "role": "person"}
+ATTACKS |= {
+    "command_without_control": (by_a_thief("command"), "do not have control"),
+    "injected_fields": (by_a_thief("command", **INJECTED), "do not have control"),
+    "program_records": (by_a_thief("record", on=True, name="x" * 64), "Only a person can record"),
+    "program_starts_a_policy": (
+        by_a_thief("runpolicy", policy="../policy"),
+        "Only a person can start a policy",
+    ),
+    **{
+        f"recordings_at_{name!r}": (by_a_thief("fetch", episode=name), "Not a valid message")
+        for name in ("../credentials", "a/../../credentials", ".", "/etc", "a\x00b", "..", "a\n")
+    },
+}
 
 
 @refused("sent already")
@@ -336,67 +282,14 @@ def second_hello(scene: Scene) -> str:
     return thief.refusal()
 
 
-@refused("do not have control")
-def command_without_control(scene: Scene) -> str:
-    """Command while another client has control."""
-    thief = scene.inside()
-    thief.drive(2**50, *FULL)
-    return thief.refusal()
-
-
-@refused("do not have control")
-def injected_fields(scene: Scene) -> str:
-    """Claim the session and the lease of the operator."""
-    thief = scene.inside()
-    thief.drive(2**50, *FULL, session=1, mine=True, holder="Grace", lease=1, role="person")
-    return thief.refusal()
-
-
-@refused("cannot take it from a person")
-def program_takes_from_a_person(scene: Scene) -> str:
-    """Ask for control of a robot that a person drives."""
-    lease = scene.inside().take()
-    assert not lease["mine"]
-    return lease["reason"]
-
-
-@refused("cannot take it from a person")
-def two_operators(scene: Scene) -> str:
-    """Ask for control as a second person, and command all the same."""
-    thief = scene.inside("person")
+@pytest.mark.parametrize("role", ["program", "person"])
+def test_control_is_not_taken_from_a_person(scene: Scene, role: str) -> None:
+    thief = scene.inside(role)
     lease = thief.take()
     assert not lease["mine"]
+    assert "cannot take it from a person" in lease["reason"]
     thief.drive(2**50, *FULL)
     assert "do not have control" in thief.refusal()
-    return lease["reason"]
-
-
-@refused("Only a person can record")
-def program_records(scene: Scene) -> str:
-    """Fill the robot's disk."""
-    thief = scene.inside()
-    thief.send("record", on=True, name="x" * 64)
-    return thief.refusal()
-
-
-@refused("Only a person can start a policy")
-def program_starts_a_policy(scene: Scene) -> str:
-    """Let a policy on board drive."""
-    thief = scene.inside()
-    thief.send("runpolicy", policy="../policy")
-    return thief.refusal()
-
-
-@refused("Not a valid message")
-def recordings_elsewhere(scene: Scene) -> str:
-    """Ask for files outside of the folder of the recordings."""
-    reasons: set[str] = set()
-    for name in ("../credentials", "a/../../credentials", ".", "/etc", "a\x00b", "..", "a\n"):
-        thief = scene.inside()
-        thief.send("fetch", episode=name)
-        reasons.add(thief.refusal().partition(":")[0])
-    assert len(reasons) == 1
-    return reasons.pop()
 
 
 @refused("Too many messages")
@@ -430,36 +323,6 @@ def repeated(scene: Scene, **fields: object) -> str:
     return operator.refusal()
 
 
-@refused("not newer than 5")
-def replayed_command(scene: Scene) -> str:
-    """Repeat the number of the last command."""
-    return repeated(scene, seq=5)
-
-
-@refused("not newer than 5")
-def stale_sequence(scene: Scene) -> str:
-    """Send a command that was overtaken."""
-    return repeated(scene, seq=4)
-
-
-@refused("Not a valid message")
-def sequence_beyond_the_range(scene: Scene) -> str:
-    """Send a number that a later one could not exceed."""
-    return repeated(scene, seq=2**53 + 1)
-
-
-@refused("was not sent to this client")
-def answer_to_the_future(scene: Scene) -> str:
-    """Answer an observation that was not sent yet."""
-    return repeated(scene, answers=2**52)
-
-
-@refused("was not sent to this client")
-def answer_to_the_distant_past(scene: Scene) -> str:
-    """Answer an observation of another client, or from before the last 64."""
-    return repeated(scene, answers=0)
-
-
 @refused("ms are allowed")
 def answer_to_an_old_observation(scene: Scene) -> str:
     """Delay a command until nobody knows what the robot sees."""
@@ -481,7 +344,12 @@ def late_request_to_arm(scene: Scene) -> str:
     return operator.refusal()
 
 
-UNUSABLE = {
+UNUSABLE: Final[dict[str, tuple[dict[str, Any], str]]] = {
+    "replayed_command": ({"seq": 5}, "not newer than 5"),
+    "overtaken_command": ({"seq": 4}, "not newer than 5"),
+    "number_that_no_later_one_exceeds": ({"seq": 2**53 + 1}, "Not a valid message"),
+    "answer_to_the_future": ({"answers": 2**52}, "was not sent to this client"),
+    "answer_to_the_distant_past": ({"answers": 0}, "was not sent to this client"),
     "not_a_number": ({"values": (0.0, math.nan)}, "must be finite"),
     "infinite": ({"values": (math.inf, 1.0)}, "must be finite"),
     "enormous": ({"values": (0.0, 1e300)}, "must be finite"),
@@ -494,13 +362,12 @@ UNUSABLE = {
 }
 
 
-def unusable(name: str) -> Attack:
-    """Return an attack that sends a command with impossible fields."""
-    return lambda scene: repeated(scene, **UNUSABLE[name][0])
-
-
-for invalid, (_, complaint) in UNUSABLE.items():
-    ATTACKS[invalid] = unusable(invalid), complaint
+ATTACKS.update(
+    {
+        name: (lambda scene, fields=fields: repeated(scene, **fields), words)
+        for name, (fields, words) in UNUSABLE.items()
+    }
+)
 
 
 @pytest.mark.parametrize("name", ATTACKS)
