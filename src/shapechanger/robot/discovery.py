@@ -79,16 +79,13 @@ def _resolved(zeroconf: Zeroconf, name: str, timeout_s: float) -> FoundRobot | N
     addresses = info.parsed_scoped_addresses() if info else []
     if info is None or info.port is None or not addresses:
         return None
-    properties = {
-        key.decode("utf-8", "replace"): (value or b"").decode("utf-8", "replace")
-        for key, value in info.properties.items()
-    }
+    said = info.decoded_properties
     return FoundRobot(
-        name=properties.get("id") or name.removesuffix(f".{SERVICE}"),
-        body=properties.get("body", ""),
+        name=said.get("id") or name.removesuffix(f".{SERVICE}"),
+        body=said.get("body") or "",
         address=Address(addresses[0], info.port),
-        fingerprint=properties.get("fp", ""),
-        version=properties.get("v", ""),
+        fingerprint=said.get("fp") or "",
+        version=said.get("v") or "",
     )
 
 

@@ -21,7 +21,7 @@ from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.contract.testing import MakeEnv
 from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.layout import Element, Feature
-from shapechanger.robot.client.env import RemoteVehicleEnv, Schedule
+from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.client.known_robots import remember
 from shapechanger.robot.link import messages as m
 from shapechanger.vehicles.remote.discrete_driving import FOUR_WAYS, DiscreteDriving
@@ -412,7 +412,7 @@ def test_late_steps_are_counted(
     run: Run, monkeypatch: pytest.MonkeyPatch, pace: str, missed: list[int], made: Made
 ) -> None:
     late = itertools.cycle((True, False))
-    monkeypatch.setattr(Schedule, "advance", lambda *_: next(late))
+    monkeypatch.setattr("shapechanger.robot.client.env.next_tick", lambda *_: (0.0, next(late)))
     env = made(run(control_hz=50.0, clock="real"), pace=pace)
     for _ in range(2):
         _, info = env.reset(seed=0)

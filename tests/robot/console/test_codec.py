@@ -63,7 +63,6 @@ def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> N
 
 
 def test_messages_of_both_sides_are_decoded(car: RunningRobot, visit: Visit) -> None:
-    """The robot decodes the page's messages, and the page the robot's."""
     console = visit(car, key="")
     sent = [
         m.Hello(version=m.VERSION, proof=b"x" * 32, name="Ada", role="person"),

@@ -21,15 +21,7 @@ _DEADLINE_MS = 250.0
 _MINUS = "\N{MINUS SIGN}"
 
 
-@pytest.fixture(autouse=True)
-def _at_the_start(car: RunningRobot) -> None:
-    """Put the car where it has room ahead."""
-    with car.operator() as operator:
-        operator.place(0)
-
-
 def test_the_live_picture_changes(car: RunningRobot, visit: Visit) -> None:
-    """The canvas shows one frame of the camera after the other."""
     console = visit(car)
     console.await_state(picture="live")
     before = console.pixels()
@@ -39,7 +31,6 @@ def test_the_live_picture_changes(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_a_key_drives_until_it_is_released(car: RunningRobot, visit: Visit) -> None:
-    """Outputs rest after key-up, in both directions."""
     console, pins = visit(car), Pins(car)
     console.arm()
     for key, way in (("s", -1.0), ("ArrowDown", -1.0), ("w", 1.0)):
@@ -50,22 +41,7 @@ def test_a_key_drives_until_it_is_released(car: RunningRobot, visit: Visit) -> N
     console.stop()
 
 
-def test_a_page_that_loses_the_focus_stops_driving(car: RunningRobot, visit: Visit) -> None:
-    """After a blur, held keys must be pressed again."""
-    console, pins = visit(car), Pins(car)
-    console.arm()
-    console.drive("w", pins)
-    console.page.evaluate("window.dispatchEvent(new Event('blur'))")
-    pins.await_rest()
-    console.await_state(robot="armed")
-    console.page.keyboard.up("w")
-    console.drive("w", pins)
-    console.page.keyboard.up("w")
-    console.stop()
-
-
 def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> None:
-    """A hidden page stops the robot, because the person cannot see it."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -178,34 +154,6 @@ def test_the_stick_works_with_mouse_and_touch(car: RunningRobot, visit: Visit) -
         pins.await_rest()
         console.stop()
         console.page.close()
-
-
-_PAD = """
-globalThis.pad = { connected: true, mapping: "standard", axes: [0, 0, 0, 0], buttons:
-  Array.from({ length: 16 }, () => ({ pressed: false, value: 0 })) };
-navigator.getGamepads = () => [globalThis.pad];
-"""
-
-
-def test_a_gamepad_drives_once_its_sticks_have_been_at_rest(
-    car: RunningRobot, visit: Visit
-) -> None:
-    """A stick that is held while the robot is armed moves nothing; B stops the robot."""
-    console, pins = visit(car, script=_PAD), Pins(car)
-    console.await_state(link="open")
-    console.page.evaluate("pad.axes[1] = 1")
-    console.arm()
-    seen = console.page.locator("#facts").inner_text()
-    until(lambda: console.page.locator("#facts").inner_text() != seen, 60.0)
-    assert pins.propels() == 0.0
-    console.page.evaluate("pad.axes[1] = 0.05")
-    until(lambda: console.page.evaluate("pad.axes[1]") == 0.05, 60.0)
-    console.page.wait_for_timeout(200)
-    console.page.evaluate("pad.axes[1] = 1")
-    pins.await_motion(-1.0)
-    console.page.evaluate("pad.buttons[1] = { pressed: true, value: 1 }")
-    console.await_state(robot="emergency")
-    pins.await_rest()
 
 
 def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:

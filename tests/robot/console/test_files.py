@@ -12,7 +12,6 @@ from shapechanger.robot.console import ENTRY, console_files
 
 
 def test_the_page_refers_only_to_existing_files() -> None:
-    """Scripts, styles and imports exist in the package."""
     files = console_files()
     for name, (_, body) in files.items():
         text = body.decode()
@@ -35,7 +34,6 @@ def test_no_inline_code_and_no_external_resources() -> None:
 
 
 def test_a_missing_page_is_an_error(tmp_path: Path) -> None:
-    """A folder without index.html and a missing folder raise errors."""
     with pytest.raises(RobotError, match=r"has no index.html"):
         console_files(tmp_path)
     with pytest.raises(RobotError, match="Cannot read"):

@@ -54,7 +54,6 @@ def test_the_key_is_removed_from_the_address(car: RunningRobot, visit: Visit) ->
 
 
 def test_a_wrong_key_is_an_error_and_keeps_the_form(car: RunningRobot, visit: Visit) -> None:
-    """Malformed and wrong keys show an error; the right key then connects."""
     console = visit(car, key="ABCD-EFGH")
     trouble = "#key-trouble"
     console.await_words(trouble, "A key has 26 letters and digits, got 8.")

@@ -35,13 +35,6 @@ _SLACK_MS = 60.0
 _SHIPPED = Path(load.__file__).parent / "shipped"
 
 
-@pytest.fixture(autouse=True)
-def _at_the_start(car: RunningRobot) -> None:
-    """Put the car where it has room ahead."""
-    with car.operator() as operator:
-        operator.place(0)
-
-
 @contextlib.contextmanager
 def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
     """Run a program that commands whenever it has control; the event is set while it drives."""
@@ -153,7 +146,6 @@ def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
 def test_a_page_reconnects_after_a_restart_and_moves_nothing(
     chromium: Browser, tmp_path: Path
 ) -> None:
-    """The page reports the loss, reconnects, and waits to be armed."""
     with socket.create_server(("127.0.0.1", 0)) as found:
         port = found.getsockname()[1]
     arguments = (*IN_A_ROOM, "--port", str(port))
@@ -202,7 +194,6 @@ def test_a_displaced_page_waits_for_its_person(car: RunningRobot, visit: Visit) 
 
 
 def test_recording_a_drive(car: RunningRobot, visit: Visit, recordings: Path) -> None:
-    """Record, mark, undo, browse and judge an episode from the page."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.page.keyboard.press("r")

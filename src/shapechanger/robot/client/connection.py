@@ -54,13 +54,7 @@ _T = TypeVar("_T")
 async def open_connection(
     robot: KnownRobot, hello: Hello, timeout_s: float
 ) -> AsyncGenerator[tuple[aiohttp.ClientWebSocketResponse, Welcome]]:
-    """Connect and authenticate.
-
-    Args:
-        robot: The robot.
-        hello: The client's first message, without a proof.
-        timeout_s: Time limit of the handshake, and of silence, s.
-    """
+    """Connect and authenticate; `hello` needs no proof, and silence ends the link too."""
     address, expected = parse_address(robot.address), parse_trust(robot.fingerprint)
     sockets: list[socket.socket] = []
 

@@ -137,10 +137,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if not callable(on_reset) and on_reset not in _WAYS_TO_RESET:
             raise UnknownName("way to reset", on_reset, _WAYS_TO_RESET)
         is_address = "." in robot or ":" in robot or robot == "localhost"
-        self._known_as = "" if is_address and robot not in known_names() else robot
+        known_as = "" if is_address and robot not in known_names() else robot
+        self._prepare = partial(Preparation, reset_timeout_s, on_waiting, known_as)
         self._open = partial(
             RobotClient.connect,
-            recall(robot) if self._known_as else robot,
+            recall(robot) if known_as else robot,
             key=key,
             fingerprint=fingerprint,
             role=role,
@@ -151,10 +152,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         )
         self._pace: Pace = pace
         self._role: Role = role
+        self._interventions = interventions
         self._takeover = Takeover(allowed=interventions)
         self._on_reset = on_reset
-        self._on_waiting = on_waiting
-        self._reset_timeout_s = reset_timeout_s
         self.render_mode = render_mode
         with ExitStack() as opened:
             self._client = self._connect()
@@ -179,7 +179,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._patience_s = max_observation_age_s or welcome.max_observation_age_ms / 1e3
         if pace == "lockstep":
             self._patience_s = _LOCKSTEP_S
-        self._schedule = Schedule(1.0 / welcome.control_hz, time.monotonic)
+        self._period_s = 1.0 / welcome.control_hz
+        self._ends = 0.0  # Time at which the current step ends, s.
         self._last: Received | None = None
         self._missed = 0
         self._has_stepped = False
@@ -208,7 +209,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             LinkError: If the robot cannot be reached in time.
         """
         super().reset(seed=seed)
-        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._known_as)
+        ready = self._prepare()
         if not self._client.alive:
             self._client = ready.connect(self._connect)
             self._spaces.reconnect()
@@ -225,10 +226,10 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         ready.arm(robot, self._role, by_person=self._on_reset == "person")
         if self._on_reset == "routine":
             ready.play(robot)
-        self._last = received = ready.first(robot, self._spaces.rest, self._is_after)
+        self._last = received = ready.first(robot, self._spaces)
         view = self._spaces.view(received)
         self._meter.start(received.message)
-        self._takeover.start()
+        self._takeover = Takeover(allowed=self._interventions)
         self._missed, self._has_stepped = 0, False
         robot.events()  # Drop events from before the episode.
         return view.observation, self._info(received, view)
@@ -247,7 +248,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             )
         values = self._spaces.values(action)
         if not self._has_stepped:
-            self._schedule.start()
+            self._ends = time.monotonic() + self._period_s
             self._has_stepped = True
         sent_at = time.monotonic()
         try:
@@ -262,7 +263,9 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             info = self._info(last, view, truncated_because=str(failure), reward_terms=terms)
             info |= terms | {"events": (), "refused": "", "latency": {}, "frame_repeated": True}
             return view.observation, 0.0, False, True, info
-        self._missed += self._schedule.advance(received.received_at) and self._pace == "realtime"
+        begins, late = next_tick(self._ends, self._period_s, received.received_at, time.monotonic())
+        self._ends = begins + self._period_s
+        self._missed += late and self._pace == "realtime"
         events = robot.events()
         bumped = any(event.name == "bump" for event in events)
         measured = self._meter.measure(last.message, received.message, bumped)
@@ -315,24 +318,15 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         weakref.finalize(self, client.abandon)
         return client
 
-    def _is_after(self, received: Received, now_ns: int) -> bool:
-        """Return True if an observation and its frame were made after a time of the robot, ns."""
-        message = received.message
-        if message.state_ns <= now_ns:
-            return False
-        if not self._spaces.has_image:
-            return True
-        return message.captured_ns > now_ns and self._spaces.shows(received)
-
     def _next(self, robot: RobotClient, last: Received, sent_at: float) -> Received:
         """Return the newest observation at the end of the control period, and always a new one."""
         if self._pace == "lockstep":
             return robot.observation(last.message.seq, self._patience_s)
-        left_s = max(0.0, self._schedule.left_s)
-        found = robot.observation(last.message.seq, left_s + self._patience_s)
+        limit_s = max(0.0, self._ends - time.monotonic()) + self._patience_s
+        found = robot.observation(last.message.seq, limit_s)
         while found.received_at <= sent_at:  # It was sent before the command.
-            found = robot.observation(found.message.seq, left_s + self._patience_s)
-        while (left_s := self._schedule.left_s) > 0.0:
+            found = robot.observation(found.message.seq, limit_s)
+        while (left_s := self._ends - time.monotonic()) > 0.0:
             robot.acknowledge()
             with suppress(StaleObservation):
                 found = robot.observation(found.message.seq, left_s)
@@ -361,47 +355,16 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         return info
 
 
-class Schedule:
-    """Control period of the env, synchronised with the robot.
+def next_tick(end: float, period_s: float, arrived_at: float, now: float) -> tuple[float, bool]:
+    """Return the time at which the next step begins, and whether this one missed its deadline.
 
     If this machine delays a step a little, the next one is shorter, so that the mean rate holds.
     If the robot's observation came after the end of the period, the next period starts at its
     arrival, because no two clocks are equally fast. A missed deadline also starts a new period,
     because two commands in quick succession are worse than a late one.
-
-    Args:
-        period_s: Control period, s.
-        clock: Monotonic clock, s.
     """
-
-    def __init__(self, period_s: float, clock: Callable[[], float]) -> None:
-        self._period_s = period_s
-        self._clock = clock
-        self._tick = clock()
-
-    def start(self) -> None:
-        """Begin the first step now."""
-        self._tick = self._clock()
-
-    @property
-    def left_s(self) -> float:
-        """Time until the end of the step, s; negative when it is late."""
-        return self._tick + self._period_s - self._clock()
-
-    def advance(self, arrived_at: float) -> bool:
-        """End a step and begin the next.
-
-        Args:
-            arrived_at: Arrival time of the observation that ends the step, s.
-
-        Returns:
-            True if the step missed its deadline.
-        """
-        end = self._tick + self._period_s
-        now = self._clock()
-        missed = now - end > LATE * self._period_s
-        self._tick = now if missed else max(end, arrived_at)
-        return missed
+    missed = now - end > LATE * period_s
+    return now if missed else max(end, arrived_at), missed
 
 
 def latencies(

@@ -148,24 +148,12 @@ def forget(name: str) -> None:
 
 
 def parse_trust(fingerprint: str) -> bytes | None:
-    """Return the SHA-256 of the expected certificate; None for "insecure".
-
-    Raises:
-        LinkError: If the text is neither a fingerprint nor "insecure".
-    """
+    """Return the SHA-256 of the expected certificate; None for "insecure"."""
     return None if fingerprint == INSECURE else parse_fingerprint(fingerprint)
 
 
 def untrusted(address: Address, timeout_s: float) -> LinkError:
-    """Return the error for a connection without a fingerprint, which shows the one to compare.
-
-    Args:
-        address: Address of the robot.
-        timeout_s: Time limit, s.
-
-    Raises:
-        LinkError: If no server shows a certificate.
-    """
+    """Return the error for a connection without a fingerprint, which shows the one to compare."""
     with translate_errors(
         OSError,
         to=lambda error: LinkError(f"No server shows a certificate at {address}: {error}."),

@@ -11,6 +11,7 @@ from typing import Final
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received
+from shapechanger.robot.client.observations import RobotSpaces
 from shapechanger.robot.link.messages import Observation
 
 _POLL_S: Final = 0.05  # Period of checks for a person's actions.
@@ -117,22 +118,23 @@ class Preparation:
                     )
                 seen = robot.exchange(values, seen)
 
-    def first(
-        self, robot: RobotClient, rest: tuple[float, ...], is_new: Callable[[Received, int], bool]
-    ) -> Received:
-        """Wait for the first observation after the reset.
+    def first(self, robot: RobotClient, spaces: RobotSpaces) -> Received:
+        """Wait for the first observation whose state and frame were made after the reset.
 
         In lockstep, commands at rest advance the robot's time.
         """
         _, now_ns = robot.ping()
         seen = robot.ask()
-        while not is_new(seen, now_ns):
+        while True:
+            has_frame = seen.message.captured_ns > now_ns and spaces.shows(seen)
+            if seen.message.state_ns > now_ns and (has_frame or not spaces.has_image):
+                return seen
             if self._left_s < 0.0:
                 raise LinkError(
                     f"{robot.welcome.robot} sends no new observation. Does its camera still work?"
                 )
-            seen = robot.exchange(rest, seen) if robot.pace == "lockstep" else robot.ask()
-        return seen
+            is_paced = robot.pace == "lockstep"
+            seen = robot.exchange(spaces.rest, seen) if is_paced else robot.ask()
 
     def _wait(self, sentence: str, hint: str = "") -> bool:
         """Wait a moment. Return False after the time limit."""
@@ -159,10 +161,6 @@ class Takeover:
 
     def __init__(self, *, allowed: bool) -> None:
         self._allowed = allowed
-        self._waits = False
-
-    def start(self) -> None:
-        """Begin an episode with control of an armed robot."""
         self._waits = False
 
     def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
