@@ -21,7 +21,6 @@ from shapechanger.errors import FailedRuns
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.learners import presets
 from shapechanger.transfer.learners.presets import LEARNERS
-from shapechanger.transfer.report import study as study_report
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 
 pytestmark = pytest.mark.system
@@ -150,7 +149,7 @@ def test_a_stopped_suite_resumes_to_the_same_numbers(
 ) -> None:
     """After Ctrl-C, the same command runs only what is left."""
     # Reports are slow to draw, and not part of this test.
-    monkeypatch.setattr(study_report, "write_study_report", lambda study, folder: folder)
+    monkeypatch.setattr("shapechanger.cli.suite.write_study_report", lambda study, folder: folder)
     whole, all_of_it, _ = complete_suite
     out, before = tmp_path / "all", _Counting(stops_after=13)
     code, output, errors = _run(out, before)
@@ -199,7 +198,7 @@ def test_folders_of_two_machines_are_merged(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Overlapping and incomplete folders merge to the same numbers."""
-    monkeypatch.setattr(study_report, "write_study_report", lambda study, folder: folder)
+    monkeypatch.setattr("shapechanger.cli.suite.write_study_report", lambda study, folder: folder)
     whole = complete_suite[0]
     parts = {"a": _PAIRS[:2], "b": _PAIRS[1:3]}
     for part, names in parts.items():
@@ -221,7 +220,7 @@ def test_merging_keeps_the_looks_of_the_parts(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seeds that were added on one machine while results could be seen are on the joint page."""
-    monkeypatch.setattr(study_report, "write_study_report", lambda study, folder: folder)
+    monkeypatch.setattr("shapechanger.cli.suite.write_study_report", lambda study, folder: folder)
     name = _PAIRS[0]
     shutil.copytree(complete_suite[0] / name, tmp_path / "a" / name)
     study = tmp_path / "a" / name / "study.json"

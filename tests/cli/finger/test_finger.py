@@ -83,7 +83,7 @@ def test_motors_are_taken_for_geared_where_the_log_says_nothing(
         taken.append(log.motors)
         raise FingerError("That is enough.")
 
-    monkeypatch.setattr("shapechanger.finger.identify.identify", identify)
+    monkeypatch.setattr("shapechanger.cli.finger.identify", identify)
     for option in ((), ("--geared",)):
         assert "That is enough." in refused(capsys, "identify", tmp_path / "log.npz", *option)
     assert taken == ([own, own] if says else [None, shipped_rig()])
