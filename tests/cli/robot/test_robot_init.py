@@ -119,20 +119,15 @@ def test_the_end_of_the_answers_writes_nothing(
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-@pytest.mark.parametrize("command", [Init(), Init(name="rover")])
-def test_without_a_terminal_nothing_is_asked(
-    asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch, command: Init
+def test_arguments_ask_nothing(
+    asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The kind is then needed, as it is with any other argument."""
-    if command == Init():
-        monkeypatch.setattr("sys.stdin", io.StringIO())
+    """A script can choose the same; it needs the kind, as a command without a terminal does."""
     with pytest.raises(RobotError, match=r"`shapechanger robot init car`. There are: .*boat"):
-        command.run()
-    assert asked[0] == []
-
-
-def test_arguments_ask_nothing(asked: tuple[list[str], list[str]]) -> None:
-    """A script can choose the same."""
+        Init(name="rover").run()
     Init("car", "bench", camera="none").run()
-    assert asked[0] == []
     assert load_profile("bench.toml").camera is None
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    with pytest.raises(RobotError, match="Name the kind"):
+        Init().run()
+    assert asked[0] == []

@@ -3,10 +3,11 @@
 import re
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from gpiozero.pins.mock import MockPin
@@ -17,6 +18,7 @@ from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.check import standing
 from shapechanger.robot.check.report import Finding
 from shapechanger.robot.check.standing import StandingRobot, examine
+from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.hardware import RealClock
@@ -61,20 +63,27 @@ def _on(root: Path, profile: Profile, **more: Any) -> dict[str, Finding]:
 
 
 @pytest.mark.parametrize(
-    ("line", "level"),
+    ("line", "gpiod", "speed"),
     [
-        ("dtparam=strict_gpiod", "good"),
-        ("dtparam=i2c_arm=on,strict_gpiod=on  # Pins of the dead go low.", "good"),
-        ("#dtparam=strict_gpiod", "bad"),
-        ("dtparam=strict_gpiod=off", "bad"),
-        ("dtparam=i2c_arm=on", "bad"),
+        ("dtparam=strict_gpiod", "good", "bad"),
+        ("dtparam=i2c_arm=on,strict_gpiod=on  # Pins of the dead go low.", "good", "bad"),
+        ("#dtparam=strict_gpiod", "bad", "bad"),
+        ("dtparam=strict_gpiod\ndtparam=strict_gpiod=off", "bad", "bad"),
+        ("[pi5]\ndtparam=strict_gpiod", "bad", "bad"),
+        ("dtparam=i2c_arm=on,i2c_arm_baudrate=400000", "bad", "good"),
+        ("dtparam = i2c_baudrate=1000000", "bad", "good"),
+        ("#dtparam=i2c_arm_baudrate=400000", "bad", "bad"),
+        ("dtparam=i2c_arm_baudrate=400000\ndtparam=i2c_arm_baudrate=100000", "bad", "bad"),
     ],
 )
-def test_strict_gpiod_is_read_from_the_boot_configuration(
-    tmp_path: Path, car: Profile, line: str, level: str
+def test_the_boot_configuration_is_read(
+    tmp_path: Path, car: Profile, line: str, gpiod: str, speed: str
 ) -> None:
+    """Encoders need a fast bus; of several lines, the last one counts."""
+    assert "I2C speed" not in _on(tmp_path, car)
     _write(tmp_path, "boot/firmware/config.txt", f"# Bookworm\n{line}\n")
-    assert _on(tmp_path, car)["strict_gpiod"].level == level
+    found = _on(tmp_path, replace(shipped("finger"), camera=None))
+    assert (found["strict_gpiod"].level, found["I2C speed"].level) == (gpiod, speed)
 
 
 def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path, car: Profile) -> None:
@@ -149,49 +158,18 @@ def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
     assert found["devices"].level == found["enable line"].level == "good"
 
 
-class _Stuck:
-    """Hardware and camera of which one method never returns, or raises.
+def _hardware(where: str = "", act: Callable[[], object] = lambda: None) -> Any:
+    """Return hardware and a camera without pins and buses, of which one method acts."""
 
-    Args:
-        where: Name of the method.
-        error: The error that it raises; None to hang until `freed`.
-        freed: Ends the hanging.
-    """
+    def refuse() -> None:
+        raise RobotError("Not here.")
 
-    def __init__(self, where: str, error: Exception | None, freed: threading.Event) -> None:
-        self._where = where
-        self._error = error
-        self._freed = freed
-        self.clock = RealClock()
-
-    def _maybe(self, method: str) -> None:
-        if method == self._where:
-            if self._error is not None:
-                raise self._error
-            self._freed.wait()
-        elif method in {"pin_factory", "i2c"}:
-            raise RobotError(f"Not here: {method}.")
-
-    def open(self, plan: CameraPlan) -> Self:
-        del plan
-        self._maybe("open")
-        return self
-
-    def read(self) -> Frame:
-        self._maybe("read")
-        return Frame(b"\xff\xd8", 1)
-
-    def pin_factory(self) -> Any:
-        self._maybe("pin_factory")
-
-    def i2c(self, bus: int) -> Any:
-        del bus
-        self._maybe("i2c")
-
-    servo_pins = servo_port = pin_factory
-
-    def close(self) -> None:
-        self._maybe("close")
+    made: Any = SimpleNamespace(clock=RealClock())
+    pins = dict.fromkeys(("pin_factory", "i2c", "servo_pins", "servo_port"), refuse)
+    camera = {"open": lambda: made, "read": lambda: Frame(b"\xff\xd8", 1), "close": lambda: None}
+    for name, other in (pins | camera).items():
+        setattr(made, name, lambda *_, run=act if name == where else other: run())
+    return made
 
 
 @pytest.fixture
@@ -229,14 +207,19 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
         _write(tmp_path, name)
     profile = replace(car, camera=CameraPlan("pattern"), outputs=(*car.outputs, _SERVO))
 
-    def findings(stuck: Any) -> list[Finding]:
-        monkeypatch.setattr(standing, "open_camera", stuck.open)
-        robot = StandingRobot(profile, root=tmp_path, hardware=lambda: stuck, motors_off=True)
+    def findings(hardware: Any) -> list[Finding]:
+        monkeypatch.setattr(standing, "open_camera", hardware.open)
+        robot = StandingRobot(profile, root=tmp_path, hardware=lambda: hardware, motors_off=True)
         return list(examine(robot))
 
-    found = findings(_Stuck(where, error, freed))
+    def fail() -> None:
+        if error is not None:
+            raise error
+        freed.wait()
+
+    found = findings(_hardware(where, fail))
     assert any(re.search(words, one.sentence) for one in found if one.level == "bad")
-    sound = findings(_Stuck("", None, freed))
+    sound = findings(_hardware())
     assert [one.level for one in sound if one.check == "camera"] == ["good"]
     assert {one.check for one in found} >= {one.check for one in sound}
     assert found[-1].check == "port"
@@ -360,6 +343,28 @@ def test_the_servos_of_a_rig_answer() -> None:
     board.pins.require_rig().break_servo(servos[0].name, "mute")
     ((level, sentence),) = _wired(rig, board.hardware)["servo bus"]
     assert (level, servos[0].name in sentence) == ("bad", True)
+
+
+@pytest.mark.parametrize(
+    ("how", "expected"),
+    [
+        ("", ("good", "The encoder of PIP_flexion detects its magnet.")),
+        ("gone", ("bad", "The encoder of PIP_flexion detects no magnet: fit one above the chip.")),
+        ("weak", ("bad", "The magnet of PIP_flexion is too far from its encoder.")),
+        ("strong", ("bad", "The magnet of PIP_flexion is too near to its encoder.")),
+    ],
+)
+def test_each_magnet_is_checked(how: Magnet, expected: tuple[str, str]) -> None:
+    """It is reported for its joint only, and a dead multiplexer for each joint behind it."""
+    rig = shipped("finger")
+    board = _board(rig)
+    board.pins.encoder("PIP_flexion").set_magnet(how)
+    found = _wired(rig, board.hardware)["encoders"]
+    assert found[2] == expected
+    assert [level for level, _ in found[:2]] == ["good"] * 2
+    board.pins.dead_chips.add((1, 0x70))
+    found = _wired(rig, board.hardware)["encoders"]
+    assert ["The multiplexer of sensor 'joints' at 0x70" in one for _, one in found] == [True] * 4
 
 
 class _Low(MockPin):

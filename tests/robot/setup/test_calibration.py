@@ -54,24 +54,18 @@ def test_a_motor_that_turned_backward_gets_a_negative_mix() -> None:
 
 @pytest.mark.parametrize("duty", [-0.1, 1.0, 2.0])
 def test_a_motor_starts_below_its_full_duty(duty: float) -> None:
-    """A start duty outside of the range raises an error."""
     with pytest.raises(RobotError, match="must start at a duty"):
         motor_changes(_MOTOR, "forward", duty)
 
 
 def test_a_wheel_is_scaled_by_the_pushed_distance() -> None:
-    """A measured 0.5 m for 1 m doubles the distance per turn."""
-    assert wheel_changes("wheel", 0.21, 1.0, 0.5) == {"sensor.wheel.wheel_m": 0.42}
-
-
-@pytest.mark.parametrize("measured_m", [0.0, -0.8])
-def test_a_wheel_that_counts_nothing_or_backward_is_an_error(measured_m: float) -> None:
-    """Zero and negative distances indicate wrong wiring."""
-    with pytest.raises(RobotError, match="check its wires"):
-        wheel_changes("wheel", 0.21, 1.0, measured_m)
+    """A measured 0.5 m for 1 m doubles the distance per turn; none or less is a wrong wire."""
+    assert wheel_changes("wheel", 0.21, 0.5) == {"sensor.wheel.wheel_m": 0.42}
+    for measured_m in (0.0, -0.8):
+        with pytest.raises(RobotError, match="check its wires"):
+            wheel_changes("wheel", 0.21, measured_m)
 
 
 def test_an_output_is_described_in_its_own_units() -> None:
-    """Servos are described in microseconds, motors as a duty."""
     assert reading(_SERVO, 0.5) == "1700 µs"
     assert reading(OutputPlan("drive", "hbridge", settings={"full": 0.8}), -0.25) == "duty 0.20"

@@ -13,7 +13,6 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.check.standing import StandingRobot, examine
-from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.install import (
     RootCommand,
     changes_to_install,
@@ -23,6 +22,7 @@ from shapechanger.robot.setup.install import (
     unit_word,
     write_unit,
 )
+from tests.robot.check.held_pins import shipped
 from tests.robot.setup.fake_pi import FakePi
 
 _CAMERA = CameraPlan("picamera2")
@@ -30,7 +30,7 @@ _UNIT = "etc/systemd/system/shapechanger-car.service"
 
 
 def _plan(name: str) -> GuardPlan:
-    return load_profile(find_profile(name)).guard_plan()
+    return shipped(name).guard_plan()
 
 
 def _install(
@@ -71,18 +71,12 @@ def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
 
 def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
     """What the checks find bad in the computer's settings is what `install` puts in place."""
-    car = replace(load_profile(find_profile("car")), camera=None)
-    profile = replace(car, path=pi.root / "home" / "car.toml")
-
-    def levels() -> dict[str, str]:
+    profile = replace(shipped("car"), camera=None, path=pi.root / "home" / "car.toml")
+    for expected in ("bad", "good"):
         found = examine(StandingRobot(profile, root=pi.root))
-        return {one.check: one.level for one in found}
-
-    before = levels()
-    assert (before["strict_gpiod"], before["systemd"]) == ("bad", "bad")
-    _install(pi, car.guard_plan())
-    after = levels()
-    assert (after["strict_gpiod"], after["systemd"]) == ("good", "good")
+        levels = {one.check: one.level for one in found}
+        assert (levels["strict_gpiod"], levels["systemd"]) == (expected, expected)
+        _install(pi, profile.guard_plan())
 
 
 def test_a_dry_run_changes_nothing(pi: FakePi) -> None:
@@ -105,20 +99,23 @@ def test_a_servo_board_needs_i2c(pi: FakePi, raspi_config: bool) -> None:
     assert _levels(_install(pi, _plan("car-esc")))["I2C"] == "already"
 
 
+def _changed(plan: GuardPlan, **settings: object) -> GuardPlan:
+    outputs = (replace(one, settings={**one.settings, **settings}) for one in plan.outputs)
+    return replace(plan, outputs=tuple(outputs))
+
+
 def test_another_bus_is_left_to_a_person(pi: FakePi) -> None:
     """Its overlay depends on its pins."""
-    plan = _plan("car-esc")
-    outputs = tuple(replace(o, settings={**o.settings, "bus": 3}) for o in plan.outputs)
-    plan = replace(plan, outputs=outputs)
+    plan = _changed(_plan("car-esc"), bus=3)
     level, sentence = _install(pi, plan)["I2C bus 3"]
     assert (level, "dtoverlay=i2c3" in sentence) == ("failed", True)
     pi.write("dev/i2c-3", "")
     assert _install(pi, plan)["I2C bus 3"][0] == "already"
 
 
-def test_lines_of_another_model_do_not_count(tmp_path: Path) -> None:
+def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
     """A line below a filter, such as [pi5], applies to that model only; ours applies to all."""
-    pi = FakePi(tmp_path, "camera_auto_detect=1\n[pi5]\ndtparam=strict_gpiod\n")
+    pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")
     assert _install(pi, _plan("car"))["strict_gpiod"][0] == "did"
     assert pi.config.endswith("[pi5]\ndtparam=strict_gpiod\n\n[all]\ndtparam=strict_gpiod\n")
 
@@ -135,10 +132,7 @@ def test_a_rig_on_the_headers_serial_port(pi: FakePi, raspi_config: bool, level:
     """Only raspi-config knows how a model's port is freed from the console."""
     if raspi_config:
         pi.write("usr/bin/raspi-config", "")
-    plan = _plan("finger")
-    settings = {"device": "/dev/serial0"}
-    outputs = tuple(replace(o, settings={**o.settings, **settings}) for o in plan.outputs)
-    found = _install(pi, replace(plan, outputs=outputs))
+    found = _install(pi, _changed(_plan("finger"), device="/dev/serial0"))
     assert (found["serial port"][0], found["serial console"][0]) == (level, level)
     assert ("enable_uart=1" in found["serial port"][1]) != raspi_config
 
@@ -251,7 +245,7 @@ def test_words_of_a_unit_are_quoted() -> None:
 @pytest.mark.parametrize("folder", ["robots", "my robots"])
 def test_the_check_accepts_the_unit_of_init(pi: FakePi, folder: str) -> None:
     """The written unit passes its check, unless it is for another profile."""
-    car = replace(load_profile(find_profile("car")), camera=None)
+    car = replace(shipped("car"), camera=None)
     unit, _ = write_unit("car", pi.root / folder / "car.toml")
     pi.write(_UNIT, unit.read_text())
     for name, level in (("car.toml", "good"), ("other.toml", "bad")):

@@ -1,18 +1,13 @@
-"""Zeros of joint encoders and tendon servos, and the checks of encoders."""
+"""Zeros of joint encoders and tendon servos."""
 
 from __future__ import annotations
 
-import socket
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.standing import StandingRobot, examine
-from shapechanger.robot.drivers.as5600 import Magnet
-from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import find_joint_zeros, find_zeros
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
@@ -84,78 +79,3 @@ def test_a_loose_tendon_is_an_error() -> None:
     assert not any(servo.has_torque for servo in board.pins.require_rig().bus.servos.values())
     with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
         find_zeros(_CAR, board.hardware, lambda: None)
-
-
-def _found(
-    root: Path, board: LocalBoard, port: int = 0, profile: Profile = _RIG
-) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    robot = StandingRobot(profile, port, root, hardware=lambda: board.hardware)
-    for one in examine(robot):
-        found.setdefault(one.check, []).append(f"{one.level}: {one.sentence}")
-    return found
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    """A computer with an I2C bus of 400 kHz."""
-    (tmp_path / "dev").mkdir()
-    (tmp_path / "dev/i2c-1").touch()
-    (tmp_path / "boot").mkdir()
-    (tmp_path / "boot/config.txt").write_text("dtparam=i2c_arm=on,i2c_arm_baudrate=400000\n")
-    return tmp_path
-
-
-@pytest.mark.parametrize(
-    ("how", "expected"),
-    [
-        ("", "good: The encoder of PIP_flexion detects its magnet."),
-        ("gone", "bad: The encoder of PIP_flexion detects no magnet: fit one above the chip."),
-        ("weak", "bad: The magnet of PIP_flexion is too far from its encoder."),
-        ("strong", "bad: The magnet of PIP_flexion is too near to its encoder."),
-    ],
-)
-def test_each_magnet_is_checked(root: Path, how: Magnet, expected: str) -> None:
-    """A missing, weak or strong magnet is reported for its joint only."""
-    board = _board()
-    board.pins.encoder("PIP_flexion").set_magnet(how)
-    found = _found(root, board)["encoders"]
-    assert found[2] == expected
-    assert [one.partition(":")[0] for one in found[:2]] == ["good"] * 2
-
-
-def test_the_check_names_a_chip_that_does_not_answer(root: Path) -> None:
-    """A dead multiplexer is reported for each joint behind it."""
-    board = _board()
-    board.pins.dead_chips.add((1, 0x70))
-    found = _found(root, board)["encoders"]
-    assert len(found) == 4
-    assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in found)
-
-
-def test_checks_leave_the_encoders_of_a_served_robot_alone(root: Path) -> None:
-    """Selecting a channel would disturb the readings of a running guard."""
-    with socket.socket() as taken:
-        taken.bind(("", 0))
-        taken.listen()
-        found = _found(root, _board(), port=taken.getsockname()[1])
-    assert "encoders" not in found
-    assert found["wiring"] == [
-        "unknown: The robot may be served now, so its pins and buses were left alone."
-    ]
-
-
-@pytest.mark.parametrize(
-    ("config", "expected"),
-    [
-        ("dtparam=i2c_arm_baudrate=1000000", "good"),
-        ("dtparam=i2c_arm=on", "bad"),
-        ("#dtparam=i2c_arm_baudrate=400000", "bad"),
-        ("dtparam=i2c_arm_baudrate=100000", "bad"),
-    ],
-)
-def test_the_bus_speed_is_checked(root: Path, config: str, expected: str) -> None:
-    """The check applies only to robots with encoders."""
-    (root / "boot/config.txt").write_text(config)
-    assert _found(root, _board())["I2C speed"][0].startswith(expected)
-    assert "I2C speed" not in _found(root, _board(), profile=_CAR)

@@ -176,7 +176,7 @@ class Calibration:
                 live.update(Text(f"  {travelled_m:.2f} m by the encoder"))
                 for key in self._pressed(robot=robot):
                     if key == "enter":
-                        return wheel_changes(name, wheel_m, 1.0, travelled_m)
+                        return wheel_changes(name, wheel_m, travelled_m)
                     if key == "n":
                         return {}
 

@@ -24,6 +24,7 @@ from shapechanger.robot.check.pins import outside_level, pin_level
 from shapechanger.robot.check.report import (
     Checks,
     Finding,
+    Level,
     Results,
     finish_in_time,
     judged,
@@ -127,7 +128,7 @@ def _checks(robot: StandingRobot) -> Checks:
 
 
 def _computer_checks(robot: StandingRobot) -> Checks:
-    profile, config = robot.profile, BootConfig(robot.root)
+    profile = robot.profile
     if robot.installed:
         yield "profile", [("good", f"{profile.path} is valid.")]
         yield "credentials", _credentials(robot)
@@ -136,17 +137,19 @@ def _computer_checks(robot: StandingRobot) -> Checks:
             yield "calibration", [("unknown", remedy)]
         yield "systemd", _unit(robot)
     yield "computer", _computer(robot)
-    yield "strict_gpiod", _strict_gpiod(config)
-    yield "enable line", _enable_line(profile)
-    yield "output enable", _output_enable(profile)
+    yield "strict_gpiod", _strict_gpiod(BootConfig(robot.root))
+    yield "enable line", [_enable_line(profile)]
+    if any(board["output_enable"] == -1 for board in _boards(profile)):
+        reason = "A PCA9685 without output_enable keeps its last pulse: wire OE to a pin with "
+        yield "output enable", [("bad", reason + "a pull-up and name it as output_enable.")]
     yield "latency timer", _latency_timers(robot)
     yield "devices", _devices(robot)
     yield "packages", _packages(profile)
     if (camera := profile.camera) is not None:
         yield "camera", _camera(camera)
-        yield "camera's geometry", _geometry(camera)
+        yield "camera's geometry", [_geometry(camera)]
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        yield "I2C speed", _bus_speed(config)
+        yield "I2C speed", _bus_speed(BootConfig(robot.root))
 
 
 def _wiring_checks(robot: StandingRobot) -> Checks:
@@ -219,27 +222,17 @@ def _unit(robot: StandingRobot) -> Results:
     )
 
 
-def _enable_line(guard: GuardPlan) -> Results:
+def _enable_line(guard: GuardPlan) -> tuple[Level, str]:
     if all(map(stops_itself, guard.outputs)):
-        yield "good", "Each servo has its own watchdog, and releases when its bus is silent."
-    else:
-        yield judged(
-            guard.enable_pin is not None,
-            f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors "
-            "lose power, as servos without a watchdog must. Measure that once, because it cannot "
-            "be checked here.",
-            "The profile has no [enable] pin: if guard and supervisor are killed together, only "
-            "strict_gpiod and pull-downs are left. Fit the one-shot of the hardware guide.",
-        )
-
-
-def _output_enable(guard: GuardPlan) -> Results:
-    if any(board["output_enable"] == -1 for board in _boards(guard)):
-        yield (
-            "bad",
-            "A PCA9685 without output_enable keeps its last pulse: wire OE to a pin with "
-            "a pull-up and name it as output_enable.",
-        )
+        return "good", "Each servo has its own watchdog, and releases when its bus is silent."
+    return judged(
+        guard.enable_pin is not None,
+        f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors "
+        "lose power, as servos without a watchdog must. Measure that once, because it cannot "
+        "be checked here.",
+        "The profile has no [enable] pin: if guard and supervisor are killed together, only "
+        "strict_gpiod and pull-downs are left. Fit the one-shot of the hardware guide.",
+    )
 
 
 def _latency_timers(robot: StandingRobot) -> Results:
@@ -305,14 +298,13 @@ def _camera(plan: CameraPlan) -> Results:
         yield from finish_in_time(frame(), _CAMERA_S, late)
 
 
-def _geometry(plan: CameraPlan) -> Results:
-    """Check that policies that drive by waypoints can use the camera."""
+def _geometry(plan: CameraPlan) -> tuple[Level, str]:
+    """Judge whether policies that drive by waypoints can use the camera."""
     if plan.pitch_deg is None or plan.fovy_deg is None:
         reason = "pitch_deg and fovy_deg are not stated, which policies with waypoints need: "
-        yield "unknown", reason + "`shapechanger robot camera` measures them."
-    else:
-        view = f"It looks {plan.pitch_deg:g} degrees down and sees {plan.fovy_deg:g} degrees from "
-        yield "good", view + "top to bottom; `shapechanger robot camera` draws it."
+        return "unknown", reason + "`shapechanger robot camera` measures them."
+    view = f"It looks {plan.pitch_deg:g} degrees down and sees {plan.fovy_deg:g} degrees from "
+    return "good", view + "top to bottom; `shapechanger robot camera` draws it."
 
 
 def _bus_speed(config: BootConfig) -> Results:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -72,23 +73,20 @@ def motor_changes(
     return changes
 
 
-def wheel_changes(
-    sensor: str, wheel_m: float, pushed_m: float, measured_m: float
-) -> dict[str, float]:
-    """Return the changes for an encoder after the robot was pushed a known distance.
+def wheel_changes(sensor: str, wheel_m: float, measured_m: float) -> dict[str, float]:
+    """Return the changes for an encoder after the robot was pushed forward by 1 m.
 
     Args:
         sensor: Name of the encoder.
         wheel_m: Distance of one turn in the profile, m.
-        pushed_m: Distance that the robot was pushed, m.
         measured_m: Distance measured by the encoder, m; negative for backward.
     """
     if measured_m <= 0.0:
         raise RobotError(
-            f"{sensor} measured {measured_m:g} m for {pushed_m:g} m forward: check its wires, and "
-            "swap its pins `a` and `b` if it counts backward."
+            f"{sensor} measured {measured_m:g} m for 1 m forward: check its wires, and swap its "
+            "pins `a` and `b` if it counts backward."
         )
-    return {f"sensor.{sensor}.wheel_m": round(wheel_m * pushed_m / measured_m, 4)}
+    return {f"sensor.{sensor}.wheel_m": round(wheel_m / measured_m, 4)}
 
 
 _START_TICKS: Final = 50  # Half a second, in which servos start that get their power now.
@@ -112,16 +110,16 @@ def find_joint_zeros(
         `joints.MCP_flexion`; empty for a robot without encoders.
     """
     zeros: dict[str, int] = {}
+    counts_per_rad = COUNTS_PER_TURN / (2.0 * math.pi)
     for sensor in (one for one in plan.sensors if one.driver == "as5600"):
         with closing(connect_encoders(sensor, hardware)) as opened:
             for encoder in opened.encoders:
-                turns: list[float] = []
-                for _ in range(_READINGS):
-                    turns.append(opened.counts(encoder) * 2.0 * math.pi / COUNTS_PER_TURN)
-                    wait()
                 # The mean direction: the mean of counts around 0 would be half a turn.
-                mean = math.atan2(sum(map(math.sin, turns)), sum(map(math.cos, turns)))
-                counts = round(mean * COUNTS_PER_TURN / (2.0 * math.pi)) % COUNTS_PER_TURN
+                mean = 0j
+                for _ in range(_READINGS):
+                    mean += cmath.exp(1j * opened.counts(encoder) / counts_per_rad)
+                    wait()
+                counts = round(cmath.phase(mean) * counts_per_rad) % COUNTS_PER_TURN
                 zeros[f"{sensor.name}.{encoder.joint}"] = counts
     return zeros
 
