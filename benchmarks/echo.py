@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 from typing import Self
 
+import msgspec
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
@@ -28,8 +29,8 @@ from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard import messages as wire
-from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.guard import channel as wire
+from shapechanger.robot.guard.running import ServePlan, plan_fd
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.twin.camera import with_capture_time
 
@@ -74,13 +75,13 @@ class EchoRobot:
             ready_file=str(folder / "ready.json"),
         )
         guard = GuardPlan("echo", (ActionPlan("steering"), ActionPlan("throttle")), ())
-        plan = plan_fd(ServePlan(guard, daemon.to_dict()))
+        plan = plan_fd(ServePlan(guard, msgspec.to_builtins(daemon)))
         with ours, daemons:
             self._echo = subprocess.Popen(
                 [sys.executable, "-m", __name__, str(ours.fileno()), str(folder / "camera.mjpeg")],
                 pass_fds=(ours.fileno(),),
             )
-            command = [sys.executable, "-m", "shapechanger.robot.daemon"]
+            command = [sys.executable, "-m", "shapechanger.robot.daemon.process"]
             command += ["--plan-fd", str(plan), "--guard-fd", str(daemons.fileno())]
             self._daemon = subprocess.Popen(
                 command, pass_fds=(plan, daemons.fileno()), stderr=subprocess.DEVNULL

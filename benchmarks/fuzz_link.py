@@ -18,10 +18,11 @@ from pathlib import Path
 
 from shapechanger.errors import LinkError
 from shapechanger.layout import Feature, Layout
+from shapechanger.robot.daemon.client import MessageRate
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.session import Authenticator, MessageRate, Session
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (
     VERSION,
@@ -134,7 +135,7 @@ def resident_kb() -> int:
 
 
 def _drained(session: Session) -> None:
-    while session.outbox.take() is not None:
+    while session.client.take() is not None:
         pass
 
 
@@ -192,7 +193,7 @@ def fuzz(
         orders.clear()
         if number % 50_000 < 4:
             progress(number)
-    if not hub.lease.holds(0):
+    if hub.lease.holder is not owner.client:
         raise AssertionError("The owner lost the command.")
     return counts
 

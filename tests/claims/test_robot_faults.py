@@ -33,7 +33,7 @@ PILOT = "shapechanger.vehicles.remote.full_throttle"
 # Runs at the guard's priority and sleeps for 1 ms at a time. A line asks it for its longest delay.
 _WITNESS = """
 import select, sys, time
-from shapechanger.robot.guard.priority import GUARD, run_promptly
+from shapechanger.robot.guard.running import GUARD, run_promptly
 run_promptly(GUARD)
 longest_s, before_s = 0.0, time.monotonic()
 while True:

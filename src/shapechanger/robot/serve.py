@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+import msgspec
+
 from shapechanger.errors import LinkError, RobotError, UnknownName
 from shapechanger.robot.client.known_robots import (
     KnownRobot,
@@ -30,7 +32,7 @@ from shapechanger.robot.daemon.credentials import (
     make_credentials,
 )
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.serve_plan import ServePlan
+from shapechanger.robot.guard.running import ServePlan
 from shapechanger.robot.link.address import Address, is_loopback, parse_address
 from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.card import card_of
@@ -151,11 +153,11 @@ class Service:
             policy=policy,
             pilot=_PILOT if policies else "",
         )
-        guard = profile.guard_plan()
+        guard, fields = profile.guard_plan(), msgspec.to_builtins(daemon)
         if board is None:
-            return ServePlan(guard, daemon.to_dict())
+            return ServePlan(guard, fields)
         patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
-        return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)
+        return ServePlan(guard, fields, board.hardware, patience_ms=patience_ms)
 
     def make_known(
         self, name: str, plan: ServePlan, port: int, say: Callable[[str], object]

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import queue
 import socket
 from collections.abc import Callable
 from typing import Any
 
+import msgspec
+
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.guard.channel import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 from tests.robot.daemon.plans import guard_state
 
 
@@ -54,9 +55,9 @@ class FakeGuard:
         self.send()
 
     def send(self, **changes: Any) -> None:
-        self.state = dataclasses.replace(self.state, at_ns=self._now_ns(), **changes)
+        self.state = msgspec.structs.replace(self.state, at_ns=self._now_ns(), **changes)
         self._socket.send(encode(self.state))
-        self.state = dataclasses.replace(self.state, refused="", refused_seq=None)
+        self.state = msgspec.structs.replace(self.state, refused="", refused_seq=None)
 
     def kinds(self) -> list[str]:
         """Return the kinds of the orders so far."""
@@ -86,7 +87,7 @@ class FakeGuard:
             }
         elif order.kind == "command":
             changes = {"refused": "Not armed.", "refused_seq": order.seq}
-        self.state = dataclasses.replace(self.state, **changes)
+        self.state = msgspec.structs.replace(self.state, **changes)
 
 
 class FakeCamera:

@@ -10,7 +10,7 @@ import simplejpeg
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.messages import GuardState
+from shapechanger.robot.guard.channel import GuardState
 from shapechanger.robot.link.card import RobotCard
 
 SIZE = (160, 120)
@@ -55,20 +55,9 @@ def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
 
 def guard_state(**changes: Any) -> GuardState:
     fields: dict[str, Any] = {
-        "at_ns": 0,
-        "armed": False,
-        "emergency": False,
-        "emergencies": 0,
         "stop_reason": "Not armed.",
         "applied": (0.0, 0.0),
-        "applied_session": 0,
-        "applied_seq": None,
-        "applied_ns": None,
-        "refused": "",
-        "refused_seq": None,
-        "outputs": {},
         "quantities": {"speed": 0.25},
         "sources": {"speed": "wheel"},
-        "bumps": 0,
     }
     return GuardState(**(fields | changes))

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from shapechanger.robot.daemon.guard_link import GuardLink
-from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.daemon.process import GuardLink
+from shapechanger.robot.guard.channel import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 from tests.robot.daemon.plans import guard_state
 from tests.robot.daemon.running import until
 
@@ -48,7 +48,7 @@ def ends() -> Iterator[Ends]:
 def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
     ends.guard.send(encode(guard_state(at_ns=1)))
     ends.guard.send(b"nonsense")
-    ends.guard.send(b'{"at_ns": 3}')
+    ends.guard.send(b'{"at_ns": "3"}')
     ends.guard.send(encode(guard_state(at_ns=4)))
     ends.port.drain()
     assert [state.at_ns for state in ends.states] == [1, 4]

@@ -16,7 +16,6 @@ from shapechanger.robot.daemon.library import (
     Answer,
     LineIndex,
     Question,
-    RecordingFolder,
     RecordingLibrary,
 )
 from shapechanger.robot.link.messages import (
@@ -108,7 +107,7 @@ def test_a_summary_agrees_with_the_whole_episode(
 ) -> None:
     folder = tmp_path_factory.mktemp("kept")
     path = record(folder, count, "time")
-    recordings = RecordingFolder(folder)
+    recordings = RecordingLibrary(folder, lambda work: work())
     for good, one, other in [(True, 0, 0), *judgements]:
         first, last = sorted((one, other))
         if last < count:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
-
+import msgspec
 import pytest
 
-from shapechanger.errors import ProfileError
 from shapechanger.robot.daemon.plan import DaemonPlan
 from tests.robot.daemon.plans import car_plan
 
 
 def test_a_plan_round_trips() -> None:
     plan = car_plan(reward={"speed": 1.0}, reset=(((0.0, -0.3), 1.5), ((0.0, 0.0), 0.5)))
-    assert DaemonPlan.from_dict(json.loads(json.dumps(plan.to_dict()))) == plan
+    assert msgspec.convert(msgspec.to_builtins(plan), DaemonPlan) == plan
 
 
 @pytest.mark.parametrize(
@@ -29,8 +27,8 @@ def test_a_plan_round_trips() -> None:
     ],
 )
 def test_an_invalid_field_is_named(change: dict[str, object], words: str) -> None:
-    fields = car_plan().to_dict()
+    fields = msgspec.to_builtins(car_plan())
     name = next(iter(change))
     (fields["card"] if name in fields["card"] else fields).update(change)
-    with pytest.raises(ProfileError, match=words):
-        DaemonPlan.from_dict(json.loads(json.dumps(fields)))
+    with pytest.raises(msgspec.ValidationError, match=words):
+        msgspec.convert(fields, DaemonPlan)

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+import msgspec
 import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan
-from shapechanger.robot.daemon.guard_link import LIFELINE, send_lifeline
-from shapechanger.robot.guard.messages import encode
-from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.daemon.process import LIFELINE, send_lifeline
+from shapechanger.robot.guard.channel import encode
+from shapechanger.robot.guard.running import ServePlan, plan_fd
 from tests.robot.daemon.plans import car_plan, guard_state
 
 pytestmark = pytest.mark.realtime
@@ -46,7 +47,7 @@ class Started:
 @pytest.fixture
 def begun() -> Iterator[Started]:
     """A daemon that has no state from the guard yet."""
-    daemon = car_plan(camera=None, discovery=True).to_dict()
+    daemon = msgspec.to_builtins(car_plan(camera=None, discovery=True))
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
     plan = plan_fd(ServePlan(guard_plan, daemon))
     guard, guard_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -56,14 +57,7 @@ def begun() -> Iterator[Started]:
     ends["ready"] = ready_end
     arguments = [part for name, fd in ends.items() for part in (f"--{name}-fd", str(fd))]
     process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "shapechanger.robot.daemon",
-            *arguments,
-            "--ready-fd",
-            str(ready_end),
-        ],
+        [sys.executable, "-m", "shapechanger.robot.daemon.process", *arguments],
         pass_fds=tuple(ends.values()),
         stdin=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

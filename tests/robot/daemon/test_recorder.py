@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import queue
 import random
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,56 +17,91 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import (
-    EpisodeHeader,
-    Step,
-    episodes_of,
-    read_episode,
-    repair,
-    writer,
-)
+from shapechanger.demos.episodes import Episode, Step, episodes_of, read_episode, repair, writer
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.control import ClientIdentity, NumberedFrame
-from shapechanger.robot.daemon.recorder import (
-    DISK_TOO_SLOW,
-    EpisodeThread,
-    StepBuilder,
-)
-from shapechanger.robot.link.messages import Mark, Observation, Undo
-from tests.robot.daemon.plans import ACTIONS, picture
+from shapechanger.robot.daemon.client import Client
+from shapechanger.robot.daemon.recorder import DISK_TOO_SLOW, Recorder, StepBuilder
+from shapechanger.robot.link.messages import Mark, Observation, RecorderState, Refused, Undo
+from tests.robot.daemon.plans import car_plan, picture
 
 pytestmark = pytest.mark.realtime
 
-HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
 WITHIN_S = 20.0
 
 
 def step(number: int) -> tuple[Step, bytes]:
     """Return a step that encodes its number, and its frame."""
     return (
-        Step(action=(0.0, number / 1e6), driver="person", captured_ns=number * 50_000_000),
+        Step(
+            action=(0.0, number / 1e6),
+            driver="person",
+            state=(0.0, 0.0, 0.0),
+            captured_ns=number * 50_000_000,
+        ),
         picture(number % 5),
     )
 
 
+class Recording:
+    """A recorder that Ada began, and the messages that she and all clients were sent."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.told: list[Any] = []
+        self.ada = Client(1, "Ada", "person")
+        self._calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        plan = car_plan(recordings=str(folder))
+        self.recorder = Recorder(plan, self.told.append, self._calls.put)
+        assert self.recorder.begin(self.ada, "corridor", "") == ""
+
+    @property
+    def state(self) -> RecorderState:
+        return self.recorder.state()
+
+    def add(self, made: Step, jpeg: bytes | None) -> None:
+        self.recorder._add(made, jpeg)
+
+    def edit(self, request: Mark | Undo) -> None:
+        assert self.recorder.edit(request, self.ada) == ""
+
+    def listen(self, until: Callable[[], object]) -> None:
+        """Call the functions of the thread until a condition holds."""
+        while not until():
+            self._calls.get(timeout=WITHIN_S)()
+
+    def end(self, outcome: str) -> list[Episode]:
+        """End the recording, and return its episodes."""
+        self.recorder.end(outcome)
+        episode = self.recorder._episode
+        assert episode is not None
+        self.listen(lambda: not episode.jobs)
+        return [read_episode(path) for path in episodes_of(self.folder)]
+
+    def refusals(self) -> list[str]:
+        """Return the refusals to Ada so far."""
+        found: list[str] = []
+        while (message := self.ada.take()) is not None:
+            assert isinstance(message, Refused)
+            found.append(message.reason)
+        return found
+
+
 def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
-    reports: list[tuple[str, str]] = []
-    answers: list[str] = []
-    thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report))
-    thread.edit(Mark(text="too early"), answers.append)
-    thread.edit(Undo(), answers.append)
-    assert all(thread.add(*step(number)) for number in range(40))
-    thread.edit(Mark(text="here"), answers.append)
-    thread.edit(Undo(seconds=0.5), answers.append)
-    thread.end("time")
-    assert thread.add(*step(41))  # Ignored after the end.
-    assert thread.join(WITHIN_S)
-    assert reports == [("begun", ""), ("ended", "")]
-    assert answers == ["There is no step to mark yet.", "There is nothing to undo.", "", ""]
-    episode = read_episode(tmp_path / thread.progress.episode)
+    recording = Recording(tmp_path)
+    recording.edit(Mark(text="too early"))
+    recording.edit(Undo())
+    for number in range(40):
+        recording.add(*step(number))
+    recording.edit(Mark(text="here"))
+    recording.edit(Undo(seconds=0.5))
+    (episode,) = recording.end("time")
+    assert recording.recorder.end() == "Nothing is being recorded."
+    assert recording.refusals() == ["There is no step to mark yet.", "There is nothing to undo."]
+    assert [state.marks for state in recording.told] == [0, 1, 1, 1]
     assert (episode.closed, episode.outcome) == (True, "time")
+    assert episode.header.notes == {"name": "corridor", "recorded_by": "Ada"}
     assert [s.action[1] for s in episode.steps] == [number / 1e6 for number in range(40)]
-    assert (len(episode.kept), thread.progress.dropped) == (30, 10)
+    assert (len(episode.kept), recording.state.dropped) == (30, 10)
     assert [mark.step for mark in episode.marks] == [39]
 
 
@@ -72,18 +109,15 @@ def test_a_full_episode_goes_on_in_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "FULL_BYTES", 2000)
-    reports: list[tuple[str, str]] = []
-    answers: list[str] = []
-    thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report))
+    recording = Recording(tmp_path)
     for number in range(40):
         made, jpeg = step(number)
-        assert thread.add(made, jpeg if number % 3 == 0 else None)
-        thread.edit(Mark(text=str(number)), answers.append)
-    thread.end("time")
-    assert thread.join(WITHIN_S)
-    episodes = [read_episode(path) for path in episodes_of(tmp_path)]
+        recording.add(made, jpeg if number % 3 == 0 else None)
+        recording.edit(Mark(text=str(number)))
+    episodes = recording.end("time")
     assert len(episodes) > 3
-    assert reports == [("begun", "")] * len(episodes) + [("ended", "")]
+    names = dict.fromkeys(state.episode for state in recording.told)
+    assert list(names) == [e.path.name for e in episodes]
     assert [e.outcome for e in episodes] == ["continued"] * (len(episodes) - 1) + ["time"]
     assert [e.header.notes.get("continues") for e in episodes[1:]] == [
         e.path.name for e in episodes[:-1]
@@ -92,51 +126,51 @@ def test_a_full_episode_goes_on_in_the_next(
     assert numbers == list(range(40))
     seen = [e.jpeg(s) for e in episodes for s in e.steps]
     assert seen == [step(number - number % 3)[1] for number in range(40)]
-    assert set(answers) == {""}
+    assert recording.refusals() == []
     assert [len(e.marks) for e in episodes] == [len(e.steps) for e in episodes]
 
 
-@pytest.mark.parametrize("bytes_each", [0, 1 << 20])
-def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_each: int) -> None:
-    busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
-    reports: list[tuple[str, str]] = []
-    thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report), after=busy)
-    taken = 0
+@pytest.mark.parametrize(("bytes_each", "fits"), [(0, 255), (1 << 20, 15)])
+def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(
+    tmp_path: Path, bytes_each: int, fits: int
+) -> None:
+    recording = Recording(tmp_path)
     large = b"\xff\xd8" + bytes(bytes_each)
-    while thread.add(step(taken)[0], large):
+    taken = 0
+    while recording.recorder.on:  # As far as the recorder knows, the disk does nothing.
+        recording.add(step(taken)[0], large)
         taken += 1
-        assert taken < 10_000
-    busy.end()
-    assert thread.join(WITHIN_S)
-    assert reports == [("begun", ""), ("ended", "")]
-    episode = read_episode(tmp_path / thread.progress.episode)
-    assert episode.outcome == DISK_TOO_SLOW
-    assert len(episode.steps) == taken == (15 if bytes_each else 256)
+    assert recording.told == [RecorderState(text=DISK_TOO_SLOW)]
+    recording.listen(lambda: recording.state.steps == fits and len(recording.told) == 3)
+    (path,) = episodes_of(tmp_path)
+    episode = read_episode(path)
+    assert (episode.closed, episode.outcome) == (True, DISK_TOO_SLOW)
+    assert len(episode.steps) == taken - 1 == fits
 
 
-def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
+def test_an_error_of_the_disk_is_reported_once(tmp_path: Path) -> None:
     (tmp_path / "kept").write_text("in the way")
-    reports: list[tuple[str, str]] = []
-    thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *report: reports.append(report))
-    assert thread.join(WITHIN_S)
-    ((what, trouble),) = reports
-    assert (what, thread.progress.episode) == ("ended", "")
-    assert "Cannot write" in trouble
+    recording = Recording(tmp_path / "kept")
+    for number in range(3):
+        recording.add(*step(number))
+    recording.listen(lambda: not recording.recorder.on)
+    (refusal,) = recording.refusals()
+    assert "Cannot write" in refusal
+    assert recording.told == [recording.state] == [RecorderState(text=refusal)]
 
 
 _WRITES_FOR_EVER = """
 import sys
 from pathlib import Path
-from tests.robot.daemon.test_recorder import HEADER, step
-from shapechanger.robot.daemon.recorder import EpisodeThread
+from tests.robot.daemon.test_recorder import Recording, step
 
-thread, number = EpisodeThread(Path(sys.argv[1]), HEADER, lambda *_: None), 0
+recording, number = Recording(Path(sys.argv[1])), 0
 while True:
-    if thread.progress.steps >= number - 100:
-        thread.add(*step(number))
-        number += 1
+    recording.add(*step(number))
+    number += 1
+    recording.listen(lambda: recording.state.steps >= number - 100)
     if number % 20 == 0:
-        print(thread.progress.steps, flush=True)
+        print(recording.state.steps, flush=True)
 """
 
 
@@ -165,7 +199,7 @@ def test_an_episode_of_a_killed_daemon_can_be_repaired(tmp_path: Path) -> None:
         assert all(episode.jpeg(s) == picture(s.index % 5) for s in episode.steps)
 
 
-ADA, NET = ClientIdentity(1, "Ada", "person"), ClientIdentity(2, "net", "program")
+ADA, NET = Client(1, "Ada", "person"), Client(2, "net")
 
 
 def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
@@ -193,9 +227,9 @@ def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
     return Observation(**(fields | changes))
 
 
-def frame(seq: int) -> NumberedFrame:
+def frame(seq: int) -> Frame:
     """Build a frame that encodes its number."""
-    return NumberedFrame(seq, Frame(b"jpeg %d" % seq, seq))
+    return Frame(b"jpeg %d" % seq, seq)
 
 
 class Built:
@@ -215,10 +249,10 @@ def built() -> Built:
 
 
 def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
-    built.builder.observed(1, seen(1, 100, suggested=(0.9,)), frame(1))
+    built.builder.observed(ADA, seen(1, 100, suggested=(0.9,)), frame(1))
     built.builder.decided(ADA, 1, (0.5,), 110)
     assert built.written == []
-    built.builder.observed(1, seen(2, 120, stop_reason="A bump."), frame(2))
+    built.builder.observed(ADA, seen(2, 120, stop_reason="A bump."), frame(2))
     built.builder.complete()
     ((step, jpeg),) = built.written
     assert jpeg == b"jpeg 1"
@@ -228,7 +262,7 @@ def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
 
 
 def test_the_later_of_two_decisions_counts(built: Built) -> None:
-    built.builder.observed(1, seen(1, 100), None)
+    built.builder.observed(ADA, seen(1, 100), None)
     built.builder.decided(ADA, 1, (0.5,), 110)
     built.builder.decided(ADA, 1, (0.0,), 115)
     built.builder.complete()
@@ -237,19 +271,19 @@ def test_the_later_of_two_decisions_counts(built: Built) -> None:
 
 
 def test_a_command_for_an_unknown_observation_is_skipped(built: Built) -> None:
-    built.builder.observed(1, seen(1, 100), None)
+    built.builder.observed(ADA, seen(1, 100), None)
     for who, answers in ((ADA, 2), (NET, 1)):
         built.builder.decided(who, answers, (0.5,), 110)
-    built.builder.forget(1)
+    built.builder.forget(ADA)
     built.builder.decided(ADA, 1, (0.5,), 110)
     built.builder.complete()
     assert built.written == []
 
 
 def test_a_client_without_control_does_not_complete_applied_outputs(built: Built) -> None:
-    built.builder.observed(2, seen(1, 100), None)
+    built.builder.observed(NET, seen(1, 100), None)
     built.builder.decided(NET, 1, (0.5,), 110)
-    built.builder.observed(2, seen(2, 120, mine=False), None)
+    built.builder.observed(NET, seen(2, 120, mine=False), None)
     ((step, _),) = built.written
     assert step.applied is None
 
@@ -260,18 +294,19 @@ def test_a_client_without_control_does_not_complete_applied_outputs(built: Built
     )
 )
 def test_times_increase_and_no_frame_repeats(
-    events: list[tuple[bool, ClientIdentity, int]],
+    events: list[tuple[bool, Client, int]],
 ) -> None:
     built = Built()
-    newest = {ADA.session: 0, NET.session: 0}
+    newest = {ADA: 0, NET: 0}
+    pictures_seen = [frame(number) for number in range(22)]
     for now_ns, (looks, who, back) in enumerate(events):
         if looks:
-            newest[who.session] += 1
-            picture = frame(1 + now_ns // 3)  # Each picture is seen a few times.
-            sent = seen(newest[who.session], picture.seq)
-            built.builder.observed(who.session, sent, picture)
+            newest[who] += 1
+            picture = pictures_seen[1 + now_ns // 3]  # Each picture is seen a few times.
+            sent = seen(newest[who], picture.captured_ns)
+            built.builder.observed(who, sent, picture)
         else:
-            built.builder.decided(who, newest[who.session] - back, (0.5,), now_ns)
+            built.builder.decided(who, newest[who] - back, (0.5,), now_ns)
     built.builder.complete()
     for times in ("captured_ns", "decided_ns"):
         found = [getattr(step, times) for step, _ in built.written]

@@ -14,7 +14,7 @@ import aiohttp
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.daemon import connection, server
+from shapechanger.robot.daemon import server, session
 from shapechanger.robot.daemon.credentials import make_credentials, read_key
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import PreAuthConnections
@@ -91,7 +91,7 @@ def test_a_wrong_key_is_refused_slowly(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, key = secured
-    monkeypatch.setattr(server, "_WRONG_KEY_S", 0.05)
+    monkeypatch.setattr(session, "_WRONG_KEY_S", 0.05)
 
     async def script(robot: Running) -> None:
         loop = asyncio.get_running_loop()
@@ -117,7 +117,7 @@ def test_a_proof_for_another_challenge_is_refused(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, spoiled: str
 ) -> None:
     plan, key = secured
-    monkeypatch.setattr(server, "_WRONG_KEY_S", 0.0)
+    monkeypatch.setattr(session, "_WRONG_KEY_S", 0.0)
 
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
@@ -222,7 +222,7 @@ def test_a_huge_message_ends_the_connection_early(play: Any) -> None:
 def test_a_client_without_a_hello_is_disconnected(
     play: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connection, "HELLO_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(session, "HELLO_TIMEOUT_S", 0.05)
 
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
@@ -563,7 +563,7 @@ def test_a_ping_is_answered_with_the_time(play: Any) -> None:
 
 def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     patience_s = 3.0
-    monkeypatch.setattr(connection, "_SEND_S", patience_s)
+    monkeypatch.setattr(session, "_SEND_S", patience_s)
 
     async def script(robot: Running) -> None:
         connecting = robot.connect()

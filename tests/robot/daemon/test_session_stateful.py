@@ -11,9 +11,10 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from shapechanger.errors import LinkError
 from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.client import Client
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Authenticator, Session
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.link.messages import (
     VERSION,
     Arm,
@@ -264,20 +265,20 @@ class Robot(RuleBasedStateMachine):
     @invariant()
     def the_newest_suggestion_is_shown_until_it_expires(self) -> None:
         """Values and sender equal the model's."""
-        shown, expected = self.hub.suggested(), self.suggestion
+        shown, expected = self.hub.observation(Client(0), 1, None), self.suggestion
         if expected is None or self.now_ns > expected[2]:
-            assert shown is None
+            assert (shown.suggested, shown.suggested_by) == ((), "")
         else:
-            assert shown is not None
-            assert shown.values == expected[1]
-            assert shown.client == self.sessions[expected[0]].client
+            name = self.sessions[expected[0]].client.name
+            assert (shown.suggested, shown.suggested_by) == (expected[1], name)
 
     @invariant()
     def no_command_is_in_force_without_a_holder(self) -> None:
+        commanded = self.hub.observation(Client(0), 1, None).commanded
         if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
-            assert self.hub.commanded() == ()
-        elif self.hub.commanded():
-            assert self.hub.commanded() == self.allowed[-1][1]
+            assert commanded == ()
+        elif commanded:
+            assert commanded == self.allowed[-1][1]
 
     def forget_suggestion(self, place: int) -> None:
         """Drop the suggestion of the client at a place."""

@@ -10,7 +10,7 @@ from shapechanger.contract.plan import (
     SensorPlan,
     StopPlan,
 )
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.channel import Order
 
 MS = 1_000_000
 """Nanoseconds of a millisecond."""

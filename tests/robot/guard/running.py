@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.guard.running import ServePlan, plan_fd
 from tests.robot.guard.plans import quick_car
 from tests.robot.guard.recording import Record
 from tests.robot.guard.waiting import until

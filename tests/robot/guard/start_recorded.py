@@ -32,12 +32,12 @@ def main(program: str, arguments: list[str]) -> None:
 
     python = sys.executable
     here = Path(__file__)
-    commands = supervisor.ProcessCommands(
-        guard=(python, "-I", str(here), "guard"),
-        daemon=(python, "-I", str(here.with_name("stand_in.py"))),
-    )
+    commands = {
+        "guard": [python, "-I", str(here), "guard"],
+        "daemon": [python, "-I", str(here.with_name("stand_in.py"))],
+    }
     # Use the real plan, but these commands.
-    supervisor.ProcessCommands.of = classmethod(lambda cls, plan: commands)
+    supervisor.command_of = lambda name, _: commands[name]
     supervisor.main(arguments)
 
 

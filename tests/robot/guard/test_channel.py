@@ -1,15 +1,26 @@
-"""The guard's end of the daemon socket detects the loss of the daemon."""
+"""The guard's end of the daemon socket, and strict decoding of its messages."""
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 from collections.abc import Iterator
 
+import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from shapechanger.robot.guard.channel import DaemonChannel
-from shapechanger.robot.guard.messages import Order, encode
+from shapechanger.robot.guard.channel import (
+    MAX_DATAGRAM,
+    DaemonChannel,
+    GuardState,
+    Order,
+    decode_order,
+    decode_state,
+    encode,
+)
 
 
 @pytest.fixture
@@ -20,6 +31,20 @@ def ends() -> Iterator[tuple[DaemonChannel, socket.socket]]:
     yield channel, theirs
     channel.close()
     theirs.close()
+
+
+def test_a_malformed_datagram_is_reported_and_the_next_order_arrives(
+    ends: tuple[DaemonChannel, socket.socket],
+) -> None:
+    channel, daemon = ends
+    for data in (b"{", b"x" * (MAX_DATAGRAM + 1), encode(Order(kind="halt"))):
+        daemon.send(data)
+    orders, malformed = channel.orders()
+    assert orders == [Order(kind="halt")]
+    assert [words.partition(":")[0] for words in malformed] == [
+        "Invalid order",
+        f"A datagram is larger than {MAX_DATAGRAM} bytes.",
+    ]
 
 
 def test_a_closed_socket_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.socket]) -> None:
@@ -56,3 +81,81 @@ def test_a_second_life_pipe_is_closed(ends: tuple[DaemonChannel, socket.socket])
     os.write(pipes[0][1], b"x")  # The first pipe is still open.
     for _, held in pipes:
         os.close(held)
+
+
+_ORDER = Order("command", 1, 2, 3, 4, 5, (0.5, -1.0), 6, "why", True)
+_STATE = GuardState(
+    1, True, False, 2, "", (0.5,), 3, 4, 5, "", None, {"drive": 0.5}, {"speed": 1.0}, {}, 0
+)
+
+
+def test_orders_and_states_round_trip() -> None:
+    assert decode_order(encode(_ORDER)) == _ORDER
+    assert decode_state(encode(_STATE)) == _STATE
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("kind", "dance"),
+        ("kind", ["command"]),
+        ("session", 1.0),
+        ("seq", True),
+        ("issued_ns", None),
+        ("ttl_ms", "1"),
+        ("emergency", []),
+        ("frame_ns", 1.5),
+        ("values", 3),
+        ("values", ["0"]),
+        ("values", [True]),
+        ("values", [float("nan")]),
+        ("values", [float("inf")]),
+        ("values", [10**400]),
+        ("reason", 5),
+        ("person", 1),
+        ("other", 1),
+    ],
+)
+def test_an_invalid_order_is_refused(field: str, value: object) -> None:
+    data = json.dumps(msgspec.structs.asdict(_ORDER) | {field: value}).encode()
+    with pytest.raises(ValueError, match=r"."):
+        decode_order(data)
+
+
+def test_a_state_with_long_reasons_fits_into_a_datagram() -> None:
+    words = "\N{GRINNING FACE}" * 250
+    state = msgspec.structs.replace(_STATE, stop_reason=words, refused=words)
+    assert len(encode(state)) < MAX_DATAGRAM // 4
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff", b"[]", b"1", b"[" * 16_000, b"\x00"])
+def test_anything_but_a_json_object_is_refused(data: bytes) -> None:
+    for decode in (decode_order, decode_state):
+        with pytest.raises(ValueError, match=r"."):
+            decode(data)
+
+
+@given(st.binary(max_size=200))
+def test_decoding_bytes_gives_an_order_or_a_value_error(data: bytes) -> None:
+    try:
+        assert isinstance(decode_order(data), Order)
+    except ValueError:
+        return
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([*msgspec.structs.asdict(_ORDER), "x"]),
+        st.recursive(
+            st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+            lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner),
+            max_leaves=5,
+        ),
+    )
+)
+def test_decoding_objects_gives_an_order_or_a_value_error(fields: dict[str, object]) -> None:
+    try:
+        order = decode_order(json.dumps({"kind": "command"} | fields).encode())
+    except ValueError:
+        return
+    assert all(abs(value) < float("inf") for value in order.values)

@@ -7,7 +7,7 @@ import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, SensorPlan, StopPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.rules import Rules
 from shapechanger.robot.guard.sensors import Sensing
 from tests.robot.guard.plans import MS, arm, car, command, quick_car

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.rules import Rules
 from shapechanger.robot.guard.sensors import Sensing
 from tests.robot.guard.plans import MS, car

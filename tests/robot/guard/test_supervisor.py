@@ -18,8 +18,8 @@ import pytest
 
 from shapechanger.contract.plan import GuardPlan, LimitPlan
 from shapechanger.robot.guard import supervisor
-from shapechanger.robot.guard.serve_plan import ServePlan
-from shapechanger.robot.guard.supervisor import ProcessCommands, Supervisor
+from shapechanger.robot.guard.running import ServePlan
+from shapechanger.robot.guard.supervisor import Restarts, Supervisor
 from shapechanger.robot.hardware import Hardware
 from tests.robot.guard.plans import MS, quick_car
 from tests.robot.guard.running import running
@@ -228,7 +228,7 @@ class _Daemon(_Stuck):
 def _supervisor(end_reason: str, **daemon: object) -> Iterator[Supervisor]:
     """A supervisor without processes."""
     log = logging.getLogger("test")
-    one = Supervisor(ServePlan(quick_car(), daemon), -1, ProcessCommands((), ()), log)
+    one = Supervisor(ServePlan(quick_car(), daemon), -1, log)
     one._end_reason = end_reason
     with one._woken, one._waker:
         yield one
@@ -296,3 +296,22 @@ def test_an_unknown_driver_ends_the_supervisor(tmp_path: Path) -> None:
     with running(tmp_path, plan) as robot:
         assert robot.process.wait(20) == 2
     assert "magic" in _log(tmp_path)
+
+
+def test_restarts_are_limited_per_period() -> None:
+    restarts = Restarts(most=2, within_s=60.0)
+    second = 10**9
+    assert [restarts.may_restart(t * second) for t in (0, 30, 59, 60, 61, 90)] == [
+        True,
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
+
+
+def test_restarts_back_off() -> None:
+    restarts = Restarts()
+    pauses = [restarts.pause_s for t in range(5) if restarts.may_restart(t)]
+    assert pauses == pytest.approx([0.0, 0.2, 0.6, 1.4, 3.0])

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from inspect import signature
 from typing import Any, Final, cast
 
+import msgspec
 import numpy as np
 import simplejpeg
 
@@ -20,11 +21,13 @@ from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.control import NumberedFrame, StateReader, build_observation
-from shapechanger.robot.guard.messages import GuardState, Order
+from shapechanger.robot.daemon.client import Client
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.guard.channel import DaemonChannel, GuardState, Order
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.link.card import card_of
-from shapechanger.robot.link.messages import Observation, Welcome
+from shapechanger.robot.link.messages import Command, Observation, Welcome
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.board import START_NS
 from shapechanger.robot.twin.hardware import SteadyClock, TwinHardware
@@ -108,7 +111,7 @@ class _Clock:
 
 
 class _Orders:
-    """Orders of this process and the newest state of the guard; see `Channel`."""
+    """Orders of this process and the newest state of the guard; see `DaemonChannel`."""
 
     def __init__(self) -> None:
         self.lost = False
@@ -151,14 +154,15 @@ class InProcessRobot:
         self._seed = seed
         camera = profile.camera if pictures else None
         self._camera = camera
-        state_layout, action_layout = profile.state_layout(), profile.action_layout()
-        self._reader = StateReader(state_layout, action_layout)
         self._tick_ns = round(1e9 / self._plan.tick_hz)
         self._period_ns = round(1e9 / profile.control_hz)
         card = card_of(profile, arming="anyone", clock="twin", pictures=pictures)
         self.welcome = Welcome.of(card, _SESSION)
         self._guard: Guard | None = None
-        self._pictured = 0  # Counts through all starts, so that each picture has its own number.
+        # Numbers pictures through all starts.
+        self._hub = SessionHub(DaemonPlan(card=card), lambda: self.now_ns, self._send)
+        self._client = Client(_SESSION)
+        self._hub.lease.take(self._client)
         self._start()
 
     @property
@@ -198,19 +202,10 @@ class InProcessRobot:
             The observation at the end of the period, and whether the robot bumped into something.
         """
         bumps = self._state.bumps
-        self._command_ns = self._board.hardware.clock.now_ns()
         self._seq += 1
-        self._orders.waiting.append(
-            Order(
-                kind="command",
-                session=_SESSION,
-                seq=self._seq,
-                issued_ns=self._command_ns,
-                ttl_ms=self._profile.limits.deadline_ms,
-                frame_ns=self._board.hardware.clock.now_ns(),
-                values=tuple(values),
-            )
-        )
+        ttl_ms = self._profile.limits.deadline_ms
+        command = Command(seq=self._seq, answers=0, values=tuple(values), ttl_ms=ttl_ms)
+        self._hub.command(self._client, command, self.now_ns)
         self._advance(self._period_ns)
         return self._observe(), self._state.bumps > bumps
 
@@ -259,11 +254,16 @@ class InProcessRobot:
         self.close()
         self._board = LocalBoard(self._wiring, self._world, self._seed)
         self._orders = _Orders()
-        self._guard = Guard(self._plan, self._board.hardware, self._orders, _log)
+        self._guard = Guard(
+            self._plan, self._board.hardware, cast("DaemonChannel", self._orders), _log
+        )
         self._seq = 0
         self._observed = 0
-        self._command_ns: int | None = None
         self._advance(self._period_ns)
+
+    def _send(self, order: Order) -> None:
+        # A robot in this process sees, with a picture or without.
+        self._orders.waiting.append(msgspec.structs.replace(order, frame_ns=self.now_ns))
 
     def _advance(self, ns: int) -> None:
         """Advance time, with a round of the guard at each of its ticks."""
@@ -286,23 +286,12 @@ class InProcessRobot:
 
     def _observe(self) -> Observation:
         self._observed += 1
-        newest = None
+        now_ns = self._board.hardware.clock.now_ns()
         if self._camera is not None:
-            self._pictured += 1
             quality = self._camera.jpeg_quality
             jpeg = simplejpeg.encode_jpeg(
                 np.ascontiguousarray(self._world.picture()), quality, "RGB", "444"
             )
-            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.hardware.clock.now_ns()))
-        return build_observation(
-            seq=self._observed,
-            now_ns=self._board.hardware.clock.now_ns(),
-            reader=self._reader,
-            state=self._state,
-            newest=newest,
-            frame_sent=self._pictured - 1,
-            lease=_SESSION,
-            command_ns=self._command_ns,
-            holder=None,
-            mine=True,
-        )
+            self._hub.on_frame(Frame(jpeg, now_ns))
+        self._hub.on_state(self._state)
+        return self._hub.observation(self._client, self._observed, self._hub.frame_seq - 1)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.guard import start
-from shapechanger.robot.guard.messages import Order, encode
-from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.guard.channel import Order, encode
+from shapechanger.robot.guard.running import ServePlan, plan_fd
 from shapechanger.robot.twin.judge import propelled, time_to_rest, unauthorised
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.signals import read_ledger

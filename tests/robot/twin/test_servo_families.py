@@ -20,9 +20,9 @@ from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
 from shapechanger.robot.drivers.servos.rig import Rig
 from shapechanger.robot.guard import start
-from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
+from shapechanger.robot.guard.channel import GuardState, Order, decode_state, encode
 from shapechanger.robot.guard.outputs import Switches, make_safe
-from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.guard.running import ServePlan, plan_fd
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.setup.calibration import find_zeros

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Annotated, Final
 
+import msgspec
 import tyro
 
 from shapechanger.cli.console import say
@@ -27,7 +28,7 @@ from shapechanger.errors import (
 from shapechanger.robot.check.pins import require_pins
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import ENDING, policies_in
-from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
+from shapechanger.robot.guard.running import plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
@@ -62,7 +63,7 @@ class Serve(Service):
         with contextlib.ExitStack() as undo:
             board = self.board(profile, lambda: self._place(profile), undo) if self.twin else None
             plan = self.plan(profile, board)
-            self._require_policy(DaemonPlan.from_dict(plan.daemon))
+            self._require_policy(msgspec.convert(plan.daemon, DaemonPlan))
             if board is None:
                 require_pins(profile.guard_plan())
             port = require_free(str(plan.daemon["host"]), self.port)

@@ -7,15 +7,17 @@ import datetime
 import os
 import ssl
 import stat
-from dataclasses import dataclass
+from collections.abc import Generator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from shapechanger.errors import LinkError, OutputError, RobotError
+from shapechanger.errors import LinkError, OutputError, RobotError, translate_errors
 from shapechanger.files import write_new
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link.address import is_loopback
-from shapechanger.robot.link.authentication import fingerprint_of, new_key, parse_key
+from shapechanger.robot.link.authentication import fingerprint_of, is_proof, new_key, parse_key
+from shapechanger.robot.link.messages import Hello
 
 _KEY: Final = "key"
 _CERTIFICATE: Final = "certificate.pem"
@@ -39,6 +41,30 @@ class Credentials:
     certificate: Path
     private_key: Path
     fingerprint: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Authenticator:
+    """Checks that a client holds the robot's key.
+
+    Attributes:
+        key: The key; empty to accept every client.
+        certificate: Fingerprint of the certificate; empty without TLS.
+    """
+
+    key: bytes = field(default=b"", repr=False)  # It does not belong in a log.
+    certificate: bytes = b""
+
+    @property
+    def is_open(self) -> bool:
+        """True if the robot has no key and accepts every client."""
+        return not self.key
+
+    def accepts(self, hello: Hello, nonce: bytes) -> bool:
+        """Return True if the proof in `hello` answers `nonce` with the right key."""
+        if self.is_open:
+            return True
+        return is_proof(hello.proof, self.key, nonce, self.certificate, hello.role)
 
 
 def credentials_folder(name: str) -> Path:
@@ -98,10 +124,13 @@ def load_credentials(folder: Path) -> Credentials:
 def read_key(file: Path) -> bytes:
     """Read the key in a file."""
     _check_private(file)
-    try:
+    with translate_errors(
+        OSError,
+        UnicodeDecodeError,
+        LinkError,
+        to=lambda error: RobotError(f"Cannot read the key in {file}: {error}"),
+    ):
         return parse_key(file.read_text())
-    except (OSError, UnicodeDecodeError, LinkError) as error:
-        raise RobotError(f"Cannot read the key in {file}: {error}") from error
 
 
 def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, bytes]:
@@ -110,10 +139,9 @@ def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, by
     fingerprint = _fingerprint(certificate)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
-    try:
+    words = f"{certificate} and {private_key} do not match"
+    with translate_errors(OSError, to=lambda error: RobotError(f"{words}: {error}.")):
         context.load_cert_chain(certificate, private_key)
-    except (OSError, ssl.SSLError) as error:
-        raise RobotError(f"{certificate} and {private_key} do not match: {error}.") from error
     return context, fingerprint
 
 
@@ -128,29 +156,29 @@ def check_exposure(plan: DaemonPlan) -> None:
 
 
 def _fingerprint(certificate: Path) -> bytes:
-    try:
+    with _readable(certificate):
         return fingerprint_of(ssl.PEM_cert_to_DER_cert(certificate.read_text().strip()))
-    except FileNotFoundError as error:
-        raise _missing(certificate) from error
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise RobotError(f"Cannot read the certificate {certificate}: {error}.") from error
 
 
 def _check_private(file: Path) -> None:
-    try:
+    with _readable(file):
         mode = file.stat().st_mode
-    except FileNotFoundError as error:
-        raise _missing(file) from error
-    except OSError as error:
-        raise RobotError(f"Cannot read {file}: {error}.") from error
     if mode & _OTHERS:
         raise RobotError(
             f"Other users can read {file}. Run `chmod 600 {file}`, or better, make a new one."
         )
 
 
-def _missing(file: Path) -> RobotError:
-    return RobotError(f"{file} does not exist. Run `shapechanger robot init` to make it.")
+@contextlib.contextmanager
+def _readable(file: Path) -> Generator[None]:
+    """Refuse a file that is missing or cannot be read."""
+    try:
+        yield
+    except FileNotFoundError as error:
+        hint = "Run `shapechanger robot init` to make it."
+        raise RobotError(f"{file} does not exist. {hint}") from error
+    except (OSError, ValueError) as error:
+        raise RobotError(f"Cannot read {file}: {error}.") from error
 
 
 def _self_signed(name: str) -> tuple[bytes, bytes]:

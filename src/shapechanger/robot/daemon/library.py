@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import os
-import queue
 import re
-import threading
 from array import array
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, Final
-
-import msgspec
-from msgspec import Meta
+from typing import BinaryIO, Final
 
 from shapechanger.demos.episodes import drop, keep
 from shapechanger.demos.episodes.files import (
@@ -24,9 +18,9 @@ from shapechanger.demos.episodes.files import (
     is_episode,
     read_file,
 )
-from shapechanger.demos.episodes.reader import read_header
-from shapechanger.demos.episodes.records import durations_s
+from shapechanger.demos.episodes.outline import frame_of, read_outline
 from shapechanger.errors import DemosError, ShapechangerError
+from shapechanger.robot.daemon.recorder import Worker
 from shapechanger.robot.link import messages
 
 Question = messages.Browse | messages.Fetch | messages.Judge
@@ -38,65 +32,35 @@ _CHUNK: Final = 1 << 16
 _JOIN_S: Final = 2.0
 
 
-class _Line(msgspec.Struct, frozen=True):
-    """What the library needs of a line of `steps.jsonl`; an hour of steps has 72 000."""
-
-    kind: str
-    step: int = -1
-    first: int = 0
-    last: int = -1
-    captured_ns: int | None = None
-    decided_ns: int | None = None
-    # File, size and checksum. Such a name never leads to another folder.
-    frame: tuple[Annotated[str, Meta(pattern=r"^[0-9]{6,}\.jpg\Z")], Any, Any] | None = None
-
-
-_LINES: Final = msgspec.json.Decoder(_Line)
-
-
 class RecordingLibrary:
-    """Answers questions about recordings, one after another, in its own thread."""
+    """Answers questions about a folder of episodes, one after another, in its own thread.
+
+    An unchanged episode is read once for the list.
+    """
 
     def __init__(self, folder: Path | None, call: Callable[[Callable[[], None]], None]) -> None:
-        self._recordings = None if folder is None else RecordingFolder(folder)
+        self._folder = Path() if folder is None else folder
+        self._has_folder = folder is not None
         self._call = call
-        self._work: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
-        self._thread: threading.Thread | None = None
+        self._worker = Worker("library")
+        self._known: dict[str, tuple[object, messages.EpisodeSummary]] = {}
+        self._index: LineIndex | None = None
 
     def ask(self, question: Question, then: Callable[[Answer], None]) -> None:
         """Ask a question; the caller bounds how many are open."""
-        recordings = self._recordings
-        if recordings is None:
-            then(messages.Refused(reason="This robot was served without a folder for recordings."))
-            return
 
         def work() -> None:
-            answer = recordings.answer(question)
+            answer = self.answer(question)
             self._call(lambda: then(answer))
 
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="library", daemon=True)
-            self._thread.start()
-        self._work.put(work)
+        if self._has_folder:
+            self._worker.put(work)
+        else:
+            then(messages.Refused(reason="This robot was served without a folder for recordings."))
 
     def close(self) -> None:
         """End the thread, without waiting for a disk that hangs."""
-        if self._thread is not None:
-            self._work.put(None)
-            self._thread.join(_JOIN_S)
-
-    def _run(self) -> None:
-        while (work := self._work.get()) is not None:
-            work()
-
-
-class RecordingFolder:
-    """Folder of episodes; an unchanged episode is read once for the list."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._known: dict[str, tuple[object, messages.EpisodeSummary]] = {}
-        self._index: LineIndex | None = None
+        self._worker.close(_JOIN_S)
 
     def answer(self, question: Question) -> Answer:
         """Answer a question; errors of the disk are refusals."""
@@ -163,11 +127,7 @@ class RecordingFolder:
             size, frame_before = len(header), ""
             for number in range(question.first, last):
                 line = index.read(file, number)[:-1].decode()
-                try:
-                    named = _LINES.decode(line).frame
-                except msgspec.MsgspecError as error:
-                    raise DemosError(f"Line {number + 1} of {steps} is damaged: {error}.") from None
-                name = "" if named is None else named[0]
+                name = frame_of(line, f"Line {number + 1} of {steps}")
                 frame = None
                 if name and name != frame_before:
                     frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
@@ -228,34 +188,14 @@ def _is_listed(path: Path) -> bool:
 
 
 def _summary(path: Path) -> messages.EpisodeSummary:
-    """Summarise an episode; an incomplete or damaged line is left out."""
-    header, closed = read_header(path)
-    steps: dict[int, int | None] = {}
-    edits: list[_Line] = []
-    with (path / STEPS).open("rb") as lines:
-        for raw in lines:
-            try:
-                line = _LINES.decode(raw)
-            except (msgspec.MsgspecError, UnicodeDecodeError):
-                continue
-            if line.kind == "step" and raw.endswith(b"\n"):
-                at_ns = line.decided_ns if line.captured_ns is None else line.captured_ns
-                steps[line.step] = at_ns
-            elif line.kind in {"drop", "keep"}:
-                edits.append(line)
-    dropped: set[int] = set()
-    for edit in edits:
-        # Only existing steps, whatever range the line names.
-        reach = {index for index in steps if edit.first <= index <= edit.last}
-        (dropped.difference_update if edit.kind == "keep" else dropped.update)(reach)
-    lasted = zip(steps, durations_s([*steps.values()], header.control_hz), strict=True)
+    outline = read_outline(path)
     return messages.EpisodeSummary(
         id=path.name,
-        steps=len(steps),
-        kept=len(steps) - len(dropped),
-        seconds=math.fsum(seconds for index, seconds in lasted if index not in dropped),
-        closed=closed is not None,
-        created=header.created[:_MAX_TEXT],
-        driver=header.driver[:_MAX_TEXT],
-        outcome="" if closed is None else str(closed.get("outcome", ""))[:_MAX_TEXT],
+        steps=outline.steps,
+        kept=outline.kept,
+        seconds=outline.seconds,
+        closed=outline.closed,
+        created=outline.header.created[:_MAX_TEXT],
+        driver=outline.header.driver[:_MAX_TEXT],
+        outcome=outline.outcome[:_MAX_TEXT],
     )

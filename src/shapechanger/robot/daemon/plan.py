@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
-from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.link.address import DEFAULT_PORT
 from shapechanger.robot.link.card import RobotCard
 
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings of the daemon, type-checked when they are read.
+    """Settings of the daemon. They are checked when the fields of a `ServePlan` are converted.
 
     Attributes:
         card: Facts of the robot.
@@ -47,15 +46,3 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     policies: str = ""
     policy: str = ""
     pilot: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the plan as values that JSON can hold."""
-        return msgspec.to_builtins(self)
-
-    @classmethod
-    def from_dict(cls, fields: dict[str, Any]) -> DaemonPlan:
-        """Read the output of `to_dict`."""
-        try:
-            return msgspec.convert(fields, cls)
-        except msgspec.ValidationError as error:
-            raise ProfileError(f"Invalid daemon plan: {error}.") from error

@@ -19,7 +19,7 @@ from typing import Any, Final, cast
 
 from shapechanger.errors import UnknownName
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.priority import run_normally
+from shapechanger.robot.guard.running import run_normally
 from shapechanger.robot.link.address import Address
 from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.messages import PolicyState

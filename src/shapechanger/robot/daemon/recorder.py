@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import queue
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.robot.daemon.control import ClientIdentity, NumberedFrame
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.client import Client
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (
@@ -42,26 +45,18 @@ _NOT_RECORDING: Final = "Nothing is being recorded."
 # Facts of the card that an episode keeps, under the same names.
 _SHARED: Final = tuple(f.name for f in fields(EpisodeHeader) if hasattr(RobotCard, f.name))
 
-_Post = Callable[[RobotMessage], None]
-
-_Job = Callable[[EpisodeWriter], EpisodeWriter]
-"""Writes to an episode, and returns the writer of the episode that is open after that."""
-
-_Write = Callable[[Step, bytes | None], object]
-"""Writes a step and its frame, which is None if it repeats the previous step's."""
-
 
 class _Seen(NamedTuple):
-    """An observation that one client was sent, and the newest frame at that time."""
+    """An observation that a client was sent, and the newest frame at that time."""
 
     observation: Observation
-    frame: NumberedFrame | None
+    frame: Frame | None
 
 
 class _Decided(NamedTuple):
-    """A step whose applied outputs are not known yet, by the number of its session."""
+    """A step whose applied outputs are not known yet."""
 
-    session: int
+    client: Client
     seen: _Seen
     step: Step
 
@@ -78,22 +73,22 @@ class StepBuilder:
     def __init__(
         self,
         limits: Sequence[tuple[float, float]],
-        write: _Write,
+        write: Callable[[Step, bytes | None], object],
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         self._limits = limits
         self._write = write
         self._wall_ns = wall_ns
-        self._seen: dict[int, deque[_Seen]] = {}
+        self._seen: dict[Client, deque[_Seen]] = {}
         self._decided: _Decided | None = None
         self._newest: _Decided | None = None
-        self._frame_seq = 0
+        self._frame: Frame | None = None
 
-    def observed(self, session: int, observation: Observation, frame: NumberedFrame | None) -> None:
+    def observed(self, client: Client, observation: Observation, frame: Frame | None) -> None:
         """Note an observation that is sent to a client, and complete the step before it."""
-        self._seen.setdefault(session, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
+        self._seen.setdefault(client, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
         decided = self._decided
-        if decided is None or decided.session != session:
+        if decided is None or decided.client is not client:
             return
         if observation.mine:
             step = msgspec.structs.replace(
@@ -104,16 +99,14 @@ class StepBuilder:
             self._decided = decided._replace(step=step)
         self.complete()
 
-    def decided(
-        self, client: ClientIdentity, answers: int, values: tuple[float, ...], now_ns: int
-    ) -> None:
+    def decided(self, client: Client, answers: int, values: tuple[float, ...], now_ns: int) -> None:
         """Note a command of a client, and complete a step that answers another observation."""
-        window = self._seen.get(client.session, ())
+        window = self._seen.get(client, ())
         seen = next((s for s in reversed(window) if s.observation.seq == answers), None)
-        if seen is None or self._is_past(client.session, seen):
+        if seen is None or self._is_past(client, seen):
             return
         before = self._decided
-        if before is None or before.session != client.session or before.seen is not seen:
+        if before is None or before.client is not client or before.seen is not seen:
             self.complete()
         step = Step(
             action=tuple(
@@ -127,7 +120,7 @@ class StepBuilder:
             decided_ns=now_ns,
             wall_ns=self._wall_ns(),
         )
-        self._decided = self._newest = _Decided(client.session, seen, step)
+        self._decided = self._newest = _Decided(client, seen, step)
 
     def complete(self) -> None:
         """Write the pending step, if there is one, with the outputs known so far."""
@@ -135,151 +128,102 @@ class StepBuilder:
         if decided is None:
             return
         frame, jpeg = decided.seen.frame, None
-        if frame is not None and frame.seq != self._frame_seq:
-            self._frame_seq, jpeg = frame.seq, frame.frame.jpeg
+        if frame is not None and frame is not self._frame:
+            self._frame, jpeg = frame, frame.jpeg
         self._write(decided.step, jpeg)
 
-    def forget(self, session: int) -> None:
+    def forget(self, client: Client) -> None:
         """Drop the observations of a client that left."""
-        self._seen.pop(session, None)
+        self._seen.pop(client, None)
 
-    def _is_past(self, session: int, seen: _Seen) -> bool:
+    def _is_past(self, client: Client, seen: _Seen) -> bool:
         """Return True if an observation is older than the newest step's."""
         newest = self._newest
         if newest is None or newest.seen is seen:
             return False
         ours, theirs = seen.observation, newest.seen.observation
-        if session == newest.session and ours.seq < theirs.seq:
+        if client is newest.client and ours.seq < theirs.seq:
             return True
         return ours.captured_ns < theirs.captured_ns
 
 
-class EpisodeThread:
-    """Thread that writes one episode, in the order of the calls; a full one goes on in the next.
+class Worker:
+    """Thread that calls functions one after another; a disk that hangs keeps no process alive."""
 
-    Attributes:
-        progress: State of the episode; `recording` and `text` are the recorder's to set.
-    """
+    def __init__(self, name: str) -> None:
+        self._calls: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
-    def __init__(
-        self,
-        folder: Path,
-        header: EpisodeHeader,
-        report: Callable[[Literal["begun", "ended"], str], None],
-        after: EpisodeThread | None = None,
-    ) -> None:
-        self.progress = RecorderState()
-        self._folder = folder
-        self._header = header
-        self._report = report
-        self._after = after
-        self._outcome = ""
-        self._ending = False
-        self._jobs: deque[tuple[_Job, int]] = deque()
-        self._bytes = 0
-        self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
-        self._thread.start()
+    def put(self, call: Callable[[], None]) -> None:
+        """Call a function after those before it."""
+        if self._thread.ident is None:
+            self._thread.start()
+        self._calls.put(call)
 
-    def add(self, step: Step, jpeg: bytes | None) -> bool:
-        """Write a step.
-
-        Returns:
-            False if the disk is too slow, which ends the episode.
-        """
-
-        def write(writer: EpisodeWriter) -> EpisodeWriter:
-            if writer.is_full:
-                writer = writer.continued()
-                self._report("begun", "")
-            writer.add(step, jpeg)
-            self._note(writer)
-            return writer
-
-        return self._put(write, len(jpeg or b""))
-
-    def edit(self, request: Mark | Undo, then: Callable[[str], None]) -> None:
-        """Mark the newest step, or drop the newest ones."""
-
-        def edit(writer: EpisodeWriter) -> EpisodeWriter:
-            refusal = ""
-            if isinstance(request, Undo):
-                refusal = "" if writer.undo(request.seconds) else "There is nothing to undo."
-            elif writer.steps:
-                writer.mark(request.text)
-            else:
-                refusal = "There is no step to mark yet."
-            self._note(writer)
-            then(refusal)
-            return writer
-
-        self._put(edit, 0)
-
-    def end(self, outcome: str = "") -> None:
-        """Close the episode once all steps are written."""
-        with self._changed:
-            if not self._ending:
-                self._outcome, self._ending = outcome, True
-                self._changed.notify()
-
-    def join(self, timeout_s: float | None = None) -> bool:
-        """Wait for the end. Return False on a timeout."""
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
-
-    def _put(self, job: _Job, size: int) -> bool:
-        with self._changed:
-            if self._ending:
-                return True
-            fits = len(self._jobs) < _MAX_JOBS and self._bytes + size <= _MAX_BYTES
-            if fits:
-                self._jobs.append((job, size))
-                self._bytes += size
-            else:
-                self._outcome, self._ending = DISK_TOO_SLOW, True
-            self._changed.notify()
-            return fits
+    def close(self, at_most_s: float) -> None:
+        """End the thread after the functions so far, and wait for it, up to a limit."""
+        if self._thread.ident is not None:
+            self._calls.put(None)
+            self._thread.join(at_most_s)
 
     def _run(self) -> None:
-        if self._after is not None:
-            self._after.join()
-            self._after = None
-        trouble = ""
+        while (call := self._calls.get()) is not None:
+            call()
+
+
+class _Shot(NamedTuple):
+    """A step, and its frame; None if it repeats the previous step's."""
+
+    step: Step
+    jpeg: bytes | None
+
+
+_Job = _Shot | Mark | Undo | str | None
+"""Something to write: a step, an edit, the outcome that ends an episode, or None to begin it."""
+
+
+class _Episode:
+    """An episode, which the recorder's thread writes; a full one goes on in the next.
+
+    Attributes:
+        starter: The client that began it.
+        progress: Its newest state that the event loop knows; the text is an error that ended it.
+        jobs: Number of jobs that wait for the disk.
+        bytes: Size of their frames, bytes.
+    """
+
+    def __init__(self, folder: Path, header: EpisodeHeader, starter: Client) -> None:
+        self.starter = starter
+        self.progress = RecorderState()
+        self.jobs = 0
+        self.bytes = 0
+        self._trouble = ""
+        self._create = partial(EpisodeWriter.create, folder, header)
+        self._writer: EpisodeWriter | None = None
+
+    def attempt(self, job: _Job) -> str:
+        """Do a job unless there was an error, and return the reason for a refusal, or ""."""
+        if self._trouble:
+            return ""
         try:
-            self._write(EpisodeWriter.create(self._folder, self._header))
+            return self._write(job)
         except ShapechangerError as error:
-            trouble = str(error)
-        except Exception as error:
-            trouble = f"Recording failed: {error!r}."
-            raise
-        finally:
-            with self._changed:
-                self._ending = True
-                self._jobs.clear()
-            self._report("ended", trouble)
+            self._trouble = str(error)
+        except Exception as error:  # Whatever it is, the robot drives on.
+            self._trouble = f"Recording failed: {error!r}."
+        # On a full disk this may fail too. All steps are there all the same, and
+        # `shapechanger demos repair` closes the episode.
+        with contextlib.suppress(ShapechangerError):
+            if self._writer is not None:
+                self._writer.close(self._trouble)
+        return ""
 
-    def _write(self, writer: EpisodeWriter) -> None:
-        try:
-            self._note(writer)
-            self._report("begun", "")
-            while True:
-                with self._changed:
-                    self._changed.wait_for(lambda: self._jobs or self._ending)
-                    if not self._jobs:
-                        break
-                    job, size = self._jobs.popleft()
-                    self._bytes -= size
-                writer = job(writer)
-        except BaseException as error:
-            # On a full disk this may fail too. All steps are there all the same, and
-            # `shapechanger demos repair` closes the episode.
-            with contextlib.suppress(ShapechangerError):
-                writer.close(str(error) or "an error")
-            raise
-        writer.close(self._outcome)
-
-    def _note(self, writer: EpisodeWriter) -> None:
-        self.progress = RecorderState(
+    def newest(self) -> RecorderState:
+        """Return the state of the episode."""
+        if (writer := self._writer) is None:
+            return RecorderState(text=self._trouble)
+        return RecorderState(
+            text=self._trouble,
             episode=writer.path.name,
             steps=writer.steps,
             dropped=writer.dropped,
@@ -287,25 +231,49 @@ class EpisodeThread:
             marks=writer.marks,
         )
 
+    def _write(self, job: _Job) -> str:
+        writer = self._writer = self._writer or self._create()
+        match job:
+            case _Shot():
+                if writer.is_full:
+                    writer = self._writer = writer.continued()
+                writer.add(*job)
+            case Undo():
+                return "" if writer.undo(job.seconds) else "There is nothing to undo."
+            case Mark():
+                if not writer.steps:
+                    return "There is no step to mark yet."
+                writer.mark(job.text)
+            case str():
+                writer.close(job)
+            case None:
+                pass
+        return ""
+
 
 class Recorder:
     """Records one episode at a time, with any client in control. It never waits for the disk.
 
-    Steps are recorded while the robot is armed.
+    Steps are recorded while the robot is armed. A thread writes them; `call` calls a function in
+    the event loop's thread.
 
     Attributes:
         builder: Makes the steps of the episode; None while nothing is recorded.
     """
 
     def __init__(
-        self, plan: DaemonPlan, broadcast: _Post, call: Callable[[Callable[[], None]], None]
+        self,
+        plan: DaemonPlan,
+        broadcast: Callable[[RobotMessage], None],
+        call: Callable[[Callable[[], None]], None],
     ) -> None:
         self._plan = plan
         self._broadcast = broadcast
         self._call = call
         features = Layout.from_json(plan.card.action_layout).features
         self._limits = [(f.low, f.high) for f in features for _ in range(f.size)]
-        self._thread: EpisodeThread | None = None
+        self._worker = Worker("recorder")
+        self._episode: _Episode | None = None
         self.builder: StepBuilder | None = None
         self._text = ""
 
@@ -316,71 +284,54 @@ class Recorder:
 
     def state(self) -> RecorderState:
         """Return the state of the recorder."""
-        progress = RecorderState() if self._thread is None else self._thread.progress
-        return msgspec.structs.replace(progress, recording=self.on, text=self._text)
+        progress = RecorderState() if self._episode is None else self._episode.progress
+        text = self._text or progress.text
+        return msgspec.structs.replace(progress, recording=self.on, text=text)
 
-    def begin(self, client: ClientIdentity, name: str, driver: str, post: _Post) -> str:
-        """Begin an episode.
-
-        Returns:
-            The reason for a refusal, or "".
-        """
+    def begin(self, client: Client, name: str, driver: str) -> str:
+        """Begin an episode, and return the reason for a refusal, or ""."""
         if not self._plan.recordings:
             return "This robot was served without a folder for recordings."
         if self.on:
-            return (
-                f"An episode is being recorded already: {self.state().episode or 'it starts now'}."
-            )
-        plan = self._plan
-        card = plan.card
+            begun = self.state().episode or "it starts now"
+            return f"An episode is being recorded already: {begun}."
         header = EpisodeHeader(
-            **{name: getattr(card, name) for name in _SHARED},
+            **{name: getattr(self._plan.card, name) for name in _SHARED},
             driver=driver or client.name,
             source="shapechanger robot",
             notes={"name": name, "recorded_by": client.name},
         )
+        self._episode = _Episode(Path(self._plan.recordings), header, client)
         self._text = ""
-        self.builder = StepBuilder(self._limits, self._write)
-
-        def report(what: Literal["begun", "ended"], trouble: str) -> None:
-            self._call(lambda: self._reported(thread, what, trouble, post))
-
-        # Reports are handled in the event loop's thread, and so after this assignment.
-        thread = EpisodeThread(Path(plan.recordings), header, report, self._thread)
-        self._thread = thread
+        self.builder = StepBuilder(self._limits, self._add)
+        self._put(self._episode, None)
         return ""
 
     def end(self, text: str = "") -> str:
-        """End the episode.
-
-        Returns:
-            The reason for a refusal, or "".
-        """
-        if self._thread is None or self.builder is None:
+        """End the episode, and return the reason for a refusal, or ""."""
+        if self._episode is None or self.builder is None:
             return _NOT_RECORDING
         self.builder.complete()
-        self.builder = None
-        self._text = self._text or text
-        self._thread.end(text)
+        self._stop(self._episode, text)
         return ""
 
-    def edit(self, request: Mark | Undo, post: _Post) -> str:
+    def edit(self, request: Mark | Undo, client: Client) -> str:
         """Mark the newest step, or drop the newest ones, after the pending step.
 
         Returns:
             The reason for a refusal, or "".
         """
-        if self._thread is None or self.builder is None:
+        if self._episode is None or self.builder is None:
             return _NOT_RECORDING
         self.builder.complete()
 
         def answer(refusal: str) -> None:
             if refusal:
-                post(Refused(reason=refusal))
+                client.post(Refused(reason=refusal))
             else:
                 self._broadcast(self.state())
 
-        self._thread.edit(request, lambda refusal: self._call(lambda: answer(refusal)))
+        self._put(self._episode, request, answer)
         return ""
 
     def tick(self) -> None:
@@ -391,26 +342,52 @@ class Recorder:
     def close(self) -> None:
         """End the episode, and wait for the disk, up to a limit."""
         self.end()
-        if self._thread is not None:
-            self._thread.join(_CLOSE_S)
+        self._worker.close(_CLOSE_S)
 
-    def _write(self, step: Step, jpeg: bytes | None) -> None:
-        if self._thread is None or self._thread.add(step, jpeg):
+    def _add(self, step: Step, jpeg: bytes | None) -> None:
+        episode, size = self._episode, len(jpeg or b"")
+        if episode is None:
             return
-        # The thread reports this too, once the disk responds.
-        self.builder, self._text = None, DISK_TOO_SLOW
-        self._broadcast(self.state())
+        if episode.jobs < _MAX_JOBS and episode.bytes + size <= _MAX_BYTES:
+            self._put(episode, _Shot(step, jpeg))
+        else:
+            self._stop(episode, DISK_TOO_SLOW)
+            self._broadcast(self.state())  # Again when the disk responds.
 
-    def _reported(
-        self, thread: EpisodeThread, what: Literal["begun", "ended"], trouble: str, post: _Post
+    def _stop(self, episode: _Episode, outcome: str) -> None:
+        self.builder = None
+        self._text = self._text or outcome
+        self._put(episode, outcome, lambda _: self._broadcast(self.state()))
+
+    def _put(
+        self, episode: _Episode, job: _Job, then: Callable[[str], None] = lambda _: None
     ) -> None:
-        if trouble:
-            _log.warning("Recorder: %s", trouble)
-        if thread is not self._thread:
-            return  # The next episode has begun already, and its state was reported.
-        if what == "ended":
-            self.builder = None
-            self._text = self._text or trouble
-            if trouble and not thread.progress.episode:
-                post(Refused(reason=trouble))  # The episode could not even begin.
-        self._broadcast(self.state())
+        """Let the thread do a job, and then call a function with the reason for a refusal."""
+        size = len(job.jpeg or b"") if isinstance(job, _Shot) else 0
+        episode.jobs += 1
+        episode.bytes += size
+
+        def work() -> None:
+            refusal = episode.attempt(job)
+            self._call(partial(self._done, episode, size, episode.newest(), partial(then, refusal)))
+
+        self._worker.put(work)
+
+    def _done(
+        self, episode: _Episode, size: int, progress: RecorderState, then: Callable[[], None]
+    ) -> None:
+        """Note that the thread has done a job."""
+        episode.jobs -= 1
+        episode.bytes -= size
+        before, episode.progress = episode.progress, progress
+        if not progress.text:
+            then()
+        elif not before.text:
+            _log.warning("Recorder: %s", progress.text)
+            if not progress.episode:  # It could not even begin.
+                episode.starter.post(Refused(reason=progress.text))
+        if episode is self._episode and (
+            (before.episode, before.text) != (progress.episode, progress.text)
+        ):
+            self.builder = None if progress.text else self.builder
+            self._broadcast(self.state())

@@ -11,21 +11,16 @@ import socket
 import ssl
 from collections import Counter
 from collections.abc import Awaitable, Callable, Hashable
+from functools import partial
 from typing import Final
 from urllib.parse import urlsplit
 
 from aiohttp import web
 
-from shapechanger.errors import LinkError, RobotError, ShapechangerError
+from shapechanger.errors import LinkError, RobotError
 from shapechanger.robot.console import ENTRY, console_files
-from shapechanger.robot.daemon.connection import (
-    ClientConnection,
-    ObservationPacer,
-    Timekeeper,
-    new_socket,
-)
-from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.session import Authenticator, Session, WrongKey
+from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
+from shapechanger.robot.daemon.session import Authenticator, ClientConnection, Session
 from shapechanger.robot.link.address import is_loopback, parse_address
 from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.messages import VERSION
@@ -230,11 +225,7 @@ class AcceptedSocket:
             _log.debug("The TLS handshake with %s failed: %s", self.address, error)
 
 
-# A key of 128 bits cannot be guessed. The pause keeps an attempt from costing the robot more than
-# its sender, and does not delay a client with the right key at the same address.
-_WRONG_KEY_S: Final = 0.5
 _SHUTDOWN_S: Final = 0.2  # A daemon that ends has nothing left to send.
-_UNANSWERED_MS: Final = 4_000  # Unacknowledged data then ends the connection.
 _GUARD_SILENT_NS: Final = 1_000_000_000
 _CONSOLE: Final = "/console/"
 
@@ -344,7 +335,7 @@ class Server:
 
     async def _health(self, _: web.Request) -> web.Response:
         state = self._hub.state
-        silent = state is None or self._hub.now_ns() - state.at_ns > _GUARD_SILENT_NS
+        silent = not state.at_ns or self._hub.now_ns() - state.at_ns > _GUARD_SILENT_NS
         # A twin's time stands still while no client drives, and its guard is silent then.
         well = not silent or self._time.in_steps
         return web.json_response(
@@ -358,41 +349,11 @@ class Server:
         if refusal:
             raise web.HTTPForbidden(text=refusal)
         self._pre_auth.stop_timer(request.protocol)
-        websocket = new_socket()
-        await websocket.prepare(request)
+        forget = partial(self._pre_auth.remove, request.protocol)
         session = Session(next(self._numbers), self._hub, self._authenticator)
-        pacer = ObservationPacer(session, self._hub, self._time)
-        connection = ClientConnection(websocket, session, pacer, self._time)
-        reason: ShapechangerError | None = None
-        try:
-            _tune(request.transport)
-            await self._serve(connection, session, request)
-        except ShapechangerError as error:
-            reason = error
-        finally:
-            # If this client was in control, the robot stops before anything else happens.
-            session.close()
-        if reason is not None:
-            _log.info("%s: %s", session.client.name or request.remote, reason)
-            await connection.dismiss(reason)
-        await self._time.settle()
-        await connection.close()
-        self._pre_auth.remove(request.protocol)
-        return websocket
-
-    async def _serve(
-        self, connection: ClientConnection, session: Session, request: web.Request
-    ) -> None:
-        try:
-            await connection.greet()
-        except WrongKey:
-            await asyncio.sleep(_WRONG_KEY_S)
-            raise
-        self._pre_auth.remove(request.protocol)
-        client = session.client
-        _log.info("%s, a %s, connected from %s.", client.name, client.role, request.remote)
-        await connection.serve()
-        _log.info("%s disconnected.", client.name)
+        socket = await ClientConnection(session, self._hub, self._time).run(request, forget)
+        forget()
+        return socket
 
 
 @web.middleware
@@ -412,15 +373,3 @@ def _serve_file(content_type: str, body: bytes) -> _Handler:
         return web.Response(body=body, content_type=content_type, charset="utf-8")
 
     return serve
-
-
-def _tune(transport: asyncio.Transport | None) -> None:
-    """Send at once, buffer little, and notice when the other end is gone."""
-    if transport is None:
-        raise LinkError("The connection ended.")
-    # Not 0: asyncio's TLS would then call an empty buffer full every second time, and a message
-    # that was sent would wait for the next one before it counts as sent.
-    transport.set_write_buffer_limits(high=1, low=0)
-    accepted = transport.get_extra_info("socket")
-    accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)

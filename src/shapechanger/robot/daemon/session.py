@@ -1,158 +1,57 @@
-"""Session of one client, without its socket: bytes in, messages out."""
+"""Session of one client: bytes in, messages out; and the WebSocket that carries them."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import logging
 import math
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from time import monotonic
+import socket
+from collections.abc import Awaitable, Callable
 from typing import Final
 
-from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.robot.daemon.control import ClientIdentity, build_observation
-from shapechanger.robot.daemon.hub import SessionHub
+import aiohttp
+from aiohttp import WSMsgType, web
+
+from shapechanger.errors import LinkError, RobotRefused, ShapechangerError, translate_errors
+from shapechanger.robot.daemon.client import (
+    MESSAGES_PER_S,
+    Client,
+    MessageRate,
+    SentObservations,
+)
+from shapechanger.robot.daemon.credentials import Authenticator
+from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
 from shapechanger.robot.daemon.library import Answer, Question
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.link import messages
-from shapechanger.robot.link.authentication import is_proof, new_nonce
+from shapechanger.robot.link.authentication import new_nonce
 
-MESSAGES_PER_S: Final = 500.0
-"""Messages per second that a connection may send; a driver sends 50."""
+HELLO_TIMEOUT_S: Final = 3.0
+"""Time that a client has for its hello, s."""
 
-NOT_READING: Final = "The client does not read its messages."
-"""Reason to end the connection of a client that leaves its messages unread."""
+_NOT_READING: Final = "The client does not read its messages."
 
-_MAX_EVENTS: Final = 32
-_MAX_MESSAGES: Final = 256
-_NS_PER_MS: Final = 1_000_000
-_WINDOW: Final = 64  # More than a second at 50 Hz; older observations are stale in any case.
+_log = logging.getLogger(__name__)
 
 _LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps sums from overflowing.
+_SEND_S: Final = 2.0  # A client that does not read for so long is disconnected.
+_CLOSE_S: Final = 1.0
+_UNANSWERED_MS: Final = 4_000  # Unacknowledged data then ends the connection.
+# A dead radio sends nothing: the connection ends 6 s after it fell silent.
+_HEARTBEAT_S: Final = 4.0
+# A key of 128 bits cannot be guessed. The pause keeps an attempt from costing the robot more than
+# its sender, and does not delay a client with the right key at the same address.
+_WRONG_KEY_S: Final = 0.5
+
+# A camera that is about as fast as the commands sets the pace, so that each observation has a new
+# frame. It is worth waiting for a frame that is a little late: an observation without it would use
+# up the client's credit.
+_FRAME_PACE: Final = 1.25
 
 
 class WrongKey(RobotRefused):
     """The client does not hold the key."""
-
-
-@dataclass(frozen=True, slots=True)
-class Authenticator:
-    """Checks that a client holds the robot's key.
-
-    Attributes:
-        key: The key; empty to accept every client.
-        certificate: Fingerprint of the certificate; empty without TLS.
-    """
-
-    key: bytes = field(default=b"", repr=False)  # It does not belong in a log.
-    certificate: bytes = b""
-
-    @property
-    def is_open(self) -> bool:
-        """True if the robot has no key and accepts every client."""
-        return not self.key
-
-    def accepts(self, hello: messages.Hello, nonce: bytes) -> bool:
-        """Return True if the proof in `hello` answers `nonce` with the right key."""
-        if self.is_open:
-            return True
-        return is_proof(hello.proof, self.key, nonce, self.certificate, hello.role)
-
-
-class MessageRate:
-    """Token bucket that holds one second's worth of messages."""
-
-    def __init__(
-        self, per_s: float = MESSAGES_PER_S, clock: Callable[[], float] = monotonic
-    ) -> None:
-        self._per_s = per_s
-        self._clock = clock
-        self._tokens = per_s
-        self._at = clock()
-
-    def spend(self) -> bool:
-        """Count one message. Return False if it exceeds the rate."""
-        now = self._clock()
-        self._tokens = min(self._per_s, self._tokens + (now - self._at) * self._per_s)
-        self._at = now
-        if self._tokens < 1.0:
-            return False
-        self._tokens -= 1.0
-        return True
-
-    def give_back(self) -> None:
-        """Uncount one message, because the robot set the pace."""
-        self._tokens = min(self._per_s, self._tokens + 1.0)
-
-
-class Outbox:
-    """Queue of messages for one client, other than observations.
-
-    It keeps the newest lease, the newest recorder state and the newest 32 events. Other messages
-    are accepted while fewer than 256 are queued.
-
-    Attributes:
-        is_full: True once a message did not fit, because the client does not read.
-    """
-
-    def __init__(self) -> None:
-        self.is_full = False
-        self._messages: deque[messages.RobotMessage] = deque()
-
-    def __len__(self) -> int:
-        """Return the number of queued messages."""
-        return len(self._messages)
-
-    def put(self, message: messages.RobotMessage) -> None:
-        """Add a message; one that does not fit is lost, and sets `is_full`."""
-        if isinstance(message, messages.Lease | messages.RecorderState):
-            self._trim(type(message), keep=0)
-        elif isinstance(message, messages.Event):
-            self._trim(messages.Event, keep=_MAX_EVENTS - 1)
-        elif len(self._messages) >= _MAX_MESSAGES:
-            self.is_full = True
-            return
-        self._messages.append(message)
-
-    def take(self) -> messages.RobotMessage | None:
-        """Remove and return the oldest message, or None if the queue is empty."""
-        return self._messages.popleft() if self._messages else None
-
-    def holds(self, *kinds: type[messages.RobotMessage]) -> bool:
-        """Return True if a message of one of these types is queued."""
-        return any(isinstance(message, kinds) for message in self._messages)
-
-    def _trim(self, kind: type[messages.RobotMessage], keep: int) -> None:
-        """Remove the oldest messages of a type until `keep` are left."""
-        queued = [message for message in self._messages if isinstance(message, kind)]
-        for message in queued[: max(0, len(queued) - keep)]:
-            self._messages.remove(message)
-
-
-class SentObservations:
-    """The last observations sent to one client, and when."""
-
-    def __init__(self, max_age_ms: int, window: int = _WINDOW) -> None:
-        self._max_age_ms = max_age_ms
-        self._sent: deque[tuple[int, int]] = deque(maxlen=window)
-
-    def add(self, seq: int, now_ns: int) -> None:
-        """Remember that an observation is sent now."""
-        self._sent.append((seq, now_ns))
-
-    def refusal(self, answers: int, now_ns: int) -> str:
-        """Return the reason why a message must not act, or "" if it may."""
-        sent_ns = dict(self._sent).get(answers)
-        if sent_ns is None:
-            return f"Observation {answers} was not sent to this client recently."
-        age_ms = (now_ns - sent_ns) / _NS_PER_MS
-        if age_ms > self._max_age_ms:
-            return (
-                f"Observation {answers} was sent {age_ms:.0f} ms ago; "
-                f"at most {self._max_age_ms} ms are allowed."
-            )
-        return ""
 
 
 def printable(text: str) -> str:
@@ -164,13 +63,9 @@ class Session:
     """Session of one client, without its socket.
 
     Attributes:
-        outbox: Messages for the client, other than observations.
-        posted: Set when the outbox has a message.
-        updated: Set when an observation may be due.
+        client: Identity of the client, and the messages for it other than observations.
         credit: True while the client waits for an observation.
-        client: Identity of the client; its name is empty before its hello.
         pace: Whether the robot's clock or the client sets the pace.
-        expelled: Reason why the connection must end; "" if it may go on.
     """
 
     def __init__(
@@ -180,13 +75,9 @@ class Session:
         authenticator: Authenticator,
         rate: MessageRate | None = None,
     ) -> None:
-        self.outbox = Outbox()
-        self.posted = asyncio.Event()
-        self.updated = asyncio.Event()
+        self.client = Client(number)
         self.credit = False
-        self.client = ClientIdentity(number, "", "program")
         self.pace: messages.Pace = "realtime"
-        self.expelled = ""
         self._hub = hub
         self._authenticator = authenticator
         self._rate = MessageRate() if rate is None else rate
@@ -203,8 +94,7 @@ class Session:
     @property
     def has_new_frame(self) -> bool:
         """True if there is a frame that the client wants and has not been sent."""
-        newest = self._hub.newest
-        return self._wants_frames and newest is not None and newest.seq != self._frame_seq
+        return self._wants_frames and self._hub.frame_seq != self._frame_seq
 
     def challenge(self) -> messages.Challenge:
         """Return the first message to the client."""
@@ -226,23 +116,24 @@ class Session:
             raise WrongKey(
                 "Wrong key. `shapechanger robot key NAME` shows the right one on the robot."
             )
-        name = printable(hello.name) or f"{hello.role} {self.client.session}"
-        self.client = ClientIdentity(self.client.session, name, hello.role)
-        self._hub.join(self)
+        hub, client = self._hub, self.client
+        client.role = hello.role
+        client.name = printable(hello.name) or f"{hello.role} {client.session}"
+        hub.join(client)
         self._is_known, self.pace, self._wants_frames = True, hello.pace, hello.frames
-        if (recorded := self._hub.recorder.state()).episode:
-            self.post(recorded)
-        if self._hub.plan.policies:
-            self.post(self._hub.policies.state())
-        can_record = bool(self._hub.plan.recordings)
-        return messages.Welcome.of(self._hub.plan.card, self.client.session, can_record=can_record)
+        if (recorded := hub.recorder.state()).episode:
+            client.post(recorded)
+        if hub.plan.policies:
+            client.post(hub.policies.state())
+        can_record = bool(hub.plan.recordings)
+        return messages.Welcome.of(hub.plan.card, client.session, can_record=can_record)
 
     def receive(self, data: bytes) -> None:
         """Handle a message of the client."""
         if not self._is_known:
             raise LinkError("The first message must be a hello.")
-        if self.expelled:
-            raise LinkError(self.expelled)
+        if self.client.expelled:
+            raise LinkError(self.client.expelled)
         self.count()
         message = messages.decode_client_message(data)
         match message:
@@ -262,11 +153,11 @@ class Session:
                 reason = f"{self.client.name}: {printable(message.reason) or 'stop'}"
                 self._hub.give_order(Order(kind="emergency", reason=reason))
             case messages.Ping():
-                self.post(messages.Pong(token=message.token, now_ns=self._hub.now_ns()))
+                self.client.post(messages.Pong(token=message.token, now_ns=self._hub.now_ns()))
             case messages.Suggest():
                 self._suggest(message)
             case messages.RunPolicy():
-                if self.client.role == "person":
+                if self.client.is_person:
                     self._refuse(self._hub.policies.run(message.policy))
                 else:
                     self._refuse("Only a person can start a policy on this robot, or end it.")
@@ -276,49 +167,27 @@ class Session:
                 self._refuse(self._recording(message))
             case _:
                 raise LinkError("The hello was sent already.")
-        if self.outbox.is_full:
-            raise LinkError(NOT_READING)
+        if self.client.is_full:
+            raise LinkError(_NOT_READING)
 
     def count(self) -> None:
         """Count a message."""
         if not self._rate.spend():
             raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
 
-    def expel(self, reason: str) -> None:
-        """End the connection, with a reason for the client."""
-        self.expelled = reason
-        self.posted.set()
-
     def close(self) -> None:
         """End the session."""
-        self._hub.leave(self.client.session)
-
-    def post(self, message: messages.RobotMessage) -> None:
-        """Queue a message; if the queue is full, the connection ends."""
-        self.outbox.put(message)
-        self.posted.set()
+        self._hub.leave(self.client)
 
     def observe(self) -> messages.Observation:
         """Build the observation to send now, which uses up the credit."""
-        hub, now_ns = self._hub, self._hub.now_ns()
+        hub = self._hub
         self._observation_seq += 1
-        observation = build_observation(
-            seq=self._observation_seq,
-            now_ns=now_ns,
-            reader=hub.reader,
-            state=hub.state,
-            newest=hub.newest,
-            frame_sent=self._frame_seq if self._wants_frames else None,
-            lease=hub.lease.number,
-            command_ns=hub.command_ns(),
-            holder=hub.lease.holder,
-            mine=hub.lease.holds(self.client.session),
-            commanded=hub.commanded(),
-            suggested=hub.suggested(),
-        )
-        self._sent.add(observation.seq, now_ns)
+        frame_sent = self._frame_seq if self._wants_frames else None
+        observation = hub.observation(self.client, self._observation_seq, frame_sent)
+        self._sent.add(observation.seq, observation.sent_ns)
         if hub.recorder.builder is not None:
-            hub.recorder.builder.observed(self.client.session, observation, hub.newest)
+            hub.recorder.builder.observed(self.client, observation, hub.frame)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
         if self.pace == "lockstep":
@@ -329,16 +198,16 @@ class Session:
     def _refuse(self, reason: str, seq: int | None = None) -> None:
         """Report a refusal, unless `reason` is empty."""
         if reason:
-            self.post(messages.Refused(reason=reason, seq=seq))
+            self.client.post(messages.Refused(reason=reason, seq=seq))
 
     def _give_credit(self) -> None:
         self.credit = True
-        self.updated.set()
+        self.client.updated.set()
 
     def _command(self, command: messages.Command) -> None:
         now_ns = self._hub.now_ns()
         refusal = ""
-        if not self._hub.lease.holds(self.client.session):
+        if self._hub.lease.holder is not self.client:
             refusal = "You do not have control; take it first."
         elif command.seq <= self._command_seq:
             refusal = f"Command {command.seq} is not newer than {self._command_seq}."
@@ -355,7 +224,7 @@ class Session:
         self._give_credit()
 
     def _suggest(self, suggestion: messages.Suggest) -> None:
-        if self._hub.lease.holds(self.client.session):
+        if self._hub.lease.holder is self.client:
             refusal = "You have control: send a command instead of a suggestion."
         elif suggestion.seq <= self._suggestion_seq:
             refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
@@ -378,15 +247,15 @@ class Session:
         return ""
 
     def _arm(self, arm: messages.Arm) -> None:
-        hub, person = self._hub, self.client.role == "person"
+        hub, person = self._hub, self.client.is_person
         refusal = ""
         if hub.lease.holder is None:
             refusal = "No client has control; take control first."
         elif not person and hub.plan.card.arming != "anyone":
             refusal = "Only a person can arm this robot."
-        elif not person and hub.state is not None and hub.state.emergency:
+        elif not person and hub.state.emergency:
             refusal = "Only a person can end an emergency stop."
-        elif not person and not hub.lease.holds(self.client.session):
+        elif not person and hub.lease.holder is not self.client:
             refusal = "Only the client in control, or a person, can arm this robot."
         elif late := self._sent.refusal(arm.answers, hub.now_ns()):
             refusal = f"Not armed. {late}"
@@ -396,7 +265,7 @@ class Session:
             hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _disarm(self) -> None:
-        if self.client.role != "person" and not self._hub.lease.holds(self.client.session):
+        if not self.client.is_person and self._hub.lease.holder is not self.client:
             self._refuse(
                 "Only the client in control, or a person, can disarm this robot; any client can "
                 "stop it with an emergency stop."
@@ -408,10 +277,8 @@ class Session:
         self, message: messages.Record | messages.Mark | messages.Undo | Question
     ) -> str:
         """Handle a request about recordings. Return the reason for a refusal, or ""."""
-        if (
-            not isinstance(message, messages.Browse | messages.Fetch)
-            and self.client.role != "person"
-        ):
+        is_question = isinstance(message, messages.Browse | messages.Fetch)
+        if not is_question and not self.client.is_person:
             return "Only a person can record on this robot, and judge recordings."
         recorder = self._hub.recorder
         match message:
@@ -419,14 +286,14 @@ class Session:
                 return recorder.end()
             case messages.Record():
                 driver = self._hub.lease.holder_name
-                return recorder.begin(self.client, printable(message.name), driver, self.post)
+                return recorder.begin(self.client, printable(message.name), driver)
             case messages.Mark():
-                return recorder.edit(messages.Mark(text=printable(message.text)), self.post)
+                return recorder.edit(messages.Mark(text=printable(message.text)), self.client)
             case messages.Undo():
-                return recorder.edit(message, self.post)
+                return recorder.edit(message, self.client)
             case _:
                 # An answer may be large, so the next question waits until it has left.
-                if self._awaits_library or self.outbox.holds(messages.Recordings, messages.Piece):
+                if self._awaits_library or self.client.awaits(messages.Recordings, messages.Piece):
                     return "Ask one question about recordings at a time."
                 self._awaits_library = True
                 self._hub.library.ask(message, self._library_answered)
@@ -434,4 +301,198 @@ class Session:
 
     def _library_answered(self, answer: Answer) -> None:
         self._awaits_library = False
-        self.post(answer)
+        self.client.post(answer)
+
+
+class ClientConnection:
+    """WebSocket of one session: receives, answers, and sends observations when they are due."""
+
+    def __init__(self, session: Session, hub: SessionHub, time: Timekeeper) -> None:
+        self._session = session
+        self._client = session.client
+        self._hub = hub
+        self._time = time
+        # Uncompressed, and without a send queue.
+        self._socket = web.WebSocketResponse(
+            timeout=_CLOSE_S,
+            autoping=False,  # Pings count as messages here, so that they cannot flood the robot.
+            heartbeat=_HEARTBEAT_S,
+            compress=False,
+            # Above the limit, so that an oversized message gets an error message, and still
+            # bounded.
+            max_msg_size=4 * messages.MAX_CLIENT_MESSAGE,
+            writer_limit=0,
+        )
+        self._period_s = 1.0 / hub.plan.card.control_hz
+        camera = hub.plan.camera
+        ratio = 0.0 if camera is None else camera.fps / hub.plan.card.control_hz
+        self._by_frames = 1.0 / _FRAME_PACE <= ratio <= _FRAME_PACE
+        self._due_s = 0.0
+
+    async def run(
+        self, request: web.Request, on_known: Callable[[], object]
+    ) -> web.WebSocketResponse:
+        """Serve the client until it leaves; `on_known` is called once it has authenticated."""
+        await self._socket.prepare(request)
+        client = self._client
+        reason: ShapechangerError | None = None
+        try:
+            _tune(request.transport)
+            await self._greet()
+            on_known()
+            _log.info("%s, a %s, connected from %s.", client.name, client.role, request.remote)
+            await self._exchange()
+            _log.info("%s disconnected.", client.name)
+        except ShapechangerError as error:
+            reason = error
+            if isinstance(error, WrongKey):
+                await asyncio.sleep(_WRONG_KEY_S)
+        finally:
+            # If this client was in control, the robot stops before anything else happens.
+            self._session.close()
+        if reason is not None:
+            _log.info("%s: %s", client.name or request.remote, reason)
+            with contextlib.suppress(LinkError):  # The client may read no more.
+                await self._send(messages.Refused(reason=str(reason), fatal=True))
+        await self._time.settle()
+        await self._close()
+        return self._socket
+
+    async def _greet(self) -> None:
+        """Authenticate the client."""
+        await self._send(self._session.challenge())
+        late = LinkError(f"No hello was received within {HELLO_TIMEOUT_S:.0f} s.")
+        with translate_errors(TimeoutError, to=lambda _: late):
+            async with asyncio.timeout(HELLO_TIMEOUT_S):
+                data = await self._read()
+        if data is None:
+            raise LinkError("The client left without a hello.")
+        await self._send(self._session.introduce(data))
+
+    async def _exchange(self) -> None:
+        """Exchange messages until the client disconnects."""
+        tasks = [
+            asyncio.create_task(work) for work in (self._listen(), self._answer(), self._observe())
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            results = await asyncio.gather(*tasks, return_exceptions=True)
+        for result in results:
+            if isinstance(result, BaseException) and not isinstance(result, asyncio.CancelledError):
+                raise result
+
+    async def _close(self) -> None:
+        """Close the WebSocket."""
+        try:
+            async with asyncio.timeout(2 * _CLOSE_S):
+                await self._socket.close(code=aiohttp.WSCloseCode.OK, drain=False)
+        except (TimeoutError, ConnectionError, RuntimeError):
+            _log.info("The connection of %s was cut.", self._client.name or "a client")
+
+    async def _send(self, message: messages.RobotMessage) -> None:
+        await self._in_time(self._socket.send_bytes(messages.encode(message)))
+
+    async def _in_time(self, sending: Awaitable[None]) -> None:
+        """Wait for a message to be sent."""
+        with (
+            translate_errors(TimeoutError, to=lambda _: LinkError(_NOT_READING)),
+            translate_errors(ConnectionError, RuntimeError, to=_ended),
+        ):
+            async with asyncio.timeout(_SEND_S):
+                await sending
+
+    async def _listen(self) -> None:
+        while (data := await self._read()) is not None:
+            self._session.receive(data)
+            await self._time.settle()
+            if self._client.awaits():
+                await asyncio.sleep(0)  # A client that asks faster than it is answered waits.
+
+    async def _answer(self) -> None:
+        client = self._client
+        while True:
+            await client.posted.wait()
+            client.posted.clear()
+            while (message := client.take()) is not None:
+                await self._send(message)
+            if client.is_full:
+                raise LinkError(_NOT_READING)
+            if client.expelled:
+                raise LinkError(client.expelled)
+
+    async def _observe(self) -> None:
+        while True:
+            await self._send(await self._next_observation())
+
+    async def _next_observation(self) -> messages.Observation:
+        """Return the next observation, once it is due and the client has credit for it."""
+        session, lease = self._session, self._hub.lease
+        while not session.credit:
+            self._client.updated.clear()
+            await self._client.updated.wait()
+        if session.pace == "lockstep" and not self._time.in_steps:
+            await self._time.step(self._period_s)
+        # The lease holder advances time, or any client without a holder.
+        elif self._time.in_steps and lease.holder in (None, self._client):
+            await self._time.step(self._period_s)
+            if session.pace == "realtime":
+                await self._wait_until_due()
+        else:
+            await self._wait_until_due()
+        return session.observe()
+
+    async def _wait_until_due(self) -> None:
+        """Wait until one period after the last observation was due, or for its frame."""
+        loop = asyncio.get_running_loop()
+        while not (self._by_frames and self._session.has_new_frame) and loop.time() < self._due_s:
+            self._client.updated.clear()
+            try:
+                async with asyncio.timeout_at(self._due_s):
+                    await self._client.updated.wait()
+            except TimeoutError:
+                break
+        now_s = loop.time()
+        if self._by_frames and self._hub.frame is not None:
+            self._due_s = now_s + _FRAME_PACE * self._period_s
+        else:
+            # Counted from the time it was due, so that delays do not add up; but a client that
+            # was away gets no burst.
+            was_s = self._due_s if now_s - self._due_s < self._period_s else now_s
+            self._due_s = was_s + self._period_s
+
+    async def _read(self) -> bytes | None:
+        """Return the next message, or None when the client has disconnected."""
+        while True:
+            message = await self._socket.receive()
+            if message.type is WSMsgType.BINARY:
+                return message.data
+            if message.type is WSMsgType.PING:
+                self._session.count()
+                await self._in_time(self._socket.pong(message.data))
+            elif message.type is WSMsgType.PONG:
+                self._session.count()
+            elif message.type is WSMsgType.TEXT:
+                raise LinkError("The link takes binary messages, got text.")
+            elif message.type is WSMsgType.ERROR:
+                raise LinkError(f"The message cannot be read: {message.data}.")
+            else:
+                return None
+
+
+def _ended(error: ConnectionError | RuntimeError) -> LinkError:
+    return LinkError(f"The connection ended: {error}")
+
+
+def _tune(transport: asyncio.Transport | None) -> None:
+    """Send at once, buffer little, and notice when the other end is gone."""
+    if transport is None:
+        raise LinkError("The connection ended.")
+    # Not 0: asyncio's TLS would then call an empty buffer full every second time, and a message
+    # that was sent would wait for the next one before it counts as sent.
+    transport.set_write_buffer_limits(high=1, low=0)
+    accepted = transport.get_extra_info("socket")
+    accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)

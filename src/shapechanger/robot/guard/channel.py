@@ -1,4 +1,8 @@
-"""Non-blocking sockets between the guard, the daemon and the supervisor."""
+"""Sockets between the guard, the daemon and the supervisor, and the messages on them.
+
+Guard and daemon exchange one JSON object per datagram. They run on one machine, connected by a pair
+of `SOCK_SEQPACKET` sockets, which preserve message boundaries, and share one monotonic clock.
+"""
 
 from __future__ import annotations
 
@@ -8,36 +12,95 @@ import select
 import socket
 import sys
 import time
-from typing import Protocol
+from typing import Final, Literal
 
-from shapechanger.robot.guard.messages import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+import msgspec
+
+MAX_DATAGRAM: Final = 16 * 1024
+"""Size of the largest datagram, bytes."""
 
 # A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
 # same, should it send as fast as it is read.
-_MOST_ORDERS_A_ROUND = 1024
-_FD_BYTES = 4  # A descriptor in an ancillary message is an int of C.
-_DESCRIPTOR = socket.CMSG_SPACE(_FD_BYTES)
+_MOST_ORDERS_A_ROUND: Final = 1024
+_FD_BYTES: Final = 4  # A descriptor in an ancillary message is an int of C.
+_DESCRIPTOR: Final = socket.CMSG_SPACE(_FD_BYTES)
 
 
-class GuardChannel(Protocol):
-    """Duplex channel: orders in, states out."""
+class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Request from the daemon to the guard, checked strictly when it is decoded.
 
-    @property
-    def lost(self) -> bool:
-        """Return whether the sender of orders has disconnected."""
-        ...
+    Attributes:
+        kind: "command" moves; "halt" takes the newest command back and leaves the robot armed;
+            "arm" lets commands move, and ends an emergency stop; "disarm" ends that; "emergency"
+            stops until armed again; "end" ends the guard.
+        session: Number of the lease that it belongs to; commands of an older one are refused.
+        seq: Number of a command; each is larger than the one before in its session.
+        issued_ns: When the daemon received it. Needed for "command" and "arm", which are refused
+            when they are old.
+        ttl_ms: How long a command acts at most, counted from `issued_ns`.
+        frame_ns: When the newest picture was taken; None without a camera or a picture.
+        values: One finite number for each action; JSON has no others.
+        emergency: For "arm": how many emergency stops whoever arms has seen. One that came since
+            is not ended.
+        reason: Why, in words, for "disarm" and "emergency".
+        person: For "arm": whether a person arms; only persons end an emergency stop.
+    """
 
-    def filenos(self) -> list[int]:
-        """Return the file descriptors to wait for."""
-        ...
+    kind: Literal["command", "halt", "arm", "disarm", "emergency", "end"]
+    session: int = 0
+    seq: int = 0
+    issued_ns: int = 0
+    ttl_ms: int = 0
+    frame_ns: int | None = None
+    values: tuple[float, ...] = ()
+    emergency: int = 0
+    reason: str = ""
+    person: bool = False
 
-    def orders(self) -> tuple[list[Order], list[str]]:
-        """Return the orders that have arrived, and a reason for each datagram that is not one."""
-        ...
 
-    def send(self, state: GuardState) -> bool:
-        """Send a state and return whether it was accepted."""
-        ...
+class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Report from the guard: what it applies and senses.
+
+    Attributes:
+        at_ns: Time of the report, ns.
+        armed: Whether commands move anything.
+        emergency: Whether an emergency stop is in force.
+        emergencies: How many there were since the guard started; see `Order.emergency`.
+        stop_reason: Why the command is not applied; empty if it is.
+        applied: Applied value of each action.
+        applied_session: Session of the underlying command.
+        applied_seq: Its sequence number; None while the robot is at rest without a command.
+        applied_ns: When it reached the outputs.
+        refused: Why the newest command was refused; empty if none was since the last state.
+        refused_seq: Its number.
+        outputs: Value of each output, -1 to 1.
+        quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
+            "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
+            "stall" 0 or 1, "collision" 0 or 1; without those that nothing measures.
+        sources: Where a quantity comes from: name of a sensor, or "estimated".
+        bumps: How many bumps there were since the guard started.
+    """
+
+    at_ns: int = 0
+    armed: bool = False
+    emergency: bool = False
+    emergencies: int = 0
+    stop_reason: str = ""
+    applied: tuple[float, ...] = ()
+    applied_session: int = 0
+    applied_seq: int | None = None
+    applied_ns: int | None = None
+    refused: str = ""
+    refused_seq: int | None = None
+    outputs: dict[str, float] = {}
+    quantities: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    bumps: int = 0
+
+
+encode: Final = msgspec.json.encode
+decode_order: Final = msgspec.json.Decoder(Order).decode
+decode_state: Final = msgspec.json.Decoder(GuardState).decode
 
 
 class DaemonChannel:
@@ -49,12 +112,8 @@ class DaemonChannel:
         self._socket.set_inheritable(False)
         self._life: int | None = None
         self._dead = select.poll()
-        self._lost = False
-
-    @property
-    def lost(self) -> bool:
-        """Return whether the daemon has disconnected or died."""
-        return self._lost
+        self.lost = False
+        """Whether the daemon has disconnected or died."""
 
     def filenos(self) -> list[int]:
         """Return the socket and the lifeline, which closes when the daemon dies."""
@@ -64,7 +123,7 @@ class DaemonChannel:
     def orders(self) -> tuple[list[Order], list[str]]:
         """Return the orders that have arrived, and a reason for each datagram that is not one."""
         if self._life is not None and self._dead.poll(0):  # The lifeline carries no data.
-            self._lost = True
+            self.lost = True
         orders: list[Order] = []
         malformed: list[str] = []
         for _ in range(_MOST_ORDERS_A_ROUND):
@@ -78,28 +137,25 @@ class DaemonChannel:
                 self._watch(sent)
                 continue
             if not data:  # End of stream; no sender uses empty datagrams.
-                self._lost = True
+                self.lost = True
                 break
+            if flags & socket.MSG_TRUNC:
+                malformed.append(f"A datagram is larger than {MAX_DATAGRAM} bytes.")
+                continue
             try:
-                if flags & socket.MSG_TRUNC:
-                    raise ValueError(f"A datagram is larger than {MAX_DATAGRAM} bytes.")
                 orders.append(decode_order(data))
             except ValueError as error:
-                malformed.append(str(error))
+                malformed.append(f"Invalid order: {error}.")
         return orders, malformed
 
     def send(self, state: GuardState) -> bool:
-        """Send a state, or drop it if the socket is full.
-
-        Returns:
-            Whether it was sent.
-        """
+        """Send a state, and return whether it fitted into the socket."""
         try:
             self._socket.send(encode(state))
         except BlockingIOError:
             return False
         except (BrokenPipeError, ConnectionResetError):
-            self._lost = True
+            self.lost = True
             return False
         return True
 
@@ -136,14 +192,14 @@ class Heartbeat:
         self._period_ns = round(period_s * 1e9)
         self._beaten_ns = 0
         self.lost = False
-        """Return whether the supervisor has died."""
+        """Whether the supervisor has died."""
 
     def fileno(self) -> int:
         """Return the file descriptor to wait for."""
         return self._socket.fileno()
 
     def beat(self) -> None:
-        """Send a beat if one is due, and return whether the supervisor is alive."""
+        """Send a beat if one is due, and notice whether the supervisor is alive."""
         if self._poll.poll(0):  # The supervisor sends no data, so this is the end of the stream.
             self.lost = True
         now_ns = time.monotonic_ns()

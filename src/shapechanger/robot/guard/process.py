@@ -17,16 +17,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+import msgspec
+
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.channel import DaemonChannel, GuardChannel, Heartbeat
-from shapechanger.robot.guard.log import log_to_stderr, shortened
-from shapechanger.robot.guard.messages import GuardState
+from shapechanger.robot.guard.channel import DaemonChannel, GuardState, Heartbeat
 from shapechanger.robot.guard.outputs import Applied, OutputBank, Switches
-from shapechanger.robot.guard.priority import GUARD, run_promptly
 from shapechanger.robot.guard.rules import OutputDecision, Rules
+from shapechanger.robot.guard.running import (
+    AFTER_FAILURE,
+    GUARD,
+    descriptors,
+    log_to_stderr,
+    read_plan_fd,
+    run_promptly,
+    shortened,
+)
 from shapechanger.robot.guard.sensors import Sensors
-from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, descriptors, read_plan_fd
 from shapechanger.robot.hardware import Hardware, connect
 
 _BEAT_S: Final = 0.01
@@ -44,7 +51,7 @@ class Guard:
         self,
         plan: GuardPlan,
         hardware: Hardware,
-        daemon: GuardChannel,
+        daemon: DaemonChannel,
         log: logging.Logger,
         *,
         after_failure: bool = False,
@@ -235,11 +242,11 @@ class Guard:
         sent = self._sent
         # The next tick would be too late for some of them.
         if sent is not None and now_ns + self._period_ns - sent.at_ns <= _STATE_EVERY_NS:
-            is_news = state != replace(sent, at_ns=now_ns)
+            is_news = state != msgspec.structs.replace(sent, at_ns=now_ns)
         else:
             is_news = True
         if is_news and not self._daemon.lost and self._daemon.send(state):
-            self._sent = replace(state, refused="", refused_seq=None)
+            self._sent = msgspec.structs.replace(state, refused="", refused_seq=None)
             self._refused = ("", None)
 
     def _log_change(self, fact: str) -> None:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from shapechanger.contract.limits import MotionReflexes, Persistence, aimed, clipped, slewed
 from shapechanger.contract.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.log import shortened
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard.channel import Order
+from shapechanger.robot.guard.running import shortened
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 
 # Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor

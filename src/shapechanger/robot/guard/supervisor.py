@@ -12,6 +12,7 @@ killed guard did not exit for some seconds. Except for 3, the outputs report tha
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import select
@@ -22,15 +23,20 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
-from shapechanger.robot.guard import start
-from shapechanger.robot.guard.log import log_to_stderr
 from shapechanger.robot.guard.outputs import errors_noted, make_safe, preload
-from shapechanger.robot.guard.priority import SUPERVISOR, run_promptly
-from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, ServePlan, descriptors, read_plan_fd
+from shapechanger.robot.guard.running import (
+    AFTER_FAILURE,
+    SUPERVISOR,
+    ServePlan,
+    command_of,
+    descriptors,
+    log_to_stderr,
+    read_plan_fd,
+    run_promptly,
+)
 from shapechanger.robot.hardware import connect
 
 
@@ -68,8 +74,7 @@ class Child:
             )
         # Signals the exit at once. The end of the heartbeat does too, but not if a grandchild holds
         # the socket.
-        can_watch = hasattr(os, "pidfd_open")
-        self._pidfd = os.pidfd_open(self._process.pid) if can_watch else None
+        self._pidfd = os.pidfd_open(self._process.pid)
 
     @property
     def pid(self) -> int:
@@ -83,7 +88,7 @@ class Child:
 
     def descriptors(self) -> list[int]:
         """Return the descriptors that become readable when it beats or exits."""
-        return [self._heart.fileno(), *([] if self._pidfd is None else [self._pidfd])]
+        return [self._heart.fileno(), self._pidfd]
 
     def is_gone(self, now_ns: int) -> bool:
         """Read its heartbeats and return whether it has exited."""
@@ -123,16 +128,12 @@ class Child:
     def close(self) -> None:
         """Close its descriptors; the process must have exited."""
         self._heart.close()
-        if self._pidfd is not None:
-            os.close(self._pidfd)
-            self._pidfd = None
+        os.close(self._pidfd)
 
     def _wait(self, at_most_s: float) -> bool:
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):  # Stuck in the kernel, or busy.
             self._process.wait(at_most_s)
-        except subprocess.TimeoutExpired:  # Stuck in the kernel, or unresponsive.
-            return False
-        return True
+        return self.has_ended()
 
 
 _PAUSE_S: Final = 0.2
@@ -177,37 +178,12 @@ _CHECK_S: Final = 0.02  # Between checks of the heartbeats.
 _PAUSE_NS: Final = 100_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessCommands:
-    """Command lines of the children, without descriptors.
-
-    Attributes:
-        guard: The guard.
-        daemon: The daemon.
-    """
-
-    guard: tuple[str, ...]
-    daemon: tuple[str, ...]
-
-    @classmethod
-    def of(cls, plan: ServePlan) -> ProcessCommands:
-        """Return the commands of Shapechanger's own guard and daemon."""
-        return cls(
-            guard=(plan.python, "-I", str(Path(start.__file__).resolve()), "guard"),
-            # -P: a file in the working directory must not shadow a module.
-            daemon=(plan.python, "-P", "-m", "shapechanger.robot.daemon"),
-        )
-
-
 class Supervisor:
     """Run the processes of one robot."""
 
-    def __init__(
-        self, plan: ServePlan, fd: int, commands: ProcessCommands, log: logging.Logger
-    ) -> None:
+    def __init__(self, plan: ServePlan, fd: int, log: logging.Logger) -> None:
         self._plan = plan
         self._fd = fd
-        self._commands = commands
         self._log = log
         self._restarts = Restarts()
         self._end_reason = ""
@@ -267,22 +243,21 @@ class Supervisor:
 
     def _start(self, after_failure: tuple[str, ...]) -> tuple[Child, Child]:
         guards_end, daemons_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with guards_end, daemons_end:
-            command = (*self._commands.guard, *after_failure)
-            guard = self._child("guard", command, "--daemon-fd", guards_end)
-            try:
-                return guard, self._child(
-                    "daemon", self._commands.daemon, "--guard-fd", daemons_end
-                )
-            except BaseException:
-                guard.end(_END_S, _REAP_S)
-                guard.close()
-                raise
+        with guards_end, daemons_end, contextlib.ExitStack() as undo:
+            guard = self._child("guard", (*after_failure, "--daemon-fd"), guards_end)
+            undo.callback(guard.close)
+            undo.callback(guard.end, _END_S, _REAP_S)
+            daemon = self._child("daemon", ("--guard-fd",), daemons_end)
+            undo.pop_all()
+        return guard, daemon
 
-    def _child(self, name: str, command: Sequence[str], option: str, end: socket.socket) -> Child:
-        plan = ("--plan-fd", str(self._fd))
-        whole = [*command, *plan, option, str(end.fileno())]
-        return Child(name, whole, [self._fd, end.fileno()], time.monotonic_ns())
+    def _child(
+        self, name: Literal["guard", "daemon"], options: Sequence[str], end: socket.socket
+    ) -> Child:
+        """Start a child; the last option names its end of the channel."""
+        command = [*command_of(name, self._plan), *options, str(end.fileno())]
+        command += ["--plan-fd", str(self._fd)]
+        return Child(name, command, [self._fd, end.fileno()], time.monotonic_ns())
 
     def _supervise(self, guard: Child, daemon: Child) -> str:
         """Return why supervision ended: a dead or silent child, or a request to end."""
@@ -372,12 +347,11 @@ class Supervisor:
     def _make_safe(self) -> None:
         failures: list[str] = []
         # The children must be ended whatever happens to the hardware.
-        with errors_noted(failures, "The hardware"):
-            hardware = connect(*self._plan.hardware)
-            try:
-                failures += make_safe(self._plan.guard, hardware)
-            finally:
-                hardware.close()
+        with (
+            errors_noted(failures, "The hardware"),
+            contextlib.closing(connect(*self._plan.hardware)) as hardware,
+        ):
+            failures += make_safe(self._plan.guard, hardware)
         self._is_safe = not failures
         self._log_unsafe(failures)
 
@@ -401,7 +375,7 @@ def main(arguments: Sequence[str]) -> None:
     try:
         fd = descriptors(arguments, ("--plan-fd",))["--plan-fd"]
         plan = read_plan_fd(fd)
-        code = Supervisor(plan, fd, ProcessCommands.of(plan), log).run()
+        code = Supervisor(plan, fd, log).run()
     except Exception as error:
         log.critical("cannot go on, for %s: %s", type(error).__name__, error)
         code = _CANNOT_START

@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from shapechanger.contract.plan import GuardPlan
-from shapechanger.robot.guard.priority import run_early
+from shapechanger.robot.guard.running import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.pin_board import PinBoard

@@ -1,9 +1,14 @@
-"""Estimated actions and reasons when outputs deviate from their commands."""
+"""Outputs: mixed from actions, estimated back from deviations, and made safe."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
-from shapechanger.robot.guard.outputs import ActionEstimator
+from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, output_values
+from shapechanger.robot.guard.outputs import ActionEstimator, make_safe
+from tests.robot.guard.plans import car
+from tests.robot.guard.recording import Record, connect
 
 _CAR = GuardPlan(
     "car",
@@ -61,3 +66,39 @@ def test_an_action_with_two_outputs_is_active_while_one_moves() -> None:
     done = ActionEstimator(boat).estimate((0.5,), (0.5, 0.5), (0.5, 0.0))
     assert done.actions == (0.5,)
     assert done.reason.startswith("Output right: its controller waits")
+
+
+_OFFSET = GuardPlan(
+    "tank",
+    (ActionPlan("steering"), ActionPlan("throttle", propels=True)),
+    (
+        OutputPlan("left", "hbridge", mix={"throttle": 1.0, "steering": 1.0}),
+        OutputPlan("right", "hbridge", mix={"throttle": 1.0, "steering": -1.0}, offset=0.25),
+    ),
+)
+
+
+def test_an_output_is_its_offset_plus_its_weighted_actions() -> None:
+    assert output_values(_OFFSET, [0.25, 0.5]) == (0.75, 0.5)
+    assert output_values(_OFFSET, [1.0, 1.0]) == (1.0, 0.25)
+
+
+@pytest.mark.parametrize("actions", [[], [0.5], [0.0, 0.5, 0.0]])
+def test_a_wrong_number_of_actions_is_refused(actions: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"tank has 2 actions \(steering, throttle\), got "):
+        output_values(_OFFSET, actions)
+
+
+def test_make_safe_continues_after_a_failed_output(tmp_path: Path) -> None:
+    record = Record(tmp_path / "record")
+    (tmp_path / "stuck-GPIO17").touch()
+    plan = replace(car(), enable_pin=5)
+    failures = make_safe(plan, connect(str(record.path)))
+    assert len(failures) == 1
+    assert failures[0].startswith("Output steer: ")
+    assert {line["pin"] for line in record.pins()} >= {"GPIO22", "GPIO27", "GPIO5"}
+    assert record.is_at_rest()
+    (tmp_path / "stuck-GPIO17").unlink()
+    assert not make_safe(plan, connect(str(record.path)))
+    (tmp_path / "stuck-GPIO5").touch()
+    assert "Enable pin 5" in make_safe(plan, connect(str(record.path)))[0]

@@ -1,0 +1,106 @@
+"""The hub: observations for one client, and expiry of commands and suggestions."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.client import Client
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.guard.channel import GuardState
+from shapechanger.robot.link.messages import Command, Observation
+from tests.robot.daemon.plans import car_plan, guard_state
+
+ANN, SAC = Client(1, "Ann", "person"), Client(3, "sac")
+MS = 1_000_000
+
+
+def observed(hub: SessionHub, frame_sent: int | None = 0) -> Observation:
+    """Build Ann's observation."""
+    return hub.observation(ANN, 7, frame_sent)
+
+
+def seen_at_50_ns(
+    state: GuardState | None = None, *, frames: int = 3, frame_sent: int | None = 0
+) -> Observation:
+    """Build the observation of a robot with a state of 40 ns and a frame of 30 ns."""
+    hub = SessionHub(car_plan(), lambda: 50, lambda order: None)
+    for _ in range(frames):
+        hub.on_frame(Frame(b"jpeg", 30))
+    hub.on_state(guard_state(at_ns=40) if state is None else state)
+    return observed(hub, frame_sent)
+
+
+def test_an_absent_quantity_is_nan() -> None:
+    seen = seen_at_50_ns(guard_state(applied=(0.1, 0.5)))
+    assert seen.state[0] == 0.25
+    assert math.isnan(seen.state[1])
+    assert seen.state[2] == 0.5
+    assert seen.sources == {"speed": "wheel", "distance": "absent"}
+
+
+def test_without_a_state_of_the_guard_all_is_unknown() -> None:
+    seen = observed(SessionHub(car_plan(), lambda: 50, lambda order: None))
+    assert all(map(math.isnan, seen.state))
+    assert "guard" in seen.stop_reason
+    assert not seen.armed
+    assert seen.state_ns == 50
+
+
+def test_a_frame_is_sent_once_and_to_those_who_want_it() -> None:
+    assert seen_at_50_ns().frame == b"jpeg"
+    again = seen_at_50_ns(frame_sent=3)
+    assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
+    declined = seen_at_50_ns(frame_sent=None)
+    assert (declined.frame, declined.captured_ns) == (None, 30)
+
+
+def test_without_a_camera_the_time_is_that_of_the_state() -> None:
+    seen = seen_at_50_ns(frames=0)
+    assert (seen.frame, seen.frame_seq, seen.captured_ns) == (None, 0, 40)
+
+
+def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
+    hub = SessionHub(car_plan(), lambda: 50, lambda order: None)
+    hub.take(ANN)
+    hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5)), 38)
+    hub.on_state(guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39))
+    own = observed(hub)
+    assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)
+    hub.release(ANN, "she went")
+    hub.take(SAC)
+    other = observed(hub)
+    assert (other.applied_seq, other.applied_ns, other.command_ns) == (None, None, None)
+    assert other.action_applied == (0.0, 0.5)
+
+
+@given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))
+def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: int) -> None:
+    now_ns = 1
+    hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
+    assert observed(hub).commanded == ()
+    hub.on_state(guard_state(armed=True))
+    hub.lease.take(ANN)
+    hub.command(ANN, Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms), now_ns)
+    now_ns += age_ms * MS
+    assert observed(hub).commanded == ((0.0, 0.5) if age_ms <= min(ttl_ms, 250) else ())
+    now_ns = 1
+    hub.halt()
+    assert observed(hub).commanded == ()
+
+
+def test_the_newest_suggestion_counts_until_it_expires() -> None:
+    now_ns = 1
+    hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
+    assert observed(hub).suggested == ()
+    hub.suggest(ANN, (0.1, 0.0))
+    now_ns += 10 * MS
+    hub.suggest(SAC, (0.2, 0.0))
+    now_ns += 250 * MS
+    seen = observed(hub)
+    assert (seen.suggested_by, seen.suggested) == ("sac", (0.2, 0.0))
+    now_ns += 1
+    assert observed(hub).suggested == ()
