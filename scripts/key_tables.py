@@ -5,17 +5,18 @@ A page has a comment in the place of each, such as `<!-- keys: profile limits --
 
 from __future__ import annotations
 
-import inspect
-import math
 import re
-from collections.abc import Iterator
-from datetime import date
+from collections.abc import Iterable, Iterator, Mapping
+from inspect import cleandoc
 from typing import Any, Final, get_args
 
-import griffe
 import msgspec
+from msgspec import inspect
 
+from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
+from shapechanger.robot.profile.profile import QUANTITIES, RobotTable
 from shapechanger.robot.profile.read import DRIVERS, GIVEN, TABLES
 from shapechanger.robot.profile.toml import fields_of, keys_of, permitted
 
@@ -30,14 +31,20 @@ def with_keys(markdown: str) -> str:
 
 def _profile_table(name: str) -> Iterator[str]:
     """Return the keys of a table of a profile, and of each driver that it may name."""
-    yield from _keys(*TABLES[name])
-    for choosing, chips in DRIVERS.get(name, {}).items():
+    chosen = DRIVERS.get(name, {})
+    yield from _keys(*TABLES[name], options=chosen)
+    for choosing, chips in chosen.items():
         for driver, chip in chips.items():
-            yield f"#### `{choosing} = \"{driver}\"`"
-            measured = f" It measures {chip.measures}." if hasattr(chip, "measures") else ""
+            yield f'#### `{choosing} = "{driver}"`'
             keys = keys_of(chip)
-            yield f"{_summary(keys)}{measured}"
-            yield from _keys(keys)
+            yield _summary(keys) if keys is not Keys else "It has no more keys."
+            if quantities := [
+                f"`{quantity}` ({unit})" if unit != "1" else f"`{quantity}`"
+                for quantity, (unit, _, _, measures) in QUANTITIES.items()
+                if measures == getattr(chip, "measures", "")
+            ]:
+                yield f"It measures {', '.join(quantities)}."
+            yield from _keys(keys, options=chosen)
             if rows := getattr(chip, "rows", None):
                 yield f"Keys of each table `[{name}.NAME.JOINT]`:"
                 yield from _keys(rows)
@@ -46,69 +53,97 @@ def _profile_table(name: str) -> Iterator[str]:
 def _messages(side: str) -> Iterator[str]:
     """Return the messages of one side, the client's or the robot's."""
     for kind in get_args({"client": ClientMessage, "robot": RobotMessage}[side]):
-        yield f"#### `{msgspec.inspect.type_info(kind).tag}`"
+        yield f"#### `{inspect.type_info(kind).tag}`"
         yield _summary(kind)
         yield from _keys(kind, typed=True)
 
 
-def _keys(*kinds: type, typed: bool = False) -> Iterator[str]:
-    rows = [
-        f"| `{name}` | {_types(field.type) if typed else permitted(field.type)} "
-        f"| {_default(field)} | {_meanings(kind)[name]} |"
-        for kind in kinds
-        for name, field in fields_of(kind).items()
-        if typed or name not in GIVEN or kind is TABLES["robot"][0]
-    ]
+def _keys(
+    *kinds: type, typed: bool = False, options: Mapping[str, Iterable[str]] | None = None
+) -> Iterator[str]:
+    """Return a table of the fields of some types, if they have any.
+
+    Args:
+        kinds: The types.
+        typed: Whether they are messages, whose values have the types of MessagePack.
+        options: Names that a key can have as its value, keyed by the key.
+    """
+    rows: list[str] = []
+    for kind in kinds:
+        for name, field in fields_of(kind).items():
+            if not typed and name in GIVEN and kind is not RobotTable:
+                continue
+            meaning = _meanings(kind).get(name, "")
+            if typed:
+                values, meaning = _types(field.type), meaning.replace("None", "null")
+            else:
+                names = (options or {}).get(name)
+                one = inspect.LiteralType(tuple(names)) if names else field.type
+                values = permitted(one).replace(Pin.words, "a pin").replace("'", '"')
+                meaning = _NONE.sub("", meaning)
+            rows.append(f"| `{name}` | {values} | {_default(name, field)} | {meaning} |")
     if rows:
         yield "\n".join(["| Key | Values | Default | Meaning |", "|---|---|---|---|", *rows])
 
 
-def _default(field: msgspec.inspect.Field) -> str:
+# A default of None is no key at all.
+_NONE: Final = re.compile(r"; None [^.;]*")
+
+
+def _default(name: str, field: inspect.Field) -> str:
     """Return a default as a cell; empty for a required key."""
     value: Any = field.default
-    if field.required or field.default is msgspec.NODEFAULT or value in ("", ()):
+    if value is None:
+        return "none"
+    if value is msgspec.NODEFAULT or value in ("", ()):
         return ""
-    if isinstance(value, bool | float | date | None):
-        return {None: "none", math.inf: "no limit"}.get(value, f"{value}".lower())
-    return f"`{value!r}`" if isinstance(value, str) else str(value)
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return hex(value) if name in ("address", "mux") else f"{value:.9g}"
+    return str([*value])
 
 
 _TYPES: Final = {
-    msgspec.inspect.IntType: "integer",
-    msgspec.inspect.FloatType: "number",
-    msgspec.inspect.StrType: "text",
-    msgspec.inspect.BytesType: "bytes",
-    msgspec.inspect.BoolType: "true or false",
-    msgspec.inspect.NoneType: "null",
-    msgspec.inspect.DictType: "map",
-    msgspec.inspect.StructType: "map",
+    inspect.IntType: "integer",
+    inspect.FloatType: "number",
+    inspect.StrType: "text",
+    inspect.BytesType: "bytes",
+    inspect.BoolType: "true or false",
+    inspect.NoneType: "null",
+    inspect.DictType: "map",
+    inspect.StructType: "map",
 }
 
 
-def _types(kind: msgspec.inspect.Type) -> str:
+def _types(kind: inspect.Type) -> str:
     """Return the types of MessagePack that a field of a message may have."""
     match kind:
-        case msgspec.inspect.UnionType():
+        case inspect.UnionType():
             return " or ".join(map(_types, kind.types))
-        case msgspec.inspect.LiteralType():
+        case inspect.LiteralType():
             return " or ".join(f'"{value}"' for value in kind.values)
-        case msgspec.inspect.VarTupleType() | msgspec.inspect.ListType():
+        case inspect.VarTupleType() | inspect.ListType():
             return f"array of {_types(kind.item_type)}"
-        case msgspec.inspect.TupleType():
+        case inspect.TupleType():
             return f"array of {' and '.join(map(_types, kind.item_types))}"
         case _:
             return _TYPES[type(kind)]
 
 
-def _sections(kind: type) -> list[Any]:
-    """Return the parts of the docstring of a class."""
-    return griffe.parse_google(griffe.Docstring(inspect.cleandoc(kind.__doc__ or "")), warnings=False)
+def _sections(kind: type) -> list[tuple[str, Any]]:
+    """Return the kind and the content of each part of the docstring of a class."""
+    import griffe  # Part of the tools for the site.
+
+    doc = griffe.Docstring(cleandoc(kind.__doc__ or ""))
+    return [(one.kind.value, one.value) for one in griffe.parse_google(doc, warnings=False)]
 
 
 def _summary(kind: type) -> str:
     """Return what a docstring says before the attributes."""
-    texts = (s.value for s in _sections(kind) if s.kind is griffe.DocstringSectionKind.text)
-    return _cell(" ".join(texts))
+    return _cell(" ".join(value for part, value in _sections(kind) if part == "text"))
 
 
 def _meanings(kind: type) -> dict[str, str]:
@@ -116,9 +151,9 @@ def _meanings(kind: type) -> dict[str, str]:
     return {
         attribute.name: _cell(attribute.description)
         for base in reversed(kind.__mro__)
-        for section in _sections(base)
-        if section.kind is griffe.DocstringSectionKind.attributes
-        for attribute in section.value
+        for part, value in _sections(base)
+        if part == "attributes"
+        for attribute in value
     }
 
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from scripts.key_tables import with_keys
 from scripts.site_pages import SitePage, api_pages, environment_pages, wiring_pages
 
 if TYPE_CHECKING:
@@ -99,7 +100,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Rewrite the links of a page to files outside `docs`, and the links of such files."""
+    """Add the tables of keys to a page, and rewrite its links to files outside `docs`."""
+    markdown = with_keys(markdown)
     origin = origin_of(page.file.src_uri)
     markdown = _ONLY_HERE.sub(lambda match: _to_made_pages(match[1], origin), markdown)
     return _CLIP.sub(_player, rewritten(_MERMAID.sub(_graph_as_table, markdown), origin))

@@ -129,8 +129,8 @@ class LimitPlan:
 
     Attributes:
         deadline_ms: Time for which the newest command acts before the robot stops, ms.
-        camera_stale_ms: Age of the newest frame from which the robot stops, ms; 0 for a robot
-            without a camera.
+        camera_stale_ms: Age of the newest frame from which the robot stops, ms, 500 if a profile
+            does not state it; 0 for a robot without a camera.
         bump_hold_ms: Time for which a bump blocks forward motion, ms. All bumpers count as front
             bumpers, so the robot may still reverse.
         stop_distance_m: Distance ahead below which forward motion is blocked, as it is while a

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from scripts.key_tables import with_keys
 from shapechanger.errors import ProfileError, RobotError
 from shapechanger.layout import Layout
 from shapechanger.robot.drivers import chip
@@ -53,6 +54,13 @@ def _outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def _read(lines: str) -> Profile:
     text = shipped_profiles()["lab-car"].read_text() + lines
     return read_profile(text, Path("lab-car.toml"))
+
+
+@pytest.mark.usefixtures("_outside")
+def test_the_guide_lists_chips_of_another_package() -> None:
+    guide = with_keys("<!-- keys: profile sensor -->\n\n<!-- keys: profile output -->")
+    assert '#### `driver = "bh1750"`\n\nKeys of a BH1750.' in guide
+    assert '#### `driver = "relay"`' in guide
 
 
 @pytest.mark.usefixtures("_outside")

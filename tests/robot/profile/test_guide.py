@@ -1,4 +1,4 @@
-"""The guide to profiles matches the tables and the chips."""
+"""The guides to profiles and to the wire have every key, from the types that decode them."""
 
 from __future__ import annotations
 
@@ -7,47 +7,47 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.robot.drivers.as5600 import JointKeys
+from scripts.key_tables import with_keys
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
+from shapechanger.robot.link.messages import ClientMessage, RobotMessage
 from shapechanger.robot.profile import shipped_profiles
-from shapechanger.robot.profile.read import CAMERAS, GIVEN, TABLES
-from shapechanger.robot.profile.toml import fields_of
+from shapechanger.robot.profile.read import CAMERAS, TABLES
 from tests.robot.profile.texts import read
 
-GUIDE = (Path(__file__).parents[3] / "docs" / "profiles.md").read_text()
-KINDS = {
-    *(kind for kinds in TABLES.values() for kind in kinds),
-    *(chip.keys for chips in (OUTPUTS, PULSES, SENSORS) for chip in chips.values()),
-    *CAMERAS.values(),
-    JointKeys,
-}
+DOCS = Path(__file__).parents[3] / "docs"
+SOURCE = (DOCS / "profiles.md").read_text()
+
+
+@pytest.fixture(scope="module", name="guide")
+def _guide() -> str:
+    return with_keys(SOURCE)
 
 
 def test_vehicle_of_the_guide_is_a_profile() -> None:
-    (text,) = re.findall(r"```toml\n(\[robot\].*?)```", GUIDE, re.DOTALL)
+    (text,) = re.findall(r"```toml\n(\[robot\].*?)```", SOURCE, re.DOTALL)
     assert read(text).body == "hovercraft"
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS, key=lambda kind: kind.__name__))
-def test_every_key_is_in_the_guide(kind: type) -> None:
-    """The guide lists each key with its choices and its default."""
-    for name, field in fields_of(kind).items():
-        if name in GIVEN:
-            continue
-        assert f"`{name}`" in GUIDE
-        choices = [n for n in getattr(field.type, "values", ()) if isinstance(n, str) and n]
-        assert [n for n in choices if f'"{n}"' not in GUIDE and f"`{n}`" not in GUIDE] == []
-        rows = re.findall(rf"^\| `{name}` \| (.*?) \|", GUIDE, re.MULTILINE)
-        default = field.default
-        if rows and type(default) in (int, float) and name not in ("address", "low"):
-            assert any(row.startswith(f"{default:g}") for row in rows) or name == "camera_stale_ms"
+def test_every_key_of_a_profile_has_a_meaning(guide: str) -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (.*) \| (.*) \| (.*) \|$", guide, re.MULTILINE)
+    assert len(rows) > 90
+    assert [key for key, values, _, meaning in rows if not values or not meaning] == []
+    assert ("deadline_ms", "a whole number from 20 to 1000", "250") in {row[:3] for row in rows}
 
 
-def test_every_table_driver_and_profile_is_in_the_guide() -> None:
+def test_every_table_driver_and_profile_is_in_the_guide(guide: str) -> None:
     for table in TABLES:
-        assert re.search(rf"^### `\[+{table}[\].]", GUIDE, re.MULTILINE), table
-    for chips in (OUTPUTS, PULSES, SENSORS):
-        for name in chips:
-            assert f"`{name}`" in GUIDE or f'"{name}"' in GUIDE
-    for name in shipped_profiles():
-        assert f"| `{name}` |" in GUIDE
+        heading = re.escape(f"<!-- keys: profile {table} -->")
+        assert re.search(rf"^### `\[+{table}[\].]", SOURCE, re.MULTILINE), table
+        assert re.search(heading, SOURCE), table
+    for names in (OUTPUTS, SENSORS, CAMERAS):
+        assert all(f'#### `driver = "{name}"`' in guide for name in names)
+    assert all(f'#### `over = "{name}"`' in guide for name in PULSES)
+    assert all(f"`{name}`" in guide for name in shipped_profiles())
+
+
+def test_every_message_is_on_the_wire() -> None:
+    page = with_keys((DOCS / "wire.md").read_text())
+    for kind in (*ClientMessage.__args__, *RobotMessage.__args__):
+        assert f"#### `{kind.__name__.lower()}`" in page
+    assert '| `pace` | "lockstep" or "realtime" | "realtime" | Whether' in page

@@ -115,7 +115,7 @@ deadline_ms = 200 -> deadline_ms = 39 -> must be at least 40 ms, the time from o
 deadline_ms = 200 -> camera_stale_ms = 99 -> must be at least 100 ms
 deadline_ms = 200 -> camera_stale_ms = 0 -> must be at least 100 ms
 flip = true -> fps = 3 -> camera_stale_ms of [limits] must be at least 667 ms -> [limits]
-velocity = 2 -> collision = 10 -> collision of [reward] must be a number from -1e+06 to 0
+velocity = 2 -> collision = 10 -> collision of [reward] must be a number from -1000000 to 0
 throttle = -0.4 -> throttle = -0.6 -> must have -0.5 to 1 for throttle
 throttle = -0.4 -> thrott = -0.4 -> no action: 'thrott' (did you mean
 arm = 0.5\n -> arm = 2\n -> [[reset]] number 2 must be a table of numbers -> [reset.values]

@@ -16,7 +16,11 @@ _PERIOD_NS: Final = 1_000_000_000
 
 
 class CpuTemperatureKeys(Keys, frozen=True, kw_only=True):
-    """Keys of the CPU's temperature: the file of the kernel."""
+    """Keys of the CPU's temperature.
+
+    Attributes:
+        path: File of the kernel.
+    """
 
     path: FilePath = "/sys/class/thermal/thermal_zone0/temp"
 

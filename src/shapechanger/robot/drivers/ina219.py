@@ -5,7 +5,7 @@ Registers: Texas Instruments, INA219 data sheet, SBOS448G, section 8.6.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Final
 
 from msgspec import Meta
@@ -13,7 +13,7 @@ from msgspec import Meta
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.keys import I2cKeys
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -28,15 +28,10 @@ _STATUS_BITS: Final = 3  # Below the voltage: two flags and one unused bit.
 _PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shared.
 
 
-class Ina219Keys(Keys, frozen=True, kw_only=True):
-    """Keys of an INA219: its I2C bus and its address."""
+class Ina219Keys(I2cKeys, frozen=True, kw_only=True):
+    """Keys of an INA219. 0x40 is also the default of a PCA9685: solder a bridge on one."""
 
-    bus: BusNumber = 1
     address: Annotated[int, Meta(ge=0x40, le=0x4F)] = 0x40
-
-    def claims(self) -> Iterator[Claim]:
-        """Return the claims of the bus and the address."""
-        return i2c_claims(self.bus, "address", self.address)
 
 
 class Ina219:

@@ -86,3 +86,19 @@ def i2c_claims(bus: int, key: str, address: int, group: str = "") -> Iterator[Cl
     yield Claim(key, f"address {address:#x} of I2C bus {bus}", group)
     for pin in I2C_PINS.get(bus, ()):
         yield Claim("bus", f"GPIO{pin}", f"I2C bus {bus}", f", a wire of I2C bus {bus},")
+
+
+class I2cKeys(Keys, frozen=True, kw_only=True):
+    """Keys of a chip on an I2C bus.
+
+    Attributes:
+        bus: Number of the bus; 1 is GPIO2 and GPIO3.
+        address: Address of the chip.
+    """
+
+    bus: BusNumber = 1
+    address: int
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the bus and the address."""
+        return i2c_claims(self.bus, "address", self.address)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Final
 
 from msgspec import Meta
@@ -17,7 +17,7 @@ from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.keys import I2cKeys
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -47,15 +47,10 @@ _MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
 _ZERO_SHARE: Final = 0.02
 
 
-class Mpu6050Keys(Keys, frozen=True, kw_only=True):
-    """Keys of an MPU-6050: its I2C bus and its address."""
+class Mpu6050Keys(I2cKeys, frozen=True, kw_only=True):
+    """Keys of an MPU-6050. x points forward, y left and z up."""
 
-    bus: BusNumber = 1
     address: Annotated[int, Meta(ge=0x68, le=0x69)] = 0x68
-
-    def claims(self) -> Iterator[Claim]:
-        """Return the claims of the bus and the address."""
-        return i2c_claims(self.bus, "address", self.address)
 
 
 class Mpu6050:

@@ -29,7 +29,7 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
     """Keys of an output that takes pulses.
 
     Attributes:
-        over: Source of the pulses, see `PULSES`.
+        over: Source of the pulses.
         hz: Pulses per second; equal for all channels of a chip.
     """
 
@@ -156,7 +156,11 @@ class _PinChannel(_WholeMicroseconds):
 
 
 class _LgpioKeys(Keys, frozen=True, kw_only=True):
-    """Pulses directly on a pin."""
+    """Pulses directly on a pin.
+
+    Attributes:
+        pin: The pin.
+    """
 
     pin: Pin
 
@@ -226,7 +230,12 @@ class SysfsPwm(_WholeMicroseconds):
 
 
 class _SysfsKeys(Keys, frozen=True, kw_only=True):
-    """Pulses by the kernel's PWM."""
+    """Pulses by the kernel's PWM.
+
+    Attributes:
+        chip: Number of the PWM chip.
+        channel: Channel of the chip.
+    """
 
     chip: Annotated[int, Meta(ge=0, le=99)] = 0
     channel: Annotated[int, Meta(ge=0, le=15)]

@@ -21,7 +21,7 @@ _INF: Final = math.inf
 # Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the
 # state, and the kind of sensor that measures it (see `SensorPlan.measures`). The guard concludes
 # stalls from a measured speed, and collisions from a bumper or a stall.
-_QUANTITIES: Final = {
+QUANTITIES: Final = {
     "speed": ("m/s", -_INF, _INF, "speed"),
     "distance": ("m", 0.0, _INF, "distance"),
     "bump": ("1", 0.0, 1.0, "bump"),
@@ -53,7 +53,7 @@ def _state_features(plan: GuardPlan) -> list[Feature]:
             sources.setdefault("speed", Element("actuator", action.name))
     known = [
         Feature(name, unit, low, high, sources[measures])
-        for name, (unit, low, high, measures) in _QUANTITIES.items()
+        for name, (unit, low, high, measures) in QUANTITIES.items()
         if measures in sources
     ]
     for sensor in plan.sensors:

@@ -29,7 +29,14 @@ _DIGITS: Final = re.compile(r"[0-9_]{600}")
 
 
 class RewardKeys(Keys, frozen=True, kw_only=True):
-    """Keys of `[reward]`; see `Profile.reward`."""
+    """Keys of `[reward]`; see `Profile.reward`.
+
+    Attributes:
+        velocity: Reward per metre forward; a metre backward costs as much.
+        collision: Reward per collision.
+        stall: Reward per second of pushing without motion.
+        collision_ends_episode: Whether a collision ends the episode.
+    """
 
     velocity: Annotated[float, Meta(ge=0, le=1e6)] = 1.0
     collision: Annotated[float, Meta(ge=-1e6, le=0)] = -10.0
@@ -38,7 +45,12 @@ class RewardKeys(Keys, frozen=True, kw_only=True):
 
 
 class ResetKeys(Keys, frozen=True, kw_only=True):
-    """Keys of a step of the reset routine; see `ResetStep`."""
+    """Keys of a step of the reset routine; see `ResetStep`.
+
+    Attributes:
+        values: Value of each action within its caps; other actions are at rest.
+        seconds: Duration of the step, s.
+    """
 
     values: Annotated[
         dict[str, Annotated[float, Meta(ge=-1, le=1)]],
@@ -61,20 +73,42 @@ class EnableKeys(Keys, frozen=True, kw_only=True):
 
 
 class EmergencyButtonKeys(Keys, frozen=True, kw_only=True):
-    """Key of `[emergency_button]`: pin of a button to ground."""
+    """Key of `[emergency_button]`.
+
+    Attributes:
+        pin: Pin of a button to ground. Pressing it stops the robot until a person arms it again.
+    """
 
     pin: Pin
 
 
 class _NumberKeys(Keys, frozen=True, kw_only=True):
+    """A camera on the ribbon cable.
+
+    Attributes:
+        number: Number of the camera.
+    """
+
     number: Annotated[int, Meta(ge=0, le=9)] = 0
 
 
 class _DeviceKeys(Keys, frozen=True, kw_only=True):
+    """A webcam.
+
+    Attributes:
+        device: Device of the camera.
+    """
+
     device: FilePath = "/dev/video0"
 
 
 class _PathKeys(Keys, frozen=True, kw_only=True):
+    """A folder of JPEG files, or a stream of them.
+
+    Attributes:
+        path: The folder, or the pipe, the file or "| program arguments" that streams.
+    """
+
     path: FilePath
 
 

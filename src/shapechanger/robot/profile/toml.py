@@ -106,7 +106,7 @@ def permitted(kind: inspect.Type) -> str:
             number = "a whole number" if isinstance(kind, inspect.IntType) else "a number"
             to = "to" if kind.gt is None else "and up to"
             ends = {"in steps of": kind.multiple_of, "from": kind.ge, "above": kind.gt, to: kind.le}
-            given = (f"{word} {end:g}" for word, end in ends.items() if end is not None)
+            given = (f"{word} {end:.9g}" for word, end in ends.items() if end is not None)
             return " ".join((number, *given))
         case inspect.LiteralType():
             return f"one of {', '.join(repr(value) for value in kind.values if value)}"

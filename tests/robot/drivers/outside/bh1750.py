@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Meta
@@ -11,7 +10,7 @@ from shapechanger.contract.plan import SensorPlan
 from shapechanger.layout import Element, Feature
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.keys import I2cKeys
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -24,15 +23,10 @@ LUX = 240.0
 """Light in the twin's world, which has no sun."""
 
 
-class Bh1750Keys(Keys, frozen=True, kw_only=True):
-    """Keys of a BH1750: its I2C bus and its address."""
+class Bh1750Keys(I2cKeys, frozen=True, kw_only=True):
+    """Keys of a BH1750."""
 
-    bus: BusNumber = 1
     address: Annotated[int, Meta(ge=0x23, le=0x5C)] = 0x23
-
-    def claims(self) -> Iterator[Claim]:
-        """Return the claims of the bus and the address."""
-        return i2c_claims(self.bus, "address", self.address)
 
 
 class Bh1750:
