@@ -134,7 +134,7 @@ class RealClock:
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Do nothing; see `Clock.keep_alive`."""
 
-    async def sleep(self, seconds: float) -> None:
+    async def sleep(self, seconds: float) -> int | None:
         """Sleep for `seconds` of real time."""
         import asyncio  # Imported here, because the guard does not need it.
 

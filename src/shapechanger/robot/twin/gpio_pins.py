@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from gpiozero import PinInvalidState, PinSetInput
+from gpiozero import PinSetInput
 from gpiozero.pins.pi import PiFactory, PiPin
 
-from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.twin.rpc import BoardClient
 
@@ -29,12 +28,8 @@ class TwinPin(PiPin):
     def __init__(self, factory: TwinPinFactory, info: Any) -> None:
         super().__init__(factory, info)
         self._board = factory.board
-        self._function = "input"
-        self._pull = "floating"
         self._watched = False
-        self._pwm_hz = 0
-        self._duty = 0.0
-        self._claim()
+        self._claim("input")
 
     @property
     def number(self) -> int:
@@ -48,15 +43,13 @@ class TwinPin(PiPin):
         if self._function == "output":
             self.frequency = None
         else:
-            self._pull = "floating"
-            self._watched = False
-            self._claim()
+            self.function = "input"
 
     def output_with_state(self, state: bool) -> None:
         """Become an output at this level; an output changes to it."""
         if self._function != "output":
-            self._function, self._pull, self._watched = "output", "floating", False
-            self._claim(int(state))
+            self._watched = False
+            self._claim("output", level=int(state))
         self.state = state
 
     def report_edge(self, level: int, at_ns: int) -> None:
@@ -69,9 +62,10 @@ class TwinPin(PiPin):
         if self._watched and self.edges in ("both", "rising" if level else "falling"):
             self._call_when_changed(at_ns / 1e9, level)
 
-    def _claim(self, level: int = 0) -> None:
-        claimed = (self._number, self._function, self._pull, level)
-        found = self._board.levels[self._number] = self._board.ask(int, "claim", *claimed)
+    def _claim(self, function: str, pull: str = "floating", level: int = 0) -> None:
+        self._function, self._pull = function, pull
+        found = self._board.ask(int, "claim", self._number, function, pull, level)
+        self._board.levels[self._number] = found
         self._pwm_hz, self._duty = 0, float(found)
 
     def _drive(self, duty: float, hz: int) -> None:
@@ -83,15 +77,11 @@ class TwinPin(PiPin):
         return self._function
 
     def _set_function(self, value: str) -> None:
-        if value not in ("input", "output"):
-            raise ValueError(f"A pin is an input or an output, not {value!r}.")
-        self._function = value
-        self._pull = "floating"
         self._watched = False
-        self._claim()
+        self._claim(value)
 
     def _get_state(self) -> float:
-        if self._pwm_hz or self._function == "output":
+        if self._function == "output":
             return self._duty
         if self._board.clock == "real":  # Twin time stands still between two grants.
             self._board.wait()
@@ -100,8 +90,6 @@ class TwinPin(PiPin):
     def _set_state(self, value: float) -> None:
         if self._function == "input":
             raise PinSetInput(f"cannot set state of pin {self!r}")
-        if not 0 <= value <= 1:
-            raise PinInvalidState(f"invalid state {value!r} for pin {self!r}")
         if self._pwm_hz:
             self._drive(int(value * 100) / 100, self._pwm_hz)
         else:
@@ -111,22 +99,16 @@ class TwinPin(PiPin):
         return self._pwm_hz or None
 
     def _set_frequency(self, value: float | None) -> None:
-        if not value:
-            if self._pwm_hz and not self._board.closed:
-                self._drive(0.0, 0)
-        elif self._function != "output":
-            raise RobotError(f"{self!r} is an input and cannot send PWM.")
-        else:
+        if value:
             self._drive(self._duty if self._pwm_hz else 0.0, int(value))
+        elif self._pwm_hz and not self._board.closed:
+            self._drive(0.0, 0)
 
     def _get_pull(self) -> str:
         return self._pull
 
     def _set_pull(self, value: str) -> None:
-        if self._function != "input" or value not in ("up", "down", "floating"):
-            raise RobotError(f"{self!r} is an {self._function} and takes no pull {value!r}.")
-        self._pull = value
-        self._claim()
+        self._claim("input", value)
 
     def _enable_event_detect(self) -> None:
         self._watched = True

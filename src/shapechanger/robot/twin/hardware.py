@@ -11,7 +11,7 @@ from typing import Any
 from shapechanger.errors import translate_errors
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
-from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.hardware import Hardware, RealClock
 from shapechanger.robot.twin.rpc import (
     MAX_MESSAGE,
     BoardClient,
@@ -22,15 +22,11 @@ from shapechanger.robot.twin.rpc import (
 )
 
 
-class SteadyClock:
+class SteadyClock(RealClock):
     """The machine's monotonic clock; edges of inputs are dispatched while the guard waits."""
 
     def __init__(self, client: BoardClient) -> None:
         self._client = client
-
-    def now_ns(self) -> int:
-        """Return the time of CLOCK_MONOTONIC in nanoseconds."""
-        return time.monotonic_ns()
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
         """Wait until a descriptor can be read or it is `until_ns`; see `Clock.wait`."""
@@ -57,12 +53,6 @@ class SteadyClock:
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
         self._client.while_held_up = beat
-
-    async def sleep(self, seconds: float) -> int | None:
-        """Sleep in real time."""
-        import asyncio  # Only the daemon sleeps; the guard stays light.
-
-        await asyncio.sleep(seconds)
 
 
 class GrantedClock(SteadyClock):
@@ -219,9 +209,7 @@ class TwinHardware(Hardware):
 
     def close(self) -> None:
         """Let go of the pins and leave the board."""
-        if self._pin_factory is not None:
-            self._pin_factory.close()
-            self._pin_factory = None
+        super().close()
         self.board.close()
 
 

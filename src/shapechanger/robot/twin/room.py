@@ -33,7 +33,7 @@ CAR_SPEED: Final = 1.5
 
 _STEERING_LAG_S: Final = 0.08
 _CONTACT: Final = 0.004  # m: something this near presses the bumper
-_BUMPER_SPREAD: Final = math.radians(75.0)  # Reach of the front bumper to each side.
+_BUMPER: Final = np.radians(np.arange(-75.0, 76.0, 7.5))  # Reach of the front bumper.
 _LONGEST_STEP_S: Final = 0.01
 _SAG_V: Final = 0.36  # Loss of the battery with a motor at full value.
 
@@ -153,7 +153,7 @@ class DrivingWorld(World):
             acceleration_x=self._acceleration,
             acceleration_y=self._speed * self._yaw_rate,
             yaw_rate=self._yaw_rate,
-            bumped=self._touches_ahead(),
+            bumped=bool(self._cast(_BUMPER)[0].min() <= RADIUS + _CONTACT),
             battery_v=self.resting_v - _SAG_V * self._load,
         )
 
@@ -213,15 +213,6 @@ class DrivingWorld(World):
             self._speed = 0.0
         self._acceleration = (self._speed - before) / dt_s
         self._load = sum(map(abs, values.values()))
-
-    def _touches_ahead(self) -> bool:
-        walls = (0.0, math.pi / 2, math.pi, -math.pi / 2)
-        gaps = (ROOM_LENGTH - self._x, ROOM_WIDTH - self._y, self._x, self._y)
-        return any(
-            gap <= RADIUS + _CONTACT
-            and abs(math.remainder(bearing - self._heading, math.tau)) <= _BUMPER_SPREAD
-            for gap, bearing in zip(gaps, walls, strict=True)
-        )
 
 
 def _lagged(value: float, target: float, lag_s: float, dt_s: float) -> float:

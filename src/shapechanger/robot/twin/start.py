@@ -83,19 +83,9 @@ def _no_module(place: Place, error: ModuleNotFoundError) -> RobotError:
 
 
 class BoardSettings(msgspec.Struct, frozen=True):
-    """Settings of a board's process.
+    """Settings of a board's process; see `start_board`."""
 
-    Attributes:
-        plan: The robot as it is wired, as the JSON of a `GuardPlan`.
-        folder: Folder of its files; see `BoardAt`.
-        clock: Kind of clock.
-        seed: Seed of everything random.
-        one_shot_ms: Hold time of the enable line's one-shot, ms; None without one.
-        place: Place of the robot.
-        camera: Front camera; None without one.
-    """
-
-    plan: str
+    plan: str  # JSON of a `GuardPlan`.
     folder: str
     clock: Literal["real", "twin"]
     seed: int
