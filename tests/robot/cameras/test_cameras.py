@@ -306,17 +306,11 @@ class _Request:
 
 
 class _Picamera2:
-    """Fake of `picamera2.Picamera2`, with the signatures of its source (raspberrypi/picamera2)."""
+    """Fake of `picamera2.Picamera2`, with the parameters that are used (raspberrypi/picamera2)."""
 
     made: list[_Picamera2] = []  # noqa: RUF012  (reset by the fixture)
 
-    def __init__(
-        self,
-        camera_num: int = 0,
-        verbose_console: Any = None,
-        tuning: Any = None,
-        allocator: Any = None,
-    ) -> None:
+    def __init__(self, camera_num: int = 0) -> None:
         if camera_num > 0:
             raise IndexError("list index out of range")
         self.calls: list[tuple[str, Any]] = []
@@ -325,31 +319,17 @@ class _Picamera2:
         self.made.append(self)
 
     def create_video_configuration(
-        self,
-        main: Any = {},  # noqa: B006  (as in the source)
-        lores: Any = None,
-        raw: Any = None,
-        transform: Any = None,
-        colour_space: Any = None,
-        buffer_count: int = 6,
-        controls: Any = {},  # noqa: B006
-        display: Any = "main",
-        encode: Any = "main",
-        queue: bool = True,
-        sensor: Any = {},  # noqa: B006
-        use_case: str = "video",
+        self, main: Any, transform: Any, queue: bool, controls: Any
     ) -> dict[str, Any]:
         return {"main": main, "transform": transform, "controls": controls, "queue": queue}
 
-    def configure(self, camera_config: Any = "preview") -> None:
+    def configure(self, camera_config: Any) -> None:
         self.calls.append(("configure", camera_config))
 
-    def start(self, config: Any = None, show_preview: Any = False) -> None:
+    def start(self) -> None:
         self.calls.append(("start", None))
 
-    def capture_request(
-        self, wait: Any = None, signal_function: Any = None, flush: Any = None
-    ) -> _Request:
+    def capture_request(self, wait: Any = None) -> _Request:
         self.calls.append(("capture_request", wait))
         if self.image.size == 0:
             raise TimeoutError
@@ -366,9 +346,7 @@ class _Picamera2:
 class _Transform:
     """Fake of `libcamera.Transform`."""
 
-    def __init__(
-        self, rotation: int = 0, hflip: int = 0, vflip: int = 0, transpose: int = 0
-    ) -> None:
+    def __init__(self, hflip: int = 0, vflip: int = 0) -> None:
         self.flips = (hflip, vflip)
 
 

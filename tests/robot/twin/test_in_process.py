@@ -7,9 +7,6 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.layout import Layout
-from shapechanger.robot.link.messages import Observation
-from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.room import DrivingWorld
 from tests.robot.twin.in_process import InProcessRobot
 from tests.robots import CAR, SWAPPED_WAYS, changed, write_profile
@@ -17,32 +14,8 @@ from tests.robots import CAR, SWAPPED_WAYS, changed, write_profile
 _PARTS = {"wheels", "steering"}
 
 
-def _robot(world: DrivingWorld | None = None, *, pictures: bool = False) -> InProcessRobot:
-    profile = load_profile(find_profile("lab-car"))
-    return InProcessRobot(profile, world or _room(), pictures=pictures)
-
-
 def _room() -> DrivingWorld:
     return DrivingWorld(_PARTS, (160, 120), seed=1)
-
-
-def _speed(robot: InProcessRobot, seen: Observation) -> float:
-    names = Layout.from_json(robot.welcome.state_layout).names
-    return seen.state[names.index("speed")]
-
-
-def test_the_throttle_follows_the_slew_limit() -> None:
-    """The applied throttle rises by the profile's slew, and the encoder measures the speed."""
-    world = _room()
-    robot = _robot(world)
-    robot.start(lambda: world.place(2))
-    begin = world.inputs().travelled_m
-    applied = [robot.step((0.0, 1.0))[0].action_applied[1] for _ in range(10)]
-    assert applied == pytest.approx([min(1.0, 0.2 * (i + 1)) for i in range(10)])
-    seen = robot.step((0.0, 1.0))[0]
-    assert world.inputs().travelled_m > begin + 0.1
-    assert _speed(robot, seen) > 0.3
-    robot.close()
 
 
 def test_swapped_pins_drive_backward(tmp_path: Path) -> None:
@@ -62,15 +35,6 @@ def test_swapped_pins_drive_backward(tmp_path: Path) -> None:
         robot.close()
     assert travelled[0] > 0.1
     assert travelled[1] == pytest.approx(-travelled[0], rel=0.05)
-
-
-def test_a_bump_between_observations_is_reported() -> None:
-    world = _room()
-    robot = _robot(world)
-    robot.start(lambda: world.place(2))
-    bumps = sum(robot.step((0.0, 1.0))[1] for _ in range(200))
-    assert bumps == 1
-    robot.close()
 
 
 def test_a_sensor_that_is_not_wired_is_refused(tmp_path: Path) -> None:

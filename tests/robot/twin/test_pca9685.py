@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,11 @@ from shapechanger.robot.drivers.pca9685 import SimulatedPca9685
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import ACTIONS, esc, process, servo
 
 pytestmark = pytest.mark.realtime
@@ -97,33 +100,23 @@ def test_without_auto_increment_a_block_lands_in_one_register() -> None:
     assert chip.pulses[0].us == 0.0
 
 
-def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written(
-    tmp_path: Path,
-) -> None:
-    at = _ON_CHIP | {"channel": 0}
-    plan = GuardPlan(
-        "car",
-        ACTIONS,
-        (
-            esc("drive", "wheels", {"throttle": 1.0}, **at),
-            servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),
-        ),
-    )
-    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        hardware = connect(board.socket_path)
-        drive, steer = (open_output(output, hardware) for output in plan.outputs)
-        wiring = TwinWiring(plan)
-        steer.write(0.2, 0)
-        operator.break_chip(1, 0x40)
-        with pytest.raises(RobotError, match="Remote I/O"):
-            steer.write(0.4, 1)
-        assert wiring.read(operator.levels(), 0)["steer"].value is None
-        operator.break_chip(1, 0x40, dead=False)
-        steer.write(0.2, 2)
-        assert wiring.read(operator.levels(), 0)["steer"].value is None
-        drive.write(0.0, 2)
-        assert wiring.read(operator.levels(), 0)["steer"].value == pytest.approx(0.2, abs=0.01)
-        hardware.close()
+def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written() -> None:
+    drive_plan = esc("drive", "wheels", {"throttle": 1.0}, **_ON_CHIP | {"channel": 0})
+    plan = replace(_SERVO_CAR, outputs=(drive_plan, *_SERVO_CAR.outputs))
+    wiring = TwinWiring(plan)
+    board = LocalBoard(wiring, DrivingWorld((), (8, 6), seed=0))
+    drive, steer = (open_output(output, board.hardware) for output in plan.outputs)
+    steer.write(0.2, 0)
+    board.pins.dead_chips.add((1, 0x40))
+    with pytest.raises(RobotError, match="no chip answers"):
+        steer.write(0.4, 1)
+    assert wiring.read(board.pins.levels, 0)["steer"].value is None
+    board.pins.dead_chips.clear()
+    steer.write(0.2, 2)
+    assert wiring.read(board.pins.levels, 0)["steer"].value is None
+    drive.write(0.0, 2)
+    assert wiring.read(board.pins.levels, 0)["steer"].value == pytest.approx(0.2, abs=0.01)
+    board.hardware.close()
 
 
 def test_pulses_continue_after_the_process_dies(tmp_path: Path) -> None:

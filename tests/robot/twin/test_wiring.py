@@ -11,13 +11,11 @@ from shapechanger.contract.plan import GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import open_output
 from shapechanger.robot.drivers.simulation import Levels, Pulse
-from shapechanger.robot.twin.hardware import connect
-from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
-
-pytestmark = pytest.mark.realtime
 
 _CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1}
 _PHASE = OutputPlan(
@@ -44,26 +42,23 @@ _OUTPUTS = {
 
 
 @pytest.mark.parametrize("kind", _OUTPUTS)
-def test_the_wiring_inverts_each_driver(tmp_path: Path, kind: str) -> None:
+def test_the_wiring_inverts_each_driver(kind: str) -> None:
     """The value read from the levels is the value written, within one step of resolution."""
     output = _OUTPUTS[kind]
-    plan = GuardPlan("robot", ACTIONS, (output,))
-    wiring = TwinWiring(plan)
-    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        hardware = connect(board.socket_path)
-        driver = open_output(output, hardware)
-        for value in (0.0, 0.05, 0.3, 1.0, -0.05, -0.7, -1.0, 0.0):
-            driver.write(value, 10**9)
-            read = wiring.read(operator.levels(), 10**9)[output.name]
-            assert read.value == pytest.approx(value, abs=0.02), value
-            if "steering" not in output.mix:
-                assert read.at_rest == (value == 0.0)
-        driver.release()
-        read = wiring.read(operator.levels(), 10**9)[output.name]
-        assert read.value == (None if output.driver in ("servo", "esc") else 0.0)
-        assert read.at_rest
-        driver.close()
-        hardware.close()
+    wiring = TwinWiring(GuardPlan("robot", ACTIONS, (output,)))
+    board = LocalBoard(wiring, DrivingWorld((), (8, 6), seed=0))
+    driver = open_output(output, board.hardware)
+    for value in (0.0, 0.05, 0.3, 1.0, -0.05, -0.7, -1.0, 0.0):
+        driver.write(value, 10**9)
+        read = wiring.read(board.pins.levels, 10**9)[output.name]
+        assert read.value == pytest.approx(value, abs=0.02), value
+        if "steering" not in output.mix:
+            assert read.at_rest == (value == 0.0)
+    driver.release()
+    read = wiring.read(board.pins.levels, 10**9)[output.name]
+    assert read == (None if output.driver in ("servo", "esc") else 0.0, True)
+    driver.close()
+    board.hardware.close()
 
 
 def test_only_outputs_with_throttle_propel() -> None:
