@@ -56,7 +56,7 @@ class RunningRobot:
         self.folder = folder
         self.supervisor = supervisor
         self._temporary = temporary
-        self._ready = self._await_ready()
+        self.await_restart()
 
     def __enter__(self) -> Self:
         """Return the robot."""
@@ -71,9 +71,7 @@ class RunningRobot:
     @property
     def port(self) -> int:
         """Port on 127.0.0.1; while the daemon restarts, wait for its new one."""
-        if self.supervisor.poll() is None:
-            self._ready = self._await_ready()
-        return int(self._ready["port"])
+        return int(self.await_restart()["port"])
 
     @property
     def ledger_path(self) -> Path:
@@ -88,7 +86,7 @@ class RunningRobot:
     def known_at(self, address: str) -> KnownRobot:
         """Return the credentials with another address, such as a proxy's."""
         key = (self.folder / "credentials" / "key").read_text().strip()
-        return KnownRobot("robot", address, key, str(self._ready["fingerprint"]) or "insecure")
+        return KnownRobot("robot", address, key, self.await_restart()["fingerprint"] or "insecure")
 
     def client(self, **options: Any) -> RobotClient:
         """Connect to it; the options are `RobotClient.connect`'s."""
@@ -117,13 +115,25 @@ class RunningRobot:
         path = self.folder / "log.txt"
         return path.read_text(errors="replace") if path.exists() else ""
 
-    def await_restart(self, timeout_s: float = _READY_S) -> None:
-        """Wait until the daemon can be reached again after a restart.
+    def await_restart(self, timeout_s: float = _READY_S) -> dict[str, Any]:
+        """Wait until the daemon can be reached, also after a restart.
+
+        Returns:
+            Its "port" and the "fingerprint" of its certificate.
 
         Raises:
-            RobotError: If it does not restart in time.
+            RobotError: If it does not start in time.
         """
-        self._ready = self._await_ready(timeout_s)
+        path = self.folder / _READY
+        until_s = time.monotonic() + timeout_s
+        while not path.exists():
+            if self.supervisor.poll() is not None or time.monotonic() > until_s:
+                self._end()
+                text = self.log_text().strip()
+                self.close()
+                raise RobotError(f"The robot did not start: {text}")
+            time.sleep(_POLL_S)
+        return json.loads(path.read_text())
 
     def forget_ready(self) -> None:
         """Remove the daemon's ready file, before something that restarts the daemon."""
@@ -141,18 +151,6 @@ class RunningRobot:
             self.supervisor.send_signal(signal.SIGCONT)
             self.supervisor.terminate()
         end(self.supervisor, _END_S)
-
-    def _await_ready(self, timeout_s: float = _READY_S) -> dict[str, Any]:
-        path = self.folder / _READY
-        until_s = time.monotonic() + timeout_s
-        while not path.exists():
-            if self.supervisor.poll() is not None or time.monotonic() > until_s:
-                self._end()
-                text = self.log_text().strip()
-                self.close()
-                raise RobotError(f"The robot did not start: {text}")
-            time.sleep(_POLL_S)
-        return json.loads(path.read_text())
 
 
 def run_robot(
