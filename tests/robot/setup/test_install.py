@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.check.standing import StandingRobot, examine
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.install import (
     RootCommand,
     changes_to_install,
@@ -25,19 +24,16 @@ from shapechanger.robot.setup.install import (
 from tests.robot.check.held_pins import shipped
 from tests.robot.setup.fake_pi import FakePi
 
-_CAMERA = CameraPlan("picamera2")
 _UNIT = "etc/systemd/system/shapechanger-car.service"
 
 
-def _plan(name: str) -> GuardPlan:
-    return shipped(name).guard_plan()
+def _blind(kind: str) -> Profile:
+    return replace(shipped(kind), camera=None)
 
 
-def _install(
-    pi: FakePi, plan: GuardPlan, camera: CameraPlan | None = None, *, dry: bool = False
-) -> dict[str, tuple[str, str]]:
-    unit, _ = write_unit(plan.name, pi.root / "home" / f"{plan.name}.toml")
-    changes = changes_to_install(plan, camera, unit, pi.machine)
+def _install(pi: FakePi, robot: Profile, *, dry: bool = False) -> dict[str, tuple[str, str]]:
+    unit, _ = write_unit(robot.name, pi.root / "home" / f"{robot.name}.toml")
+    changes = changes_to_install(robot, unit, pi.machine)
     return {o.change.name: (o.level, o.sentence) for o in make_changes(changes, pi.run, dry=dry)}
 
 
@@ -53,7 +49,7 @@ def pi(tmp_path: Path) -> FakePi:
 
 def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
     """The second run changes nothing and says so."""
-    found = _install(pi, _plan("car"), _CAMERA)
+    found = _install(pi, shipped("car"))
     assert _levels(found) == {
         "group gpio": "did",
         "group video": "did",
@@ -65,7 +61,7 @@ def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
     }
     assert (pi.root / _UNIT).read_text().count("ExecStart=") == 1
     ran = list(pi.ran)
-    assert set(_levels(_install(pi, _plan("car"), _CAMERA)).values()) == {"already"}
+    assert set(_levels(_install(pi, shipped("car"))).values()) == {"already"}
     assert pi.ran == ran
 
 
@@ -76,12 +72,12 @@ def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
         found = examine(StandingRobot(profile, root=pi.root))
         levels = {one.check: one.level for one in found}
         assert (levels["strict_gpiod"], levels["systemd"]) == (expected, expected)
-        _install(pi, profile.guard_plan())
+        _install(pi, profile)
 
 
 def test_a_dry_run_changes_nothing(pi: FakePi) -> None:
     """Each sentence is the command."""
-    found = _install(pi, _plan("car"), _CAMERA, dry=True)
+    found = _install(pi, shipped("car"), dry=True)
     assert found["group gpio"] == ("would", "sudo usermod -aG gpio pi")
     assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
     assert pi.ran == []
@@ -92,21 +88,21 @@ def test_a_servo_board_needs_i2c(pi: FakePi, raspi_config: bool) -> None:
     """raspi-config is used where it is there, and config.txt otherwise."""
     if raspi_config:
         pi.write("usr/bin/raspi-config", "")
-    found = _levels(_install(pi, _plan("car-esc")))
+    found = _levels(_install(pi, _blind("car-esc")))
     assert (found["I2C"], found["group i2c"]) == ("did", "did")
     assert any("raspi-config nonint do_i2c 0" in line for line in pi.ran) == raspi_config
     assert (pi.root / "etc/modules-load.d/i2c-dev.conf").exists() != raspi_config
-    assert _levels(_install(pi, _plan("car-esc")))["I2C"] == "already"
+    assert _levels(_install(pi, _blind("car-esc")))["I2C"] == "already"
 
 
-def _changed(plan: GuardPlan, **settings: object) -> GuardPlan:
-    outputs = (replace(one, settings={**one.settings, **settings}) for one in plan.outputs)
-    return replace(plan, outputs=tuple(outputs))
+def _changed(robot: Profile, **settings: object) -> Profile:
+    outputs = (replace(one, settings={**one.settings, **settings}) for one in robot.outputs)
+    return replace(robot, outputs=tuple(outputs))
 
 
 def test_another_bus_is_left_to_a_person(pi: FakePi) -> None:
     """Its overlay depends on its pins."""
-    plan = _changed(_plan("car-esc"), bus=3)
+    plan = _changed(_blind("car-esc"), bus=3)
     level, sentence = _install(pi, plan)["I2C bus 3"]
     assert (level, "dtoverlay=i2c3" in sentence) == ("failed", True)
     pi.write("dev/i2c-3", "")
@@ -116,15 +112,15 @@ def test_another_bus_is_left_to_a_person(pi: FakePi) -> None:
 def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
     """A line below a filter, such as [pi5], applies to that model only; ours applies to all."""
     pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")
-    assert _install(pi, _plan("car"))["strict_gpiod"][0] == "did"
+    assert _install(pi, _blind("car"))["strict_gpiod"][0] == "did"
     assert pi.config.endswith("[pi5]\ndtparam=strict_gpiod\n\n[all]\ndtparam=strict_gpiod\n")
 
 
 def test_a_rig_on_an_adapter(pi: FakePi) -> None:
     """Its adapter gets a short latency, and its encoders a fast bus."""
-    found = _levels(_install(pi, _plan("finger")))
+    found = _levels(_install(pi, _blind("finger")))
     assert (found["latency timer"], found["I2C speed"], found["group dialout"]) == ("did",) * 3
-    assert set(_levels(_install(pi, _plan("finger"))).values()) == {"already"}
+    assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}
 
 
 @pytest.mark.parametrize(("raspi_config", "level"), [(True, "did"), (False, "failed")])
@@ -132,7 +128,7 @@ def test_a_rig_on_the_headers_serial_port(pi: FakePi, raspi_config: bool, level:
     """Only raspi-config knows how a model's port is freed from the console."""
     if raspi_config:
         pi.write("usr/bin/raspi-config", "")
-    found = _install(pi, _changed(_plan("finger"), device="/dev/serial0"))
+    found = _install(pi, _changed(_blind("finger"), device="/dev/serial0"))
     assert (found["serial port"][0], found["serial console"][0]) == (level, level)
     assert ("enable_uart=1" in found["serial port"][1]) != raspi_config
 
@@ -140,7 +136,7 @@ def test_a_rig_on_the_headers_serial_port(pi: FakePi, raspi_config: bool, level:
 def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:
     """The other changes are made."""
     pi.refuses = "usermod"
-    found = _install(pi, _plan("car"))
+    found = _install(pi, _blind("car"))
     assert found["group gpio"] == (
         "failed",
         "usermod: permission denied. By hand: sudo usermod -aG gpio pi",
@@ -151,7 +147,7 @@ def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:
 def test_a_command_without_an_effect_is_told(pi: FakePi) -> None:
     """An exit code of 0 is not proof."""
     unit, _ = write_unit("car", pi.root / "home" / "car.toml")
-    changes = changes_to_install(_plan("car"), None, unit, pi.machine)
+    changes = changes_to_install(_blind("car"), unit, pi.machine)
     outcomes = list(make_changes(changes, lambda _: ""))
     assert {outcome.level for outcome in outcomes} == {"failed"}
     assert all("the command had no effect" in outcome.sentence for outcome in outcomes)
@@ -160,7 +156,7 @@ def test_a_command_without_an_effect_is_told(pi: FakePi) -> None:
 def test_without_groups_and_config(tmp_path: Path) -> None:
     """What Raspberry Pi OS would have is named."""
     pi = FakePi(tmp_path, config=None, groups=())
-    found = _install(pi, _plan("car"), _CAMERA)
+    found = _install(pi, shipped("car"))
     assert found["group gpio"] == (
         "failed",
         "There is no group gpio here, which Raspberry Pi OS has.",
@@ -172,7 +168,7 @@ def test_without_groups_and_config(tmp_path: Path) -> None:
 def test_the_service_is_removed(pi: FakePi) -> None:
     """An older one is replaced; once removed, nothing of it is left."""
     pi.write(_UNIT, "old")
-    assert _install(pi, _plan("car"))["service"][0] == "did"
+    assert _install(pi, _blind("car"))["service"][0] == "did"
     assert "safe-pins" in (pi.root / _UNIT).read_text()
     for level in ("did", "already"):
         changes = changes_to_remove("shapechanger-car.service", pi.root)

@@ -288,7 +288,7 @@ class Install:
             folder = self.credentials or credentials_folder(profile.name)
             load_credentials(folder)
             unit = self._unit(profile, machine.user)
-            changes = changes_to_install(profile.guard_plan(), profile.camera, unit, machine)
+            changes = changes_to_install(profile, unit, machine)
         outcomes: list[Outcome] = []
         for outcome in make_changes(changes, machine.run, dry=self.dry_run):
             level = "FAILED" if outcome.level == "failed" else outcome.level

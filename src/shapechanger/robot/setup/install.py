@@ -23,8 +23,8 @@ from typing import Final, Literal, NamedTuple
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError, translate_errors
 from shapechanger.files import cannot_write, write_new
-from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.settings import DRIVER
+from shapechanger.robot.profile.profile import Profile
 
 FAST_HZ: Final = 400_000
 """Speed of the I2C bus that encoders at joints need, bits per second."""
@@ -64,7 +64,7 @@ class BootConfig:
             if match := re.match(r"\s*\[([^\]]*)\]", line):
                 section = match[1]
             elif section == "all":
-                lines.append(line.partition("#")[0].replace(" ", ""))
+                lines.append("".join(line.partition("#")[0].split()))
         return lines
 
     def parameters(self) -> dict[str, str]:
@@ -303,30 +303,27 @@ def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
     )
 
 
-def changes_to_install(
-    guard: GuardPlan, camera: CameraPlan | None, unit: Path, machine: Machine
-) -> Iterator[SystemChange]:
+def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterator[SystemChange]:
     """Yield what puts a robot in place; each change is planned when those before are made.
 
     Args:
-        guard: Outputs and sensors of the robot.
-        camera: Its camera; None without one.
+        profile: The robot.
         unit: Its systemd unit, next to the profile.
         machine: The computer.
     """
     config = BootConfig(machine.root)
-    groups = {*device_groups(guard).values(), *(["video"] if camera is not None else [])}
+    groups = {*device_groups(profile).values(), *(["video"] if profile.camera else [])}
     for group in sorted(groups):
         yield _group(group, machine)
-    yield from _interfaces(guard, camera, machine, config)
-    if camera is not None and camera.driver == "picamera2":
+    yield from _interfaces(profile, machine, config)
+    if profile.camera is not None and profile.camera.driver == "picamera2":
         package = machine.root / "usr/lib/python3/dist-packages/picamera2"
         install = RootCommand(("apt-get", "install", "-y", "python3-picamera2"))
         yield SystemChange(
             "picamera2", "python3-picamera2 is installed.", package.is_dir, (install,)
         )
     rule = machine.root / _UDEV
-    for device in servo_devices(guard):
+    for device in servo_devices(profile):
         if Path(device).name.startswith(_UARTS):
             yield from _serial_port(device, machine, config)
         else:
@@ -373,9 +370,7 @@ def _group(group: str, machine: Machine) -> SystemChange:
     )
 
 
-def _interfaces(
-    guard: GuardPlan, camera: CameraPlan | None, machine: Machine, config: BootConfig
-) -> Iterator[SystemChange]:
+def _interfaces(profile: Profile, machine: Machine, config: BootConfig) -> Iterator[SystemChange]:
     """Yield the lines that config.txt needs."""
 
     def line(
@@ -387,11 +382,11 @@ def _interfaces(
         words = f"There is no config.txt of Raspberry Pi OS here; it would need {text}."
         return SystemChange(name, state, is_made, commands, "restart", words)
 
-    if needs_pins(guard):
+    if needs_pins(profile):
         state = "The pins of a process that dies go low."
         is_strict = partial(config.sets, "strict_gpiod")
         yield line("strict_gpiod", state, "dtparam=strict_gpiod", is_strict)
-    for device in (name for name, group in device_groups(guard).items() if group == "i2c"):
+    for device in (name for name, group in device_groups(profile).items() if group == "i2c"):
         bus = int(device.rpartition("-")[2])
         if bus == _ARM_BUS:
             is_on = partial(config.sets, "i2c")
@@ -407,14 +402,14 @@ def _interfaces(
                 instead=f"Bus {bus} needs an overlay that depends on its pins, as "
                 f"dtoverlay=i2c{bus}.",
             )
-    if any(sensor.driver == "as5600" for sensor in guard.sensors):
+    if any(sensor.driver == "as5600" for sensor in profile.sensors):
         yield line(
             "I2C speed",
             f"The I2C bus has {FAST_HZ} bits per second.",
             f"dtparam=i2c_arm_baudrate={FAST_HZ}",
             lambda: config.i2c_hz() >= FAST_HZ,
         )
-    if camera is not None and camera.driver == "picamera2":
+    if profile.camera is not None and profile.camera.driver == "picamera2":
         finds = ("camera_auto_detect=1", *_CAMERA_OVERLAYS)
         yield line(
             "camera",
