@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from shapechanger.contract.plan import GuardPlan, SensorPlan, driven_pins
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.check.pins import outside_level, pin_level
 from shapechanger.robot.check.report import (
@@ -420,13 +420,14 @@ def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
 def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
     """Check that a PCA9685 answers; its pulses stay as they are."""
     name = f"The PCA9685 at {address:#04x} on I2C bus {bus}"
-    try:
-        with device_errors(name), closing(robot.pins.i2c(bus)) as opened:
-            opened.read_byte_data(address, _MODE1)
-    except RobotError as error:
-        yield "bad", f"{error} Look at SDA, SCL, 3.3 V and ground, and at `i2cdetect -y {bus}`."
-    else:
-        yield "good", f"{name} answers."
+    wires = f"Look at SDA, SCL, 3.3 V and ground, and at `i2cdetect -y {bus}`."
+    with (
+        translate_errors(RobotError, to=lambda error: RobotError(f"{error} {wires}")),
+        device_errors(name),
+        closing(robot.pins.i2c(bus)) as opened,
+    ):
+        opened.read_byte_data(address, _MODE1)
+    yield "good", f"{name} answers."
 
 
 def _servo_bus(robot: StandingRobot) -> Results:

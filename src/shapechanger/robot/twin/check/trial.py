@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Literal
 
-from shapechanger.errors import RobotError, ShapechangerError
+from shapechanger.errors import RobotError, ShapechangerError, translate_errors
 from shapechanger.robot.check.pins import SHOWN_S, Ask, BenchLamp, check_lamps, lamps_of, probed_pin
 from shapechanger.robot.check.report import Finding, Level, judged
 from shapechanger.robot.check.standing import StandingRobot, examine
@@ -294,7 +294,7 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
         board = opened.enter_context(robot.operator()) if bench.twin else None
         network = opened.enter_context(closing(BadNetwork(robot.port)))
         watcher = opened.enter_context(closing(bench.watcher()))
-        try:
+        with translate_errors(ShapechangerError, to=lambda error: NotTried(str(error))):
             _calm(robot)
             if board is not None:
                 board.place(0)
@@ -304,8 +304,6 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
             if fault.by_policy:
                 _arm_for_program(robot)
             driver.await_commands(_COMMANDS)
-        except ShapechangerError as error:
-            raise NotTried(str(error)) from error
         _await_drive(watcher)
         drove = watcher.moves() is not False
         if fault.then == "starts afresh":
