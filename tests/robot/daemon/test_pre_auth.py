@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.robot.daemon.server import PreAuthConnections
+from shapechanger.robot.daemon.server import Listener
 
 pytestmark = pytest.mark.realtime
+
+
+_listener = partial(Listener, asyncio.Protocol, None)
 
 
 @dataclass
@@ -29,7 +33,7 @@ class Fake:
 
 def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
     async def play() -> None:
-        connections = PreAuthConnections(max_total=10, max_per_address=2)
+        connections = _listener(max_total=10, max_per_address=2)
         other, crowd = Fake("a"), [Fake("b") for _ in range(5)]
         for number, sock in enumerate([other, *crowd]):
             connections.add(number, sock)
@@ -41,7 +45,7 @@ def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
 
 def test_a_full_set_drops_from_the_most_crowded_address() -> None:
     async def play() -> None:
-        connections = PreAuthConnections(max_total=4, max_per_address=4)
+        connections = _listener(max_total=4, max_per_address=4)
         crowd, other = [Fake("b") for _ in range(4)], Fake("a")
         for number, sock in enumerate([*crowd, other]):
             connections.add(number, sock)
@@ -55,7 +59,7 @@ def test_a_full_set_drops_from_the_most_crowded_address() -> None:
 
 def test_a_served_request_restarts_the_timeout() -> None:
     async def play() -> None:
-        connections = PreAuthConnections(max_total=2, max_per_address=2, timeout_s=0.05)
+        connections = _listener(max_total=2, max_per_address=2, timeout_s=0.05)
         page, silent = Fake("a"), Fake("a")
         for sock in (page, silent):
             connections.add(id(sock), sock)
@@ -69,7 +73,7 @@ def test_a_served_request_restarts_the_timeout() -> None:
         connections.add("newest", Fake("a"))
         assert not page.dropped
         connections.renew("gone")
-        connections.close()
+        await connections.close()
         assert page.dropped == 1
 
     asyncio.run(play())
@@ -77,7 +81,7 @@ def test_a_served_request_restarts_the_timeout() -> None:
 
 def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
     async def play() -> None:
-        connections = PreAuthConnections(timeout_s=0.01)
+        connections = _listener(timeout_s=0.01)
         silent, asks, known = Fake("a"), Fake("a"), Fake("a")
         for sock in (silent, asks, known):
             connections.add(id(sock), sock)
@@ -87,7 +91,7 @@ def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
             while not silent.dropped:
                 await asyncio.sleep(0.002)
         assert len(connections) == 1
-        connections.close()
+        await connections.close()
         assert [sock.dropped for sock in (silent, asks, known)] == [1, 1, 0]
 
     asyncio.run(play())
@@ -102,7 +106,7 @@ def test_a_new_connection_always_fits_and_the_limits_hold(
     arrivals: list[tuple[str, bool]], max_total: int, max_per_address: int
 ) -> None:
     async def play() -> None:
-        connections = PreAuthConnections(max_total, max_per_address)
+        connections = _listener(max_total, max_per_address)
         sockets: list[Fake] = []
         for number, (address, goes) in enumerate(arrivals):
             here = [v for v in sockets if not v.dropped and not v.is_gone]
@@ -116,7 +120,7 @@ def test_a_new_connection_always_fits_and_the_limits_hold(
             assert len(connections) <= max_total
             assert all(v.dropped <= 1 for v in sockets)
             sock.is_gone = goes
-        connections.close()
+        await connections.close()
         assert len(connections) == 0
 
     asyncio.run(play())

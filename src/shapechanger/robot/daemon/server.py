@@ -37,24 +37,64 @@ _SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a
 _ACCEPT_PAUSE_S: Final = 0.05  # After a failed accept, most likely for want of descriptors.
 
 
-class PreAuthConnections:
-    """Bounded, short-lived set of connections before authentication.
+class Listener:
+    """Accepts connections, of which few have not authenticated, and those for a short time.
 
-    A new connection is never turned away, because it may be the person who wants to stop the
-    robot: it replaces the oldest connection of the address that has the most.
+    Each one is registered before its TLS handshake. A new connection is never turned away, because
+    it may be the person who wants to stop the robot: it replaces the oldest connection of the
+    address that has the most.
     """
 
     def __init__(
         self,
+        protocol: Callable[[], asyncio.Protocol],
+        tls: ssl.SSLContext | None,
         max_total: int = _MAX_TOTAL,
         max_per_address: int = _MAX_PER_ADDRESS,
         timeout_s: float = _PRE_AUTH_TIMEOUT_S,
     ) -> None:
+        self._protocol = protocol
+        self._tls = tls
         self._max_total = max_total
         self._max_per_address = max_per_address
         self._timeout_s = timeout_s
+        self._sockets: list[socket.socket] = []
+        self._tasks: list[asyncio.Task[None]] = []
         # Oldest first.
         self._waiting: dict[Hashable, tuple[AcceptedSocket, asyncio.TimerHandle]] = {}
+
+    async def start(self, host: str, port: int) -> int:
+        """Start listening.
+
+        Returns:
+            The port.
+        """
+        loop = asyncio.get_running_loop()
+        try:
+            found = await loop.getaddrinfo(
+                host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+            )
+            for family, *_, address in dict.fromkeys(found):
+                listening = socket.create_server(address, family=family, backlog=_BACKLOG)
+                self._sockets.append(listening)
+                listening.setblocking(False)
+        except OSError as error:
+            self._close_sockets()
+            why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+            raise RobotError(
+                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
+            ) from error
+        self._tasks = [asyncio.create_task(self._accept(each)) for each in self._sockets]
+        return self._sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        """Stop listening, and drop all connections that have not authenticated."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._close_sockets()
+        for key in list(self._waiting):
+            self._drop(key)
 
     def __len__(self) -> int:
         """Return the number of connections."""
@@ -93,10 +133,27 @@ class PreAuthConnections:
         for address, _ in self._counts().most_common(1):
             self._drop_oldest(address)
 
-    def close(self) -> None:
-        """Drop all connections."""
-        for key in list(self._waiting):
-            self._drop(key)
+    def _close_sockets(self) -> None:
+        for each in self._sockets:
+            each.close()
+
+    async def _accept(self, listening: socket.socket) -> None:
+        loop, fails = asyncio.get_running_loop(), False
+        while True:
+            try:
+                accepted, address = await loop.sock_accept(listening)
+                accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+            except OSError as error:
+                if not fails:
+                    _log.warning("Cannot accept connections: %s", error)
+                fails = True
+                self.drop_one()
+                await asyncio.sleep(_ACCEPT_PAUSE_S)
+                continue
+            fails = False
+            protocol = self._protocol()
+            self.add(protocol, AcceptedSocket(accepted, address[0], protocol, self._tls))
+            await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
 
     def _counts(self) -> Counter[str]:
         return Counter(connection.address for connection, _ in self._waiting.values())
@@ -112,78 +169,6 @@ class PreAuthConnections:
         connection, _ = self._waiting[key]
         self.remove(key)
         connection.drop()
-
-
-class Listener:
-    """Accepts connections, and registers each one before its TLS handshake."""
-
-    def __init__(
-        self,
-        connections: PreAuthConnections,
-        protocol: Callable[[], asyncio.Protocol],
-        tls: ssl.SSLContext | None,
-    ) -> None:
-        self._connections = connections
-        self._protocol = protocol
-        self._tls = tls
-        self._sockets: list[socket.socket] = []
-        self._tasks: list[asyncio.Task[None]] = []
-
-    async def start(self, host: str, port: int) -> int:
-        """Start listening.
-
-        Returns:
-            The port.
-        """
-        loop = asyncio.get_running_loop()
-        try:
-            found = await loop.getaddrinfo(
-                host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-            )
-            for family, *_, address in dict.fromkeys(found):
-                listening = socket.create_server(address, family=family, backlog=_BACKLOG)
-                self._sockets.append(listening)
-                listening.setblocking(False)
-        except OSError as error:
-            self._close_sockets()
-            why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-            raise RobotError(
-                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
-            ) from error
-        self._tasks = [asyncio.create_task(self._accept(each)) for each in self._sockets]
-        return self._sockets[0].getsockname()[1]
-
-    async def close(self) -> None:
-        """Stop listening, and drop all connections that have not authenticated."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._close_sockets()
-        self._connections.close()
-
-    def _close_sockets(self) -> None:
-        for each in self._sockets:
-            each.close()
-
-    async def _accept(self, listening: socket.socket) -> None:
-        loop, fails = asyncio.get_running_loop(), False
-        while True:
-            try:
-                accepted, address = await loop.sock_accept(listening)
-                accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
-            except OSError as error:
-                if not fails:
-                    _log.warning("Cannot accept connections: %s", error)
-                fails = True
-                self._connections.drop_one()
-                await asyncio.sleep(_ACCEPT_PAUSE_S)
-                continue
-            fails = False
-            protocol = self._protocol()
-            self._connections.add(
-                protocol, AcceptedSocket(accepted, address[0], protocol, self._tls)
-            )
-            await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
 
 
 class AcceptedSocket:
@@ -279,11 +264,10 @@ class Server:
         self._time = time
         self._authenticator = authenticator
         self._numbers = itertools.count(1)
-        self._pre_auth = PreAuthConnections()
         self._runner = web.AppRunner(
             self._app(), access_log=None, handle_signals=False, shutdown_timeout=_SHUTDOWN_S
         )
-        self._listener = Listener(self._pre_auth, self._protocol, tls)
+        self._listener = Listener(self._protocol, tls)
 
     async def start(self) -> int:
         """Start listening, and return the port."""
@@ -317,7 +301,7 @@ class Server:
     async def _renew_timeout(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         response = await handler(request)
         # A slow radio loads the files of the console one by one.
-        self._pre_auth.renew(request.protocol)
+        self._listener.renew(request.protocol)
         return response
 
     async def _robot(self, _: web.Request) -> web.Response:
@@ -348,8 +332,8 @@ class Server:
         )
         if refusal:
             raise web.HTTPForbidden(text=refusal)
-        self._pre_auth.stop_timer(request.protocol)
-        forget = partial(self._pre_auth.remove, request.protocol)
+        self._listener.stop_timer(request.protocol)
+        forget = partial(self._listener.remove, request.protocol)
         session = Session(next(self._numbers), self._hub, self._authenticator)
         socket = await ClientConnection(session, self._hub, self._time).run(request, forget)
         forget()

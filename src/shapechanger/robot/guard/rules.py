@@ -15,7 +15,7 @@ from shapechanger.contract.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.running import shortened
-from shapechanger.robot.guard.sensors import SensedState, Sensing
+from shapechanger.robot.guard.sensors import Sensing, with_conclusions
 
 # Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor
 # starts, must not stop the robot.
@@ -185,40 +185,6 @@ class Stopping:
         return (self.end_ns - now_ns) / self._ramp_ns
 
 
-class Freshness:
-    """Refuse commands that are repeated, out of order, too old or from the future.
-
-    A command replaces its predecessors even when it is refused for another reason, because its
-    sender has superseded them.
-    """
-
-    def __init__(self, deadline_ms: int) -> None:
-        self._deadline_ms = deadline_ms
-        self._newest = (-1, -1)
-
-    def refusal(self, order: Order, now_ns: int) -> str:
-        """Return why a command that arrives now is refused, or an empty string."""
-        if (order.session, order.seq) <= self._newest:
-            session, seq = self._newest
-            return (
-                f"Command {order.seq} of session {order.session} is not newer than "
-                f"{seq} of session {session}."
-            )
-        self._newest = (order.session, order.seq)
-        if order.issued_ns > now_ns + FUTURE_NS:
-            return f"Command {order.seq} comes from the future."
-        if now_ns >= self.expiry_ns(order, now_ns):
-            age_ms = (now_ns - order.issued_ns) / _NS_PER_MS
-            limit_ms = min(self._deadline_ms, order.ttl_ms)
-            return f"Command {order.seq} is {age_ms:.0f} ms old; it may act for {limit_ms} ms."
-        return ""
-
-    def expiry_ns(self, order: Order, arrived_ns: int) -> int:
-        """Return the time at which a command expires, ns."""
-        start_ns = min(order.issued_ns, arrived_ns)
-        return start_ns + min(self._deadline_ms, order.ttl_ms) * _NS_PER_MS
-
-
 @dataclass(frozen=True, slots=True)
 class OutputDecision:
     """Decision of the rules on the outputs.
@@ -243,7 +209,7 @@ class Rules:
 
     Attributes:
         arming: Whether commands may move anything.
-        senses: Sensor readings and their conclusions.
+        senses: Newest sensor readings, and what follows from them.
     """
 
     def __init__(self, plan: GuardPlan, now_ns: int) -> None:
@@ -254,11 +220,11 @@ class Rules:
                     f"{action.low:g} to {action.high:g}."
                 )
         self.arming = Arming()
-        self.senses = SensedState()
+        self.senses = Sensing()
         self._plan = plan
         self._period_ns = round(1e9 / plan.tick_hz)
         self._stale_ns = plan.limits.camera_stale_ms * 1_000_000
-        self._freshness = Freshness(plan.limits.deadline_ms)
+        self._newest = (-1, -1)  # Session and number of the newest command.
         self._reflexes = MotionReflexes(plan)
         self._health = RobotHealth(plan)
         self._disarming = tuple(s.name for s in plan.sensors if s.measures in _DISARMING)
@@ -345,11 +311,11 @@ class Rules:
         for name in self._disarming:
             if name in sensing.failures and name not in sensing.slow and self.arming.armed:
                 self.disarm(sensing.failures[name])
-        self.senses.complete(
+        stall = self._reflexes.stall
+        self.senses = with_conclusions(
             sensing,
             speed=self._reflexes.propulsion.speed(self._done),
-            stalled=self._reflexes.stall.way != 0,
-            watches_stall=self._reflexes.stall.watches,
+            stalled=stall.way != 0 if stall.watches else None,
         )
 
     def tick(self, now_ns: int) -> OutputDecision:
@@ -390,7 +356,7 @@ class Rules:
         return min(time_ns for time_ns in times if time_ns > now_ns)
 
     def _offer_command(self, order: Order, now_ns: int) -> str:
-        if refusal := self._freshness.refusal(order, now_ns):
+        if refusal := self._staleness(order, now_ns):
             return refusal
         wanted, given = len(self._plan.actions), len(order.values)
         if given != wanted:
@@ -399,8 +365,34 @@ class Rules:
         if not self.arming.armed:
             return f"Command {order.seq} is refused. {self.arming.reason}"
         self._command = order
-        self._expiry_ns = self._freshness.expiry_ns(order, now_ns)
+        self._expiry_ns = self._end_ns(order, now_ns)
         return ""
+
+    def _staleness(self, order: Order, now_ns: int) -> str:
+        """Return why a command is repeated, out of order, too old or from the future, or "".
+
+        A command replaces its predecessors even when it is refused for another reason, because its
+        sender has superseded them.
+        """
+        if (order.session, order.seq) <= self._newest:
+            session, seq = self._newest
+            return (
+                f"Command {order.seq} of session {order.session} is not newer than "
+                f"{seq} of session {session}."
+            )
+        self._newest = (order.session, order.seq)
+        if order.issued_ns > now_ns + FUTURE_NS:
+            return f"Command {order.seq} comes from the future."
+        if now_ns >= self._end_ns(order, now_ns):
+            age_ms = (now_ns - order.issued_ns) / _NS_PER_MS
+            limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
+            return f"Command {order.seq} is {age_ms:.0f} ms old; it may act for {limit_ms} ms."
+        return ""
+
+    def _end_ns(self, order: Order, arrived_ns: int) -> int:
+        """Return the time at which a command expires, ns."""
+        limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
+        return min(order.issued_ns, arrived_ns) + limit_ms * _NS_PER_MS
 
     def _arm(self, order: Order, now_ns: int) -> str:
         if self._is_pressed:

@@ -6,7 +6,7 @@ import contextlib
 import math
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from shapechanger.contract.plan import GuardPlan
@@ -56,48 +56,29 @@ class Sensing:
         silent: Distance sensors that responded without a distance.
     """
 
-    quantities: Mapping[str, float] = field(default_factory=dict[str, float])
-    sources: Mapping[str, str] = field(default_factory=dict[str, str])
+    quantities: dict[str, float] = field(default_factory=dict[str, float])
+    sources: dict[str, str] = field(default_factory=dict[str, str])
     failures: Mapping[str, str] = field(default_factory=dict[str, str])
     slow: frozenset[str] = frozenset()
     silent: frozenset[str] = frozenset()
 
 
-class SensedState:
-    """The newest sensing, with estimated quantities added.
+def with_conclusions(sensing: Sensing, *, speed: float | None, stalled: bool | None) -> Sensing:
+    """Return a sensing with the quantities that follow from it.
 
-    Attributes:
-        quantities: By name, in SI units; unknown quantities are absent.
-        sources: Name of the sensor behind each, or "estimated".
+    `speed` is the estimated speed, m/s, and `stalled` is None where nothing watches for a stall.
     """
-
-    def __init__(self) -> None:
-        self.quantities: dict[str, float] = {}
-        self.sources: dict[str, str] = {}
-
-    def complete(
-        self, sensing: Sensing, *, speed: float | None, stalled: bool, watches_stall: bool
-    ) -> None:
-        """Update with a new sensing."""
-        self.quantities = dict(sensing.quantities)
-        self.sources = dict(sensing.sources)
-        if watches_stall:
-            self._add("stall", float(stalled), self.sources["speed"])
-        if "speed" not in self.quantities and speed is not None:
-            self._add("speed", speed, _ESTIMATED)
-        self._conclude_collision()
-
-    def _conclude_collision(self) -> None:
-        """Conclude a collision from a bumper, or else from a stall."""
-        signs = [name for name in ("bump", "stall") if name in self.quantities]
-        if not signs:
-            return
-        sign = next((name for name in signs if self.quantities[name] > 0.0), signs[0])
-        source = _ESTIMATED if sign == "stall" else self.sources[sign]
-        self._add("collision", float(self.quantities[sign] > 0.0), source)
-
-    def _add(self, name: str, value: float, source: str) -> None:
-        self.quantities[name], self.sources[name] = value, source
+    quantities, sources = dict(sensing.quantities), dict(sensing.sources)
+    if stalled is not None:
+        quantities["stall"], sources["stall"] = float(stalled), sources["speed"]
+    if "speed" not in quantities and speed is not None:
+        quantities["speed"], sources["speed"] = speed, _ESTIMATED
+    signs = [name for name in ("bump", "stall") if name in quantities]
+    if signs:  # A collision shows in a bumper, or else in a stall.
+        sign = next((name for name in signs if quantities[name] > 0.0), signs[0])
+        quantities["collision"] = float(quantities[sign] > 0.0)
+        sources["collision"] = _ESTIMATED if sign == "stall" else sources[sign]
+    return replace(sensing, quantities=quantities, sources=sources)
 
 
 _MOST_READ_NS: Final = 20_000_000
