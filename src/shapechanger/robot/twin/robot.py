@@ -106,7 +106,7 @@ class RunningRobot:
         children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
         for pid in children:
             arguments = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-            if any(a.decode().endswith((program, f"robot.{program}")) for a in arguments):
+            if any(a.decode().endswith((program, f"robot.{program}.process")) for a in arguments):
                 return int(pid)
         raise RobotError(f"The robot's {program} does not run at the moment.")
 
