@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from inspect import cleandoc
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 import msgspec
 from msgspec import inspect
@@ -52,7 +52,7 @@ def _profile_table(name: str) -> Iterator[str]:
 
 def _messages(side: str) -> Iterator[str]:
     """Return the messages of one side, the client's or the robot's."""
-    for kind in get_args({"client": ClientMessage, "robot": RobotMessage}[side]):
+    for kind in {"client": ClientMessage, "robot": RobotMessage}[side].__subclasses__():
         yield f"#### `{inspect.type_info(kind).tag}`"
         yield _summary(kind)
         yield from _keys(kind, typed=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -145,3 +146,9 @@ def test_bytes_are_not_in_the_repr() -> None:
 def test_a_request_to_arm_must_answer_an_observation() -> None:
     with pytest.raises(LinkError, match="answers"):
         decode_client_message(msgspec.msgpack.encode({"kind": "arm", "emergency": 0}))
+
+
+def test_the_page_has_the_numbers_of_the_wire() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "wire.md").read_text()
+    assert f"`version` ({messages.VERSION})" in page
+    assert f"| size of a client's message | {MAX_CLIENT_MESSAGE // 1024} KiB |" in page

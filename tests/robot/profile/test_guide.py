@@ -48,6 +48,6 @@ def test_every_table_driver_and_profile_is_in_the_guide(guide: str) -> None:
 
 def test_every_message_is_on_the_wire() -> None:
     page = with_keys((DOCS / "wire.md").read_text())
-    for kind in (*ClientMessage.__args__, *RobotMessage.__args__):
+    for kind in (*ClientMessage.__subclasses__(), *RobotMessage.__subclasses__()):
         assert f"#### `{kind.__name__.lower()}`" in page
     assert '| `pace` | "lockstep" or "realtime" | "realtime" | Whether' in page

@@ -1,15 +1,14 @@
-"""Messages between a client and a robot, each one binary WebSocket message.
+"""Messages between a client and a robot, each one binary WebSocket message; see `docs/wire.md`.
 
 A message is a msgpack map with its type under `kind`; JPEG bytes are sent as they are. Unknown
-keys are ignored, so that newer minor versions stay readable; unknown types are refused. The course
-of a connection is in `docs/wire.md`.
-
-Times are nanoseconds of the robot's monotonic clock. Clocks of two machines are never subtracted:
-the age of a command is the time since the robot sent the observation that it answers.
+keys are ignored, so that newer minor versions stay readable; unknown types are refused. Times are
+nanoseconds of the robot's monotonic clock. Clocks of two machines are never subtracted: the age of
+a command is the time since the robot sent the observation that it answers.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Final, Literal, TypeVar, Union
 
 import msgspec
@@ -75,6 +74,8 @@ class Hello(ClientMessage, frozen=True):
         version: Version of the messages that the client uses.
         proof: Answer to the challenge, see `shapechanger.robot.link.authentication`.
         name: Display name.
+        role: Kind of client.
+        pace: Whether the clocks or the client set the pace.
         frames: Whether observations carry frames.
     """
 
@@ -153,7 +154,12 @@ class Suggest(ClientMessage, frozen=True):
 
     A suggestion is shown to all clients (`Observation.suggested`) and recorded, and gives credit
     for the next observation, as a command does. It expires after `Welcome.deadline_ms`, and when
-    its sender leaves or takes control. The fields are as in `Command`.
+    its sender leaves or takes control.
+
+    Attributes:
+        seq: Number of the suggestion, larger than the one before. A refusal names it.
+        answers: `seq` of the observation that the suggestion answers.
+        values: One number for each action of the robot, in the order of its action layout.
     """
 
     seq: _Sequence
@@ -198,9 +204,7 @@ class Browse(ClientMessage, frozen=True):
 
 
 class Fetch(ClientMessage, frozen=True):
-    """Request for a part of an episode; answered by `Piece`.
-
-    A further question about recordings is refused until the answer has been sent.
+    """Request for a `Piece` of an episode; until it has been sent, further questions are refused.
 
     Attributes:
         episode: Id of the episode.
@@ -214,9 +218,7 @@ class Fetch(ClientMessage, frozen=True):
 
 
 class Judge(ClientMessage, frozen=True):
-    """Judgement that steps of an episode are bad, or good after all; only from a person.
-
-    Answered by `Recordings` with that episode alone.
+    """Judgement by a person that steps are bad, or good after all; answered by `Recordings`.
 
     Attributes:
         episode: Id of the episode, which must not be the one being recorded.
@@ -478,24 +480,21 @@ class PolicyState(RobotMessage, frozen=True):
 encode: Final = msgspec.msgpack.Encoder().encode
 """Encode a message."""
 
-_CLIENT_DECODER: Final = msgspec.msgpack.Decoder(Union[*ClientMessage.__subclasses__()])
-_ROBOT_DECODER: Final = msgspec.msgpack.Decoder(Union[*RobotMessage.__subclasses__()])
 
-
-def decode_client_message(data: bytes) -> ClientMessage:
-    """Decode a message of a client; raise `LinkError` for any other bytes."""
-    return _decoded(_CLIENT_DECODER, data, MAX_CLIENT_MESSAGE)
-
-
-def decode_robot_message(data: bytes) -> RobotMessage:
-    """Decode a message of a robot; raise `LinkError` for any other bytes."""
-    return _decoded(_ROBOT_DECODER, data, MAX_ROBOT_MESSAGE)
-
-
-def _decoded(decoder: msgspec.msgpack.Decoder[_M], data: bytes, limit: int) -> _M:
+def _decoded(decoder: msgspec.msgpack.Decoder[_M], limit: int, data: bytes) -> _M:
     if len(data) > limit:
         raise LinkError(f"A message of {len(data)} bytes is larger than the {limit} allowed.")
     try:
         return decoder.decode(data)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise LinkError(f"Not a valid message: {error}.") from error
+
+
+_OF_A_CLIENT: Final = msgspec.msgpack.Decoder(Union[*ClientMessage.__subclasses__()])
+_OF_A_ROBOT: Final = msgspec.msgpack.Decoder(Union[*RobotMessage.__subclasses__()])
+
+decode_client_message: Final = partial(_decoded, _OF_A_CLIENT, MAX_CLIENT_MESSAGE)
+"""Decode the bytes of a client's message; raise `LinkError` for any others."""
+
+decode_robot_message: Final = partial(_decoded, _OF_A_ROBOT, MAX_ROBOT_MESSAGE)
+"""Decode the bytes of a robot's message; raise `LinkError` for any others."""
