@@ -13,7 +13,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
@@ -137,20 +136,6 @@ def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) 
     eventually(lambda: "disarm" in robot.running.guard.kinds())
 
 
-def test_a_person_takes_control_from_a_program(serve: Callable[..., Served]) -> None:
-    robot = serve(arming="anyone")
-    env = made(robot, pace="lockstep", reset_timeout_s=0.3)
-    env.reset(seed=0)
-    with RobotClient.connect(robot.known, role="person", name="Grace", frames=False) as person:
-        person.take()
-        *_, truncated, info = env.step(np.zeros(2, np.float32))
-        assert truncated
-        assert info["truncated_because"].startswith("Grace has control of the robot now")
-        with pytest.raises(RobotRefused, match="Grace has control"):
-            env.reset()
-    env.close()
-
-
 def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
     robot = serve()
     with RobotClient.connect(robot.known, role="person", name="Grace") as person:
@@ -169,17 +154,6 @@ def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
                 break
         assert info["truncated_because"].startswith("Emergency stop")
         env.close()
-
-
-def test_a_command_must_answer_an_observation_that_was_sent(serve: Callable[..., Served]) -> None:
-    robot = serve(arming="anyone")
-    with RobotClient.connect(robot.known, pace="lockstep") as client:
-        client.take()
-        client.arm()
-        seen = client.ask()
-        seq = client.command((0.0, 0.5), answers=seen.message.seq + 1000)
-        client.observation(seen.message.seq)
-        assert "was not sent to this client" in client.refusal(seq)
 
 
 def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None:
