@@ -44,10 +44,9 @@ _DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
 
 def _own_name() -> str:
     """Return the default name of a client: user and host."""
-    try:
+    user = "unknown"
+    with contextlib.suppress(KeyError, OSError):  # A container may have no user name.
         user = getpass.getuser()
-    except (KeyError, OSError):  # A container may have no user name.
-        user = "unknown"
     return f"{user}@{socket.gethostname()}"[:64]
 
 
@@ -75,13 +74,11 @@ class RobotClient(Inbox):
         self._thread = threading.Thread(
             target=self._run, name=f"robot {robot.address}", daemon=True
         )
-        try:
-            with self.request(Welcome) as welcome:
-                self._thread.start()
-                self.welcome = self.answered(welcome, threading.TIMEOUT_MAX)
-        except BaseException:  # Ctrl-C too: leave no thread behind.
-            self.close()
-            raise
+        with contextlib.ExitStack() as opened, self.request(Welcome) as welcome:
+            opened.callback(self.close)  # Leave no thread behind, after Ctrl-C too.
+            self._thread.start()
+            self.welcome = self.answered(welcome, threading.TIMEOUT_MAX)
+            opened.pop_all()
 
     @classmethod
     def connect(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
@@ -148,11 +149,9 @@ class RobotSpaces:
             return False
         if seq != self._tried_seq:  # An invalid frame is tried once, too.
             self._tried_seq = seq
-            try:
+            with suppress(DemosError):
                 self.picture = decode_picture(received.jpeg, "")
-            except DemosError:
-                return False
-            self._picture_seq = seq
+                self._picture_seq = seq
         return seq == self._picture_seq
 
     def view(self, received: Received) -> View:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -61,14 +62,16 @@ def parse_address(text: str) -> Address:
 
 def is_loopback(host: str) -> bool:
     """Return True if only this machine reaches the address of `host`."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+    ip = _ip(host)
+    return host == "localhost" if ip is None else ip.is_loopback
 
 
 def _is_ip(text: str, version: int) -> bool:
-    try:  # Python takes any text as the zone after a "%".
-        return ipaddress.ip_address(text).version == version and not {"/", "@"} & set(text)
-    except ValueError:
-        return False
+    ip = _ip(text)  # Python takes any text as the zone after a "%".
+    return ip is not None and ip.version == version and not {"/", "@"} & set(text)
+
+
+def _ip(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    with suppress(ValueError):
+        return ipaddress.ip_address(text)
+    return None

@@ -14,7 +14,7 @@ import re
 import secrets
 from typing import Final
 
-from shapechanger.errors import LinkError
+from shapechanger.errors import LinkError, translate_errors
 
 NONCE_BYTES: Final = 32
 """Bytes of a nonce."""
@@ -44,10 +44,9 @@ def parse_key(text: str) -> bytes:
     plain = text.strip().upper().translate(_MISREAD)
     if len(plain) != _KEY_CHARACTERS:
         raise LinkError(f"A key has {_KEY_CHARACTERS} letters and digits, got {len(plain)}.")
-    try:
+    wrong = LinkError("A key has only the letters A to Z and the digits 2 to 7.")
+    with translate_errors(ValueError, to=lambda _: wrong):
         key = base64.b32decode(plain + "=" * (-len(plain) % 8))
-    except ValueError:
-        raise LinkError("A key has only the letters A to Z and the digits 2 to 7.") from None
     if base64.b32encode(key).decode().rstrip("=") != plain:
         raise LinkError("The last letter of this key is wrong.")
     return key
