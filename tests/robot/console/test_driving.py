@@ -184,7 +184,6 @@ def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_the_cap_scales_commands(car: RunningRobot, visit: Visit) -> None:
-    """The robot reports the command times the cap; keys change the cap."""
     console, pins = visit(car), Pins(car)
     console.arm()
     for _ in range(3):

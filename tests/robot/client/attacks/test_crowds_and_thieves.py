@@ -25,26 +25,22 @@ ELSEWHERE = [f"127.0.0.{number}" for number in range(2, 8)]  # Addresses of atta
 
 
 def knocks(scene: Scene, source: str) -> Stranger:
-    """Guess a key, and do not wait for the answer."""
     stranger = scene.stranger(source=source)
     stranger.hello(os.urandom(16), "person")
     return stranger
 
 
 def says_nothing(scene: Scene, source: str) -> Stranger:
-    """Connect alone, without a handshake."""
     return scene.stranger(source=source, version=None)
 
 
 def half_a_handshake(scene: Scene, source: str) -> Stranger:
-    """Send the beginning of a TLS handshake."""
     stranger = scene.stranger(source=source, version=None)
     stranger.write(b"\x16\x03\x01\x02\x00\x01")
     return stranger
 
 
 def half_a_request(scene: Scene, source: str) -> Stranger:
-    """Send a request without its end."""
     stranger = scene.stranger(source=source)
     stranger.write(b"GET /link HTTP/1.1\r\nHost: x\r\n")
     return stranger
@@ -200,7 +196,6 @@ def test_no_log_contains_a_key_or_a_proof(robot: RunningRobot) -> None:
 
 
 def base64_of(secret: bytes) -> str:
-    """Return bytes in base 64 without padding."""
     return base64.b64encode(secret).decode().rstrip("=")
 
 

@@ -154,7 +154,6 @@ PATHS = (
 
 @refused("404")
 def paths(scene: Scene) -> str:
-    """Ask for files outside of the console."""
     found = {scene.stranger().request(f"GET {path} HTTP/1.1") for path in PATHS}
     assert {status.split()[1] for status in found} <= {"400", "404"}, found
     return "".join(found)
@@ -173,20 +172,17 @@ def methods(scene: Scene) -> str:
 
 @refused("400")
 def half_an_upgrade(scene: Scene) -> str:
-    """Open the link without the headers of a WebSocket."""
     return scene.stranger().request("GET /link HTTP/1.1", Upgrade="websocket")
 
 
 @refused("400")
 def smuggled_request(scene: Scene) -> str:
-    """Send two contradictory lengths."""
     headers = {"Content_Length": "4", "Transfer_Encoding": "chunked"}
     return scene.stranger().request("GET /healthz HTTP/1.1", **headers)
 
 
 @refused("400")
 def huge_header(scene: Scene) -> str:
-    """Send a header of a megabyte."""
     return scene.stranger().request("GET / HTTP/1.1", X="x" * 2**20) or "400"
 
 
