@@ -3,7 +3,7 @@
 import re
 import socket
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -228,8 +228,7 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
 class _Board(LocalBoard):
     """A board whose time the checks advance."""
 
-    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        del readable, at_most_s
+    def wait_until(self, until_ns: int) -> bool:
         self.advance(until_ns)
         return True
 

@@ -11,8 +11,11 @@ from gpiozero import DigitalOutputDevice, Motor, PWMOutputDevice
 from shapechanger.errors import RobotError
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import CAR, die, process
 
 pytestmark = pytest.mark.realtime
@@ -99,17 +102,15 @@ def test_an_active_low_output_stays_high_when_opened_and_closed(tmp_path: Path) 
         assert {line.duty for line in read_ledger(board.ledger_path) if line.pin == 24} == {1.0}
 
 
-@pytest.mark.parametrize(("asked", "done"), [(0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)])
-def test_pwm_is_rounded_down(tmp_path: Path, asked: float, done: float) -> None:
+def test_pwm_is_rounded_down() -> None:
     """As gpiozero over lgpio, duty is truncated to whole percent and frequency to whole hertz."""
-    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        hardware = connect(board.socket_path)
-        device = PWMOutputDevice(18, frequency=50.9, pin_factory=hardware.pin_factory())
+    board = LocalBoard(TwinWiring(CAR), DrivingWorld((), (8, 6), seed=0))
+    device = PWMOutputDevice(18, frequency=50.9, pin_factory=board.hardware.pin_factory())
+    for asked, done in ((0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)):
         device.value = asked
-        assert operator.levels().duties[18] == done
-        assert device.frequency == 50
-        assert device.value == done
-        hardware.close()
+        assert board.pins.levels.duties[18] == device.value == done
+    assert device.frequency == 50
+    board.hardware.close()
 
 
 def test_a_pin_has_one_owner(tmp_path: Path) -> None:

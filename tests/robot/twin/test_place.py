@@ -103,15 +103,6 @@ def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
     assert laid_out == [5, 4]
 
 
-def test_an_operator_lays_out_rooms(tmp_path: Path) -> None:
-    """Another seed is another start in the room, which reports no counters."""
-    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        first = operator.where()
-        operator.lay_out(5)
-        assert operator.where()[:3] != first[:3]
-        assert operator.where().truth == {}
-
-
 def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> None:
     """An unknown fault is answered with an error, and the board continues."""
     with (

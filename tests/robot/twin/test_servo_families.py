@@ -189,15 +189,6 @@ def test_arming_does_not_keep_a_deaf_servo_pulling(bench: _Bench) -> None:
     assert bench.seen.stop_reason == ""
 
 
-def test_a_servo_that_is_missing_is_named(bench: _Bench) -> None:
-    """A rig with a servo of a wrong id, or without one, is not armed."""
-    bench.drive(_FLEX, 10)
-    bench.rig.break_servo("LUM", "mute")
-    bench.drive(_FLEX, 40)
-    with pytest.raises(RobotError, match=r"no servo answers as LUM \(id 5\); those that do: FDP"):
-        bench.robot.arm()
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -219,12 +210,6 @@ def test_another_servo_than_in_the_profile_is_refused(
 
 def _other(match: re.Match[str]) -> str:
     return "XL330-M288"
-
-
-def test_two_servos_of_one_id_are_refused(family: str) -> None:
-    """The profile refuses it, with the line of the bus."""
-    with pytest.raises(ProfileError, match=r"line \d+: id 1 of the servo bus is used twice"):
-        read(finger_text(family).replace("\nid = 2\n", "\nid = 1\n"))
 
 
 def test_zeros_are_found_and_kept(family: str) -> None:

@@ -20,10 +20,8 @@ from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.operator import Operator
+from shapechanger.robot.twin.operator import Operator as Operator
 from shapechanger.robot.twin.start import BoardAt, end
-
-__all__ = ["Operator", "RunningRobot", "run_robot"]
 
 _READY: Final = "ready.json"
 """File that the daemon writes when it can be reached."""
