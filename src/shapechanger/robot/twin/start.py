@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Collection, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -162,12 +162,9 @@ def end(process: subprocess.Popen[bytes], within_s: float) -> None:
 def find_board(folder: str | os.PathLike[str]) -> tuple[BoardAt, Literal["real", "twin"]] | None:
     """Return the board that runs in a folder, and its clock; None without one."""
     board = BoardAt(Path(folder).absolute())
-    try:
-        client = BoardClient(board.socket_path, "operator")
-    except RobotError:
-        return None
-    client.close()
-    return board, client.clock
+    with suppress(RobotError), closing(BoardClient(board.socket_path, "operator")) as client:
+        return board, client.clock
+    return None
 
 
 def start_board(
