@@ -186,7 +186,7 @@ class Running:
         """Let a person take control and arm."""
         await client.obtain()
         await self.arm(client)
-        await until(lambda: self.guard.state.armed, "the guard is armed")
+        await until(lambda: self.daemon._hub.state.armed, "it is armed, and the daemon knows")
 
 
 @contextlib.asynccontextmanager

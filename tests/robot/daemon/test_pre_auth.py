@@ -90,7 +90,7 @@ def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
         async with asyncio.timeout(20.0):
             while not silent.dropped:
                 await asyncio.sleep(0.002)
-        assert len(connections) == 1
+        assert len(connections._waiting) == 1
         await connections.close()
         assert [sock.dropped for sock in (silent, asks, known)] == [1, 1, 0]
 
@@ -117,10 +117,10 @@ def test_a_new_connection_always_fits_and_the_limits_hold(
             same = [v for v in here if v.address == address]
             assert not sock.dropped
             assert len(left) == (len(here) >= max_total or len(same) >= max_per_address)
-            assert len(connections) <= max_total
+            assert len(connections._waiting) <= max_total
             assert all(v.dropped <= 1 for v in sockets)
             sock.is_gone = goes
         await connections.close()
-        assert len(connections) == 0
+        assert len(connections._waiting) == 0
 
     asyncio.run(play())

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, output_values
-from shapechanger.robot.guard.outputs import ActionEstimator, make_safe
+from shapechanger.robot.guard.outputs import estimated, make_safe
 from tests.robot.guard.plans import car
 from tests.robot.guard.recording import Record, connect
 
@@ -44,15 +44,14 @@ _SLOW = "Output steer: it turns no faster than its profile allows."
 def test_an_action_is_estimated_from_its_output(
     has: tuple[float, float], actions: tuple[float, float], reason: str
 ) -> None:
-    done = ActionEstimator(_CAR).estimate((0.5, -0.4), (-0.4, -0.05), has)
+    done = estimated(_CAR, (0.5, -0.4), (-0.4, -0.05), has)
     assert done.actions == pytest.approx(actions)
     assert done.reason == reason
 
 
 def test_mixed_outputs_show_rest_only() -> None:
-    estimator = ActionEstimator(_TANK)
-    assert estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
-    one = estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
+    assert estimated(_TANK, (0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
+    one = estimated(_TANK, (0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
     assert one.actions == (0.2, 0.5)
     assert one.reason == "Output left: it does not follow."
 
@@ -63,7 +62,7 @@ def test_an_action_with_two_outputs_is_active_while_one_moves() -> None:
         (ActionPlan("throttle", propels=True),),
         tuple(OutputPlan(name, "esc", mix={"throttle": 1.0}) for name in ("left", "right")),
     )
-    done = ActionEstimator(boat).estimate((0.5,), (0.5, 0.5), (0.5, 0.0))
+    done = estimated(boat, (0.5,), (0.5, 0.5), (0.5, 0.0))
     assert done.actions == (0.5,)
     assert done.reason.startswith("Output right: its controller waits")
 

@@ -541,7 +541,6 @@ def test_the_direction_is_that_of_the_propulsion() -> None:
     assert rules.direction == 0.0
     _ask(rules, 3, _T0, -0.3)
     assert rules.direction == -1.0
-    assert rules.applied == (0.5, -0.3)
     tank = replace(car(), actions=(ActionPlan("steering", propels=True),))
     turning = _driving(tank, (0.5,))
     assert turning.direction == 0.0

@@ -15,7 +15,9 @@ import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Final
+
+import msgspec
 
 from shapechanger.errors import UnknownName
 from shapechanger.robot.daemon.plan import DaemonPlan
@@ -33,6 +35,13 @@ _EVERYWHERE: Final = frozenset({"", "0.0.0.0", "::"})
 _END_S: Final = 2.0  # For a policy to release the robot and exit.
 _MOST_NAMES: Final = 256
 _LONGEST: Final = 1024  # Of a line that a policy's process writes, characters.
+
+
+class _Said(msgspec.Struct):
+    """Message of a policy's process: how it goes, or why it ends."""
+
+    note: str = ""
+    failed: str = ""
 
 
 def policies_in(folder: Path) -> list[str]:
@@ -138,11 +147,10 @@ class PolicyRunner:
             process.stdin.write(json.dumps(task).encode() + b"\n")
             await process.stdin.drain()
             while line := await process.stdout.readline():
-                said = _decoded(line)
-                if "failed" in said:
-                    failure = str(said["failed"])
-                elif "note" in said:
-                    self._report(name, str(said["note"]))
+                with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
+                    said = msgspec.json.decode(line, type=_Said)
+                    failure = said.failed or failure
+                    self._report(name, said.note or self._text)
         except ConnectionError:
             pass  # It is gone, and its exit code says more.
         except ValueError:
@@ -168,12 +176,3 @@ async def _finish(process: Process) -> None:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
         await process.wait()
-
-
-def _decoded(line: bytes) -> dict[str, Any]:
-    """Decode a message of a policy's process; empty unless it is a JSON object."""
-    try:
-        said = json.loads(line)
-    except ValueError:
-        return {}
-    return cast("dict[str, Any]", said) if isinstance(said, dict) else {}

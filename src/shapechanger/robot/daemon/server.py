@@ -96,10 +96,6 @@ class Listener:
         for key in list(self._waiting):
             self._drop(key)
 
-    def __len__(self) -> int:
-        """Return the number of connections."""
-        return len(self._waiting)
-
     def add(self, key: Hashable, connection: AcceptedSocket) -> None:
         """Add a connection, and drop another one if there are too many."""
         for other in [k for k, (known, _) in self._waiting.items() if known.is_gone]:

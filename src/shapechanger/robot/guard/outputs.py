@@ -84,49 +84,35 @@ class Applied(NamedTuple):
     reason: str
 
 
-class ActionEstimator:
-    """Estimate the applied actions of a robot from the values of its outputs."""
+def estimated(
+    plan: GuardPlan, actions: Sequence[float], requested: Sequence[float], has: Sequence[float]
+) -> Applied:
+    """Estimate the applied actions of a robot from the values that its outputs have.
 
-    def __init__(self, plan: GuardPlan) -> None:
-        self._plan = plan
-        self._rest = output_values(plan, [action.rest for action in plan.actions])
-        # The outputs that each action moves, by index.
-        self._moved = [
-            [i for i, output in enumerate(plan.outputs) if output.mix.get(action.name, 0.0)]
-            for action in plan.actions
-        ]
-
-    def estimate(
-        self, actions: Sequence[float], requested: Sequence[float], has: Sequence[float]
-    ) -> Applied:
-        """Return the applied outputs."""
-        deviating = {
-            i for i, (a, b) in enumerate(zip(requested, has, strict=True)) if abs(a - b) > _STEP
-        }
-        if not deviating:
-            return Applied(tuple(actions), "")
-        outputs = self._plan.outputs
-        reasons = [
-            f"Output {outputs[i].name}: {OUTPUTS[outputs[i].driver].differs}."
-            for i in sorted(deviating)
-        ]
-        applied = tuple(self._action(i, value, deviating, has) for i, value in enumerate(actions))
-        return Applied(applied, " ".join(reasons))
-
-    def _action(self, index: int, value: float, deviating: set[int], has: Sequence[float]) -> float:
-        """Return one action: the value farthest from rest among the outputs of it alone."""
-        moved = self._moved[index]
-        if deviating.isdisjoint(moved):
-            return value
-        action = self._plan.actions[index]
-        if all(abs(has[i] - self._rest[i]) <= _STEP for i in moved):
-            return action.rest
-        found = [
-            (has[i] - output.offset) / output.mix[action.name]
-            for i in moved
-            if sum(map(bool, (output := self._plan.outputs[i]).mix.values())) == 1
-        ]
-        return max(found, key=lambda v: abs(v - action.rest), default=value)
+    An action whose outputs deviate has the value farthest from rest among the outputs of it alone.
+    """
+    pairs = zip(plan.outputs, requested, has, strict=True)
+    deviating = [output for output, wanted, value in pairs if abs(wanted - value) > _STEP]
+    if not deviating:
+        return Applied(tuple(actions), "")
+    rest = output_values(plan, [action.rest for action in plan.actions])
+    applied: list[float] = []
+    for action, decided in zip(plan.actions, actions, strict=True):
+        outputs = zip(plan.outputs, has, rest, strict=True)
+        moved = [one for one in outputs if one[0].mix.get(action.name, 0.0)]
+        if all(output not in deviating for output, _, _ in moved):
+            applied.append(decided)
+        elif all(abs(value - at_rest) <= _STEP for _, value, at_rest in moved):
+            applied.append(action.rest)
+        else:
+            found = [
+                (value - output.offset) / output.mix[action.name]
+                for output, value, _ in moved
+                if sum(map(bool, output.mix.values())) == 1
+            ]
+            applied.append(max(found, key=lambda v: abs(v - action.rest), default=decided))
+    reasons = [f"Output {output.name}: {OUTPUTS[output.driver].differs}." for output in deviating]
+    return Applied(tuple(applied), " ".join(reasons))
 
 
 def _propelling_first(plan: GuardPlan) -> GuardPlan:
@@ -147,7 +133,6 @@ class OutputBank:
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
         self._plan = plan = _propelling_first(plan)
         self._rest = tuple(action.rest for action in plan.actions)
-        self._estimator = ActionEstimator(plan)
         self._drivers: list[tuple[OutputPlan, OutputDriver]] = []
         self.released = False
         self.values = {output.name: 0.0 for output in plan.outputs}
@@ -173,7 +158,7 @@ class OutputBank:
         for device in self._devices:
             device.flush(grip=True)
         self.released = False
-        return self._estimator.estimate(actions, values, tuple(self.values.values()))
+        return estimated(self._plan, actions, values, tuple(self.values.values()))
 
     def ready(self, alive: Callable[[], object]) -> str:
         """Reset outputs that had a fault.

@@ -239,11 +239,6 @@ class Rules:
         self._stopping: Stopping | None = self._rest_at_once(now_ns)
 
     @property
-    def applied(self) -> tuple[float, ...]:
-        """Return the last decided value of each action."""
-        return self._applied
-
-    @property
     def direction(self) -> float:
         """Return the sign of the propulsion: 1 forward, -1 backward, 0 neither."""
         push = self._reflexes.propulsion.push(self._done)

@@ -71,6 +71,7 @@ def plan_fd(plan: ServePlan) -> int:
     """
     # Without MFD_CLOEXEC, so that `exec` keeps it open.
     fd = os.memfd_create("serve-plan", os.MFD_ALLOW_SEALING)
+    # Not by msgspec, which encodes neither infinities nor pins, a subclass of int.
     left = memoryview(json.dumps(asdict(plan)).encode())
     while left:
         left = left[os.write(fd, left) :]
