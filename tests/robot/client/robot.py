@@ -107,7 +107,6 @@ class Robot:
         self.key = new_key()
         self.port = 0
         self.connections = 0
-        self.pings = 0
         self._credentials: Credentials | None = None
         self._sockets: list[web.WebSocketResponse] = []
         self._now_ns = 10**9
@@ -206,7 +205,7 @@ class Robot:
         return context
 
     async def _talk(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(compress=False, autoping=False)
+        socket = web.WebSocketResponse(compress=False)
         await socket.prepare(request)
         assert self._credentials is not None
         nonce = new_nonce()
@@ -234,9 +233,6 @@ class Robot:
     async def _converse(self, socket: web.WebSocketResponse, hello: m.Hello) -> None:
         frame_sent, mine, sent_s = 0, False, 0.0
         async for raw in socket:
-            if raw.type is WSMsgType.PING and not self.silent:
-                self.pings += 1
-                await socket.pong(raw.data)
             if raw.type is not WSMsgType.BINARY:
                 continue
             message = m.decode_client_message(raw.data)

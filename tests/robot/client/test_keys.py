@@ -11,9 +11,9 @@ from shapechanger.robot.client.teleop import (
     FIRST_HOLD_S,
     REPEAT_HOLD_S,
     HeldKeys,
+    KeyParser,
     NoTerminal,
     Terminal,
-    keys_in,
 )
 
 
@@ -58,7 +58,13 @@ def test_other_keys_are_ignored() -> None:
 
 
 def test_arrow_keys_have_two_encodings() -> None:
-    assert keys_in("\x1b[A\x1bOBq\x1b[C\x1b[D") == ["up", "down", "q", "right", "left"]
+    assert KeyParser().feed(b"\x1b[A\x1bOBq\x1b[C\x1b[D", 0.0) == [
+        "up",
+        "down",
+        "q",
+        "right",
+        "left",
+    ]
 
 
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,6 @@ from shapechanger.robot.client.teleop import (
     STOPS,
     KeyParser,
     Terminal,
-    keys_in,
 )
 from tests.robot.client.sequences import ARROWS, UNKNOWN
 
@@ -183,7 +182,3 @@ def keys_in_bytes(data: bytes) -> list[str]:
 def orders(keys: list[str]) -> list[str]:
     """Return the keys that could move a robot or that type anything."""
     return [key for key in keys if key in DIRECTIONS or key not in {*STOPS, OTHER}]
-
-
-def test_a_text_is_one_read() -> None:
-    assert keys_in("w\x1b") == ["w", "escape"]

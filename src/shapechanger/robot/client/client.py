@@ -39,6 +39,9 @@ from shapechanger.robot.link.messages import ClientMessage, Hello, RobotMessage,
 _Answer = TypeVar("_Answer", bound=RobotMessage)
 
 _MARGIN_S: Final = 2.0  # Of a call beyond the link's own time limit, s.
+# Shares of the silence timeout: when to send a ping, and how often to check.
+_PING_AFTER: Final = 0.4
+_CHECK_EVERY: Final = 0.1
 _DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
 
 
@@ -447,8 +450,9 @@ class RobotClient(Inbox):
         self._loop = asyncio.get_running_loop()
         async with open_connection(*self._settings) as (websocket, welcome):
             self.put(welcome)
-            work = (self._receive(websocket), self._send(websocket), self._stop.wait())
-            tasks = [asyncio.ensure_future(each) for each in work]
+            self._heard_at = self._loop.time()
+            links = (self._receive(websocket), self._send(websocket), self._watch())
+            tasks = [asyncio.ensure_future(each) for each in (*links, self._stop.wait())]
             done, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in others:
                 task.cancel()
@@ -463,7 +467,18 @@ class RobotClient(Inbox):
 
     async def _receive(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
         while True:
-            self.put(await receive(websocket, self._settings[2]))
+            message = await receive(websocket)
+            self._heard_at = asyncio.get_running_loop().time()
+            self.put(message)
+
+    async def _watch(self) -> None:
+        """End a silent connection: a radio that dies closes nothing."""
+        loop, limit_s = asyncio.get_running_loop(), self._settings[2]
+        while (silent_s := loop.time() - self._heard_at) <= limit_s:
+            if silent_s > _PING_AFTER * limit_s:
+                self._enqueue(messages.Ping())
+            await asyncio.sleep(_CHECK_EVERY * limit_s)
+        raise lost(f"no message for {silent_s:.1f} s")
 
     async def _send(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
         while True:

@@ -40,9 +40,6 @@ except ImportError as error:
 CLOSE_S: Final = 0.5
 """Time limit of the closing handshake, s."""
 
-# aiohttp sends a ping after this share of the silence timeout, and waits half as long for the pong.
-_PING_AFTER: Final = 2 / 3
-
 # attrs makes aiohttp's class in a way that pyright does not understand.
 _CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=CLOSE_S)  # pyright: ignore[reportCallIssue]
 
@@ -54,7 +51,7 @@ _T = TypeVar("_T")
 async def open_connection(
     robot: KnownRobot, hello: Hello, timeout_s: float
 ) -> AsyncGenerator[tuple[aiohttp.ClientWebSocketResponse, Welcome]]:
-    """Connect and authenticate; `hello` needs no proof, and silence ends the link too."""
+    """Connect and authenticate within a time limit; `hello` needs no proof."""
     address, expected = parse_address(robot.address), parse_trust(robot.fingerprint)
     sockets: list[socket.socket] = []
 
@@ -73,9 +70,8 @@ async def open_connection(
                 f"{'wss' if expected else 'ws'}://{address}/link",
                 max_msg_size=messages.MAX_ROBOT_MESSAGE,
                 timeout=_CLOSING,
-                heartbeat=_PING_AFTER * timeout_s,
             )
-            challenge = await _expect(websocket, Challenge, timeout_s)
+            challenge = await _expect(websocket, Challenge)
             if challenge.version != messages.VERSION:
                 older = "robot" if challenge.version < messages.VERSION else "workstation"
                 raise LinkError(
@@ -86,7 +82,7 @@ async def open_connection(
             proof = make_proof(key, challenge.nonce, expected or b"", hello.role)
             answer = msgspec.structs.replace(hello, proof=proof)
             await websocket.send_bytes(messages.encode(answer))
-            welcome = await _expect(websocket, Welcome, timeout_s)
+            welcome = await _expect(websocket, Welcome)
             limit.reschedule(None)
             yield websocket, welcome
     except LinkError:
@@ -110,16 +106,14 @@ async def open_connection(
                     await asyncio.sleep(0)
 
 
-async def receive(websocket: aiohttp.ClientWebSocketResponse, timeout_s: float) -> RobotMessage:
-    """Receive the next message; `timeout_s` is the silence after which the link is lost, s."""
+async def receive(websocket: aiohttp.ClientWebSocketResponse) -> RobotMessage:
+    """Receive the next message."""
     received = await websocket.receive()
     match received.type:
         case aiohttp.WSMsgType.BINARY:
             return messages.decode_robot_message(received.data)
         case aiohttp.WSMsgType.TEXT:
             raise LinkError("Expected a binary message from the robot, got text.")
-        case aiohttp.WSMsgType.ERROR if isinstance(received.data, TimeoutError):
-            raise lost(f"no message for {timeout_s:.1f} s")
         case aiohttp.WSMsgType.ERROR:
             raise lost(str(received.data) or "the connection broke")
         case _:
@@ -131,11 +125,9 @@ def lost(why: str) -> LinkError:
     return LinkError(f"The link to the robot is lost: {why}.")
 
 
-async def _expect(
-    websocket: aiohttp.ClientWebSocketResponse, kind: type[_M], timeout_s: float
-) -> _M:
+async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
     """Receive a message of one type."""
-    message = await receive(websocket, timeout_s)
+    message = await receive(websocket)
     if isinstance(message, Refused):
         raise RobotRefused(message.reason)
     if not isinstance(message, kind):

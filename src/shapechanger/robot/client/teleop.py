@@ -274,16 +274,6 @@ class KeyParser:
         return _ARROWS.get(text, OTHER)
 
 
-def keys_in(text: str) -> list[str]:
-    r"""Parse a whole input into keys.
-
-    >>> keys_in("w\x1b[1;5D\x1b")
-    ['w', 'other', 'escape']
-    """
-    parser = KeyParser()
-    return parser.feed(text.encode(), 0.0) + parser.expire(REST_WAIT_S)
-
-
 def _as_typed(keys: list[str]) -> list[str]:
     """Return the keys of one read that a person can have meant.
 
