@@ -456,7 +456,7 @@ class RobotClient(Inbox):
             done, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in others:
                 task.cancel()
-            await asyncio.wait(tasks)
+            await asyncio.gather(*tasks, return_exceptions=True)
             for task in done:
                 task.result()
             # Should this fail, the robot notices the end of the connection anyway.
