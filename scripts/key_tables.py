@@ -53,7 +53,7 @@ def _profile_table(name: str) -> Iterator[str]:
 def _messages(side: str) -> Iterator[str]:
     """Return the messages of one side, the client's or the robot's."""
     for kind in {"client": ClientMessage, "robot": RobotMessage}[side].__subclasses__():
-        yield f"#### `{inspect.type_info(kind).tag}`"
+        yield f"#### `{kind.__struct_config__.tag}`"
         yield _summary(kind)
         yield from _keys(kind, typed=True)
 
@@ -101,8 +101,10 @@ def _default(name: str, field: inspect.Field) -> str:
         return f'"{value}"'
     if isinstance(value, bool):
         return str(value).lower()
+    if name in ("address", "mux"):
+        return hex(value)
     if isinstance(value, int | float):
-        return hex(value) if name in ("address", "mux") else f"{value:.9g}"
+        return f"{value:.9g}"
     return str([*value])
 
 

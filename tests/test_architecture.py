@@ -15,7 +15,7 @@ pytestmark = pytest.mark.sources
 _SRC = Path(__file__).resolve().parents[1] / "src"
 _HEAVY = frozenset({"cv2", "matplotlib", "mujoco", "ray", "stable_baselines3", "torch"})
 _SIMULATORS = frozenset({"mujoco", "glfw", "OpenGL"})
-_NEEDS_LGPIO = "shapechanger.robot.drivers.lgpio_pins"
+_NEEDS_LGPIO = "shapechanger.robot.lgpio_pins"
 
 
 def _modules() -> Iterator[tuple[str, Path]]:

@@ -10,24 +10,26 @@ import importlib
 import select
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, ClassVar, Final, Protocol
 
 from shapechanger.errors import RobotError, translate_errors
-
-if TYPE_CHECKING:  # Only a rig needs them.
-    from shapechanger.robot.drivers.servos.registers import ServoPort
-    from shapechanger.robot.drivers.servos.settings import BusSettings
 
 REAL: Final = "shapechanger.robot.hardware:Hardware"
 """Default source of the hardware."""
 
 
-class Clock(Protocol):
-    """Clock of a process."""
+class Clock:
+    """The machine's monotonic clock; a twin overrides all of it.
+
+    Attributes:
+        is_real: Whether the hardware takes its time; a twin's chips respond at once.
+    """
+
+    is_real: ClassVar = True
 
     def now_ns(self) -> int:
-        """Return the monotonic time, ns."""
-        ...
+        """Return the time of CLOCK_MONOTONIC, ns."""
+        return time.monotonic_ns()
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
         """Wait in the guard for a readable descriptor or a time.
@@ -42,7 +44,12 @@ class Clock(Protocol):
             False if only the limit was reached. A twin's time moves in grants: the result is True
             at each grant, and only then.
         """
-        ...
+        left_s = min((until_ns - time.monotonic_ns()) / 1e9, at_most_s)
+        poll = select.poll()
+        for fd in readable:
+            poll.register(fd, select.POLLIN)
+        ready = poll.poll(max(0.0, left_s * 1e3))
+        return bool(ready) or time.monotonic_ns() >= until_ns
 
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Let a call to the hardware send heartbeats while a twin's board is held up.
@@ -53,7 +60,6 @@ class Clock(Protocol):
         Args:
             beat: Sends a heartbeat if one is due.
         """
-        ...
 
     async def sleep(self, seconds: float) -> int | None:
         """Let `seconds` pass in the daemon.
@@ -62,7 +68,9 @@ class Clock(Protocol):
             Capture time of the newest frame that the camera's driver was sent by the end, ns, so
             that the daemon can wait for it; None where frames arrive in their own time.
         """
-        ...
+        import asyncio  # Imported here, because the guard does not need it.
+
+        await asyncio.sleep(seconds)
 
 
 class I2cBus(Protocol):
@@ -115,32 +123,6 @@ class ServoPins(Protocol):
         ...
 
 
-class RealClock:
-    """The machine's monotonic clock."""
-
-    def now_ns(self) -> int:
-        """Return the time of CLOCK_MONOTONIC, ns."""
-        return time.monotonic_ns()
-
-    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Wait for a readable descriptor or a time; see `Clock.wait`."""
-        left_s = min((until_ns - time.monotonic_ns()) / 1e9, at_most_s)
-        poll = select.poll()
-        for fd in readable:
-            poll.register(fd, select.POLLIN)
-        ready = poll.poll(max(0.0, left_s * 1e3))
-        return bool(ready) or time.monotonic_ns() >= until_ns
-
-    def keep_alive(self, beat: Callable[[], object]) -> None:
-        """Do nothing; see `Clock.keep_alive`."""
-
-    async def sleep(self, seconds: float) -> int | None:
-        """Sleep for `seconds` of real time."""
-        import asyncio  # Imported here, because the guard does not need it.
-
-        await asyncio.sleep(seconds)
-
-
 class Hardware:
     """Pins, buses and clock of this machine, a Raspberry Pi; a twin overrides all of them.
 
@@ -151,7 +133,7 @@ class Hardware:
     """
 
     def __init__(self, _: str = "") -> None:
-        self.clock: Clock = RealClock()
+        self.clock = Clock()
         """Clock of this process."""
         self._pin_factory: Any = None
 
@@ -166,7 +148,7 @@ class Hardware:
         if self._pin_factory is None:
             # Of gpiozero or lgpio, or one of them is missing.
             with translate_errors(Exception, to=_no_pins):
-                from shapechanger.robot.drivers.lgpio_pins import LowAtOnceFactory
+                from shapechanger.robot.lgpio_pins import LowAtOnceFactory
 
                 self._pin_factory = LowAtOnceFactory()
         return self._pin_factory
@@ -179,15 +161,18 @@ class Hardware:
 
     def servo_pins(self) -> ServoPins:
         """Open the pins that send servo pulses, with lgpio."""
-        from shapechanger.robot.drivers.lgpio_pins import LgpioServoPins
+        from shapechanger.robot.lgpio_pins import LgpioServoPins
 
         return LgpioServoPins()
 
-    def servo_port(self, settings: BusSettings) -> ServoPort:
-        """Open the port of a servo bus, with `dynamixel_sdk`."""
-        from shapechanger.robot.drivers.servos.serial_port import open_serial_port
+    def servo_port(self, settings: Any, open_port: Callable[[Any], Any]) -> Any:
+        """Open the port of a servo bus, a `ServoPort` for `BusSettings`, both of `drivers.servos`.
 
-        return open_serial_port(settings)
+        Args:
+            settings: The bus.
+            open_port: Opens a serial port of this machine.
+        """
+        return open_port(settings)
 
     def close(self) -> None:
         """Close all of it."""

@@ -21,7 +21,7 @@ from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
-from shapechanger.robot.hardware import RealClock
+from shapechanger.robot.hardware import Clock
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.install import unit_name
 from shapechanger.robot.twin.room import DrivingWorld
@@ -164,7 +164,7 @@ def _hardware(where: str = "", act: Callable[[], object] = lambda: None) -> Any:
     def refuse() -> None:
         raise RobotError("Not here.")
 
-    made: Any = SimpleNamespace(clock=RealClock())
+    made: Any = SimpleNamespace(clock=Clock())
     pins = dict.fromkeys(("pin_factory", "i2c", "servo_pins", "servo_port"), refuse)
     camera = {"open": lambda: made, "read": lambda: Frame(b"\xff\xd8", 1), "close": lambda: None}
     for name, other in (pins | camera).items():

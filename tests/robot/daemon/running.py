@@ -19,7 +19,7 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon import process
 from shapechanger.robot.daemon.camera import FrameReader
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.hardware import Clock, RealClock
+from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link.authentication import fingerprint_of, make_proof
 from shapechanger.robot.link.messages import (
     VERSION,
@@ -194,7 +194,7 @@ async def running(
     plan: DaemonPlan, monkeypatch: pytest.MonkeyPatch, clock: Clock | None = None
 ) -> AsyncIterator[Running]:
     """Run a daemon with a fake guard and a fake camera."""
-    clock = RealClock() if clock is None else clock
+    clock = Clock() if clock is None else clock
     camera = FakeCamera()
     reader = lambda *arguments: FrameReader(*arguments, opener=camera.open)  # noqa: E731
     monkeypatch.setattr(process, "FrameReader", reader)

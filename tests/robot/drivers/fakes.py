@@ -13,7 +13,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OutputDriver, SensorDriver, open_output, open_sensor
 from shapechanger.robot.drivers.servos.registers import ServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings
-from shapechanger.robot.hardware import RealClock
+from shapechanger.robot.hardware import Clock
 
 MS = 1_000_000
 """Nanoseconds of a millisecond."""
@@ -147,7 +147,7 @@ class FakeHardware:
     """
 
     def __init__(self, chips: dict[int, dict[int, int]] | None = None) -> None:
-        self.clock = RealClock()
+        self.clock = Clock()
         self.factory = ScriptedFactory()
         self.fault = self.factory.fault
         self.bus = FakeBus(chips or {}, self.fault)
@@ -164,7 +164,7 @@ class FakeHardware:
     def servo_pins(self) -> FakeServoPins:
         return self.pulses
 
-    def servo_port(self, settings: BusSettings) -> ServoPort:
+    def servo_port(self, settings: BusSettings, open_port: object) -> ServoPort:
         """Raise, since servo buses are simulated elsewhere."""
         raise RobotError(f"The bus at {settings.device} cannot be opened.")
 

@@ -1,6 +1,7 @@
 """Servos, speed controllers and their pulse sources."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -152,7 +153,7 @@ def test_a_simulated_chip_wakes_up_without_a_pause(
     monkeypatch.setattr(pca9685.time, "sleep", slept.append)
     hardware = FakeHardware({0x40: _asleep()})
     if simulated:
-        monkeypatch.setattr(hardware, "clock", object())
+        monkeypatch.setattr(hardware, "clock", SimpleNamespace(is_real=False))
     hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
     assert slept == ([] if simulated else [500e-6])
 

@@ -129,7 +129,7 @@ def test_pings_are_at_least_60_ms_apart() -> None:
 
 
 class _SimulatedClock:
-    """Clock of simulated hardware."""
+    is_real = False
 
 
 def _forbid(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

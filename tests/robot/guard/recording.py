@@ -14,7 +14,7 @@ from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
-from shapechanger.robot.hardware import RealClock
+from shapechanger.robot.hardware import Clock
 
 _STUCK = "stuck-"
 """Prefix of a file next to the record that makes a pin fail, such as `stuck-GPIO22`."""
@@ -65,7 +65,7 @@ class _Hardware:
                 super()._set_state(value)
                 record.write(pin=self.info.name, duty=float(value))
 
-        self.clock = RealClock()
+        self.clock = Clock()
         self._factory = MockFactory(pin_class=Pin)
 
     def pin_factory(self) -> MockFactory:

@@ -72,7 +72,6 @@ NAMES = st.sampled_from(["a", "b", "c-d", '"e f"', "'g.h'"])
     )
 )
 def test_every_key_is_found_on_its_line(tables: dict[str, dict[str, str]]) -> None:
-    """Each key is reported on the line it stands on, and no other keys are reported."""
     text = "".join(
         f"[{table}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()) + "\n"
         for table, keys in tables.items()

@@ -221,7 +221,7 @@ def test_a_missing_table_is_named() -> None:
 
 def test_too_many_actions() -> None:
     actions = "".join(f"[action.a{i}]\n" for i in range(65))
-    with pytest.raises(ProfileError, match="a robot has at most 64 actions, not 65"):
+    with pytest.raises(ProfileError, match=r"\[action\] must have at most 64 tables, not 65"):
         read('[robot]\nname = "x"\nbody = "y"\n' + actions)
 
 

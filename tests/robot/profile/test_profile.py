@@ -6,16 +6,17 @@ import datetime
 import math
 
 import pytest
+from gpiozero.pins.data import PLUS_J8
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.drivers.pins import BCM_OF_BOARD, bcm
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import EVERYTHING, changed, read
 
 
 def test_everything_is_read() -> None:
-    """Each table is read, with its defaults."""
     profile = read()
     assert (profile.name, profile.body, profile.control_hz) == ("rover", "car", 25.0)
     assert profile.calibrated == datetime.date(2026, 11, 3)
@@ -73,13 +74,6 @@ def test_drivers_find_all_their_settings() -> None:
     assert sensors["wheel"][1] == {"a": 16, "b": 20, "counts_per_turn": 20.0, "wheel_m": 0.21}
 
 
-def test_chip_settings_apply_to_all_its_outputs() -> None:
-    """The output-enable line of a PCA9685 is given once."""
-    outputs = {output.name: output for output in read().outputs}
-    assert outputs["steer"].settings["output_enable"] == 25
-    assert outputs["arm"].settings["output_enable"] == 25
-
-
 def test_guard_plan_round_trips() -> None:
     plan = read().guard_plan()
     assert GuardPlan.from_json(plan.to_json()) == plan
@@ -134,7 +128,6 @@ def test_tendon_layouts_start_at_0() -> None:
 
 
 def test_a_minimal_profile() -> None:
-    """Without camera, sensors and limits, the defaults are safe."""
     text = EVERYTHING.split("[action.steering]", maxsplit=1)[0]
     profile = read(
         text + '[action.turn]\n[output.turn]\ndriver = "hbridge"\nforward = 4\nbackward = 5\n'
@@ -148,12 +141,16 @@ def test_a_minimal_profile() -> None:
 
 
 def test_pin_minus_1_means_unconnected() -> None:
-    """-1 is the same as no key."""
     without, with_none = (read(changed("enable = 26\n", new)) for new in ("", "enable = -1\n"))
     assert without == with_none
 
 
-@pytest.mark.parametrize("ending", ["\r\n", "\n"])
-def test_line_ends_do_not_matter(ending: str) -> None:
-    """CRLF and LF give the same profile."""
-    assert read(EVERYTHING.replace("\n", ending)) == read()
+def test_the_header_matches_gpiozero() -> None:
+    pins: dict[int, dict[str, str]] = PLUS_J8[2]
+    named = {n: int(p["gpio"].removeprefix("GPIO")) for n, p in pins.items() if "gpio" in p}
+    assert named == BCM_OF_BOARD
+
+
+def test_the_pins_of_2017() -> None:
+    assert [bcm(f"BOARD{n}") for n in (15, 13, 11, 7)] == [22, 27, 17, 4]
+    assert bcm("GPIO22") == bcm(22) == 22

@@ -39,7 +39,6 @@ def test_a_first_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> 
 
 
 def test_a_first_profile_overwrites_nothing(tmp_path: Path) -> None:
-    """Existing files, invalid paths, kinds and names raise errors."""
     path = tmp_path / "car.toml"
     path.write_text("mine")
     with pytest.raises(OutputError, match=r"Cannot write .*: it exists"):
@@ -135,7 +134,6 @@ def test_a_first_profile_takes_another_camera(kind: str, camera: str, tmp_path: 
 
 @pytest.mark.parametrize("step", ["os.fsync", "pathlib.Path.chmod", "pathlib.Path.replace"])
 def test_a_full_disk_loses_nothing(step: str, rover: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a failed write, the old file is intact and no temporary file remains."""
 
     def fails(*_: object) -> None:
         raise OSError(28, os.strerror(28))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Final
 
 from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
 
@@ -132,48 +133,14 @@ hold_ms = 50
 pin = 21
 """
 
-HOVERCRAFT = """\
-[robot]
-name = "skimmer"
-body = "hovercraft"
+_DOCS: Final = Path(__file__).parents[3] / "docs"
 
-[action.steering]
-
-[action.throttle]
-low = 0.0
-propels = true
-
-[action.lift]
-one_sided = true
-
-[output.fan]
-driver = "esc"
-part = "propeller"
-over = "lgpio"
-pin = 18
-reverse = "none"
-mix = { throttle = 1.0 }
-
-[output.lift_fan]
-driver = "hbridge"
-forward = 5
-backward = 6
-mix = { lift = 1.0 }
-
-[output.left_rudder]
-driver = "servo"
-part = "rudder"
-over = "lgpio"
-pin = 12
-mix = { steering = 1.0 }
-
-[output.right_rudder]
-driver = "servo"
-part = "rudder"
-over = "lgpio"
-pin = 13
-mix = { steering = 0.8 }
-"""
+# The vehicle of the guide, with a rudder that turns less than the other.
+(HOVERCRAFT,) = re.findall(
+    r"```toml\n(\[robot\].*?)```", (_DOCS / "profiles.md").read_text(), re.DOTALL
+)
+HOVERCRAFT = HOVERCRAFT.replace("[output.propeller]", "[output.fan]")
+HOVERCRAFT = "steering = 0.8".join(HOVERCRAFT.rsplit("steering = 1.0", 1))
 
 
 def changed(old: str, new: str, text: str = EVERYTHING) -> str:
@@ -190,7 +157,6 @@ def read(text: str = EVERYTHING) -> Profile:
 
 
 _LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
-_GUIDE = Path(__file__).parents[3] / "docs" / "finger-rig.md"
 
 
 def finger_text(family: str) -> str:
@@ -202,7 +168,9 @@ def finger_text(family: str) -> str:
     text = shipped_profiles()["finger"].read_text()
     lines, enable = _LENGTH, ""
     if family == "Feetech":
-        (block,) = re.findall(r"```toml\n\[output.FDP\]\n(.*?)```", _GUIDE.read_text(), re.DOTALL)
+        (block,) = re.findall(
+            r"```toml\n\[output.FDP\]\n(.*?)```", (_DOCS / "finger-rig.md").read_text(), re.DOTALL
+        )
         lines, enable = block.split("\n\n")
         for key in re.findall(r"^(\w+) =", lines, re.MULTILINE):
             text = re.sub(rf"^{key} = .*\n", "", text, flags=re.MULTILINE)

@@ -101,6 +101,8 @@ class LocalBoard(BoardClient):
 
 
 class _Clock:
+    is_real = False
+
     def __init__(self, board: LocalBoard) -> None:
         self._board = board
 

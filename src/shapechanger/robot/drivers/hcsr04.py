@@ -20,7 +20,7 @@ from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
-from shapechanger.robot.hardware import Hardware, RealClock
+from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # Only a twin has a world.
     from shapechanger.contract.world import World
@@ -53,7 +53,7 @@ class Hcsr04:
         self._name = f"Sensor {plan.name!r}"
         self._max_m: float = settings["max_m"]
         # Simulated pins need no pulse width.
-        self._trigger_ns = _TRIGGER_NS if isinstance(hardware.clock, RealClock) else 0
+        self._trigger_ns = _TRIGGER_NS if hardware.clock.is_real else 0
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._rise: float | None = None
         self._echo_s: float | None = None

@@ -27,7 +27,7 @@ from shapechanger.robot.drivers.simulation import (
     PwmChannel,
     SimulatedChip,
 )
-from shapechanger.robot.hardware import Hardware, RealClock
+from shapechanger.robot.hardware import Hardware
 
 _MODE1: Final = 0x00
 _MODE2: Final = 0x01
@@ -166,7 +166,7 @@ class Pca9685:
             bus.write_byte_data(address, _PRESCALE, self._prescale)
         bus.write_byte_data(address, _MODE2, _TOTEM_POLE)
         bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT)
-        if asleep and isinstance(self._hardware.clock, RealClock):
+        if asleep and self._hardware.clock.is_real:
             time.sleep(_WAKE_UP_S)
         self._must_start = False
 

@@ -269,7 +269,7 @@ def preload(plan: GuardPlan, source: str) -> None:
     # A robot without pins may lack the libraries, which are imported when they are needed.
     libraries = ("gpiozero",)
     if source == REAL:
-        libraries += ("shapechanger.robot.drivers.lgpio_pins", "gpiozero.pins.lgpio", "smbus2")
+        libraries += ("shapechanger.robot.lgpio_pins", "gpiozero.pins.lgpio", "smbus2")
     for library in libraries:
         with contextlib.suppress(ImportError):
             importlib.import_module(library)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -23,7 +23,6 @@ from shapechanger.robot.profile.profile import CommandTable, Profile, ResetStep,
 from shapechanger.robot.profile.rules import RULES
 from shapechanger.robot.profile.toml import Table, choice, fields_of, keys_of
 
-_MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 _DIGITS: Final = re.compile(r"[0-9_]{600}")
 
@@ -164,11 +163,17 @@ def read_profile(text: str, path: Path) -> Profile:
         if name not in TABLES:
             raise root.error((name,), f"a profile has no table or key {choice(name, TABLES)}")
     robot: RobotTable = _once(root, "robot")
-    actions = {name: _read_action(name, table) for name, table in _named(root, "action")}
+    actions = {
+        name: _read_action(name, table) for name, table in root.table("action").named().items()
+    }
     if not actions:
         raise root.error(("action",), "a robot needs an action, such as [action.throttle]")
-    outputs = tuple(_read_output(name, table) for name, table in _named(root, "output"))
-    sensors = tuple(_read_sensor(name, table) for name, table in _named(root, "sensor"))
+    outputs = tuple(
+        _read_output(name, table) for name, table in root.table("output").named().items()
+    )
+    sensors = tuple(
+        _read_sensor(name, table) for name, table in root.table("sensor").named().items()
+    )
     pins: dict[str, Any] = {}
     if "enable" in root.keys:
         enable: EnableKeys = _once(root, "enable")
@@ -218,15 +223,6 @@ def _once(root: Table, name: str) -> Any:
     """Return the keys of a table that is there once."""
     (keys,) = root.table(name).decode(*TABLES[name])
     return keys
-
-
-def _named(root: Table, kind: str) -> Iterable[tuple[str, Table]]:
-    """Return the tables of one kind with their names, in the order of the file."""
-    tables = root.table(kind).named()
-    if len(tables) > _MOST_NAMED:
-        message = f"a robot has at most {_MOST_NAMED} {kind}s, not {len(tables)}"
-        raise root.error((kind,), message)
-    return tables.items()
 
 
 def _read_action(name: str, table: Table) -> ActionPlan:

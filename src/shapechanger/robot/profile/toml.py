@@ -81,6 +81,7 @@ def shown(value: Any) -> str:
         return "a number too large to write"
 
 
+_MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 _PATH: Final = re.compile(r" - at `\$\.(\w+)")
 
@@ -115,7 +116,7 @@ def permitted(kind: inspect.Type) -> str:
         case inspect.UnionType():
             return permitted(kind.types[0])
         case inspect.CustomType():
-            return kind.cls.words
+            return cast("type[Pin]", kind.cls).words
         case _:
             return f"a {type(kind).__name__.removesuffix('Type').lower()}"
 
@@ -188,6 +189,9 @@ class Table:
 
     def named(self) -> dict[str, Table]:
         """Return the nested tables keyed by name; refuse names that no part may have."""
+        if len(self.keys) > _MOST_NAMED:
+            words = f"must have at most {_MOST_NAMED} tables, not {len(self.keys)}"
+            raise self.refused("", words)
         for name in self.keys:
             if _NAME.fullmatch(name) is None:
                 raise self.error(

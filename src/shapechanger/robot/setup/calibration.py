@@ -13,7 +13,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
 from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.pulse import PulseRange
-from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
+from shapechanger.robot.drivers.servos.bus import BusState, open_bus
 from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_settings
 from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
@@ -215,7 +215,7 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
     require_homing(settings)
     with (
         closing(Switches(plan, hardware)) as switches,
-        closing(ServoBus(settings, hardware.servo_port(settings))) as bus,
+        closing(open_bus(settings, hardware)) as bus,
     ):
 
         def cycle(tensions: Mapping[str, float]) -> BusState:

@@ -6,12 +6,12 @@ import select
 import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from shapechanger.errors import translate_errors
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
-from shapechanger.robot.hardware import Hardware, RealClock
+from shapechanger.robot.hardware import Clock, Hardware
 from shapechanger.robot.twin.rpc import (
     MAX_MESSAGE,
     BoardClient,
@@ -22,8 +22,10 @@ from shapechanger.robot.twin.rpc import (
 )
 
 
-class SteadyClock(RealClock):
+class SteadyClock(Clock):
     """The machine's monotonic clock; edges of inputs are dispatched while the guard waits."""
+
+    is_real: ClassVar = False
 
     def __init__(self, client: BoardClient) -> None:
         self._client = client
@@ -203,7 +205,7 @@ class TwinHardware(Hardware):
         """Return the pins that send servo pulses."""
         return TwinServoPins(self.board)
 
-    def servo_port(self, settings: BusSettings) -> TwinServoPort:
+    def servo_port(self, settings: BusSettings, open_port: object) -> TwinServoPort:
         """Return the port of the servo bus; its first use fails if the board has no such bus."""
         return TwinServoPort(self.board, settings.device)
 

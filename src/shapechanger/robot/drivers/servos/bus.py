@@ -14,6 +14,7 @@ from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN, Register
 from shapechanger.robot.drivers.servos.registers import RegisterBus, ServoPort, ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 from shapechanger.robot.drivers.servos.tendon import ServoState, TendonServo
+from shapechanger.robot.hardware import Hardware
 
 Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.
@@ -358,3 +359,14 @@ class ServoBus:
             else:
                 one.miss(late=late)
         return states
+
+
+def open_bus(settings: BusSettings, hardware: Hardware) -> ServoBus:
+    """Open a bus, without torque."""
+    return ServoBus(settings, hardware.servo_port(settings, _serial_port))
+
+
+def _serial_port(settings: BusSettings) -> ServoPort:
+    from shapechanger.robot.drivers.servos.serial_port import open_serial_port  # It needs an extra.
+
+    return open_serial_port(settings)

@@ -14,7 +14,7 @@ from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OutputChip, SensorChip
 from shapechanger.robot.drivers.keys import Keys
-from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.bus import ServoBus, open_bus
 from shapechanger.robot.drivers.servos.settings import ServoSettings, bus_settings, servo_settings
 from shapechanger.robot.drivers.simulation import WiredOutput
 from shapechanger.robot.hardware import Hardware
@@ -68,7 +68,7 @@ class SharedBus:
         self._settings = settings = bus_settings([*self._plans.values()])
         self._zeros: dict[str, int] = {n: p.settings["zero"] for n, p in self._plans.items()}
         self._has_watchdog = settings.family.has_watchdog
-        bus = ServoBus(settings, self._hardware.servo_port(settings))
+        bus = open_bus(settings, self._hardware)
         if self._has_watchdog:
             try:
                 bus.set_up()

@@ -76,8 +76,8 @@ class _Lgpio(types.ModuleType):
 def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
     """A Raspberry Pi 4 with the fake lgpio."""
     fake = _Lgpio()
-    ours = ("gpiozero.pins.lgpio", "shapechanger.robot.drivers.lgpio_pins")
-    for name in (*ours, "shapechanger.robot.drivers.lgpio_pins"):
+    ours = ("gpiozero.pins.lgpio", "shapechanger.robot.lgpio_pins")
+    for name in (*ours, "shapechanger.robot.lgpio_pins"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "lgpio", fake)
     monkeypatch.setattr("gpiozero.pins.local.get_pi_revision", lambda: 0xC03115)
@@ -87,13 +87,13 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
         "gpiozero.pins.local.LocalPiFactory._reservations", collections.defaultdict(list)
     )
     yield fake
-    for name in (*ours, "shapechanger.robot.drivers.lgpio_pins"):
+    for name in (*ours, "shapechanger.robot.lgpio_pins"):
         sys.modules.pop(name, None)
 
 
 def _factory(ours: bool) -> Any:
     if ours:
-        return importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LowAtOnceFactory()
+        return importlib.import_module("shapechanger.robot.lgpio_pins").LowAtOnceFactory()
     return importlib.import_module("gpiozero.pins.lgpio").LGPIOFactory()
 
 
@@ -169,7 +169,7 @@ def test_closing_servo_pins_continues_after_a_failure(
     lgpio: _Lgpio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """When one pin fails, the others go low and the chip is closed."""
-    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LgpioServoPins()
+    pins = importlib.import_module("shapechanger.robot.lgpio_pins").LgpioServoPins()
     for pin in (17, 18, 19):
         pins.pulse(pin, 1500, 50)
     send = lgpio.tx_servo
@@ -187,7 +187,7 @@ def test_closing_servo_pins_continues_after_a_failure(
 
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
     """Closing sets the pin low, where lgpio keeps its present level."""
-    pins = importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LgpioServoPins()
+    pins = importlib.import_module("shapechanger.robot.lgpio_pins").LgpioServoPins()
     pins.pulse(17, 1503, 50)
     assert lgpio.pulses[17] == 1503
     pins.close()

@@ -1,0 +1,159 @@
+"""The finger's profile: its servo bus and the encoders at its joints."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from shapechanger.contract.plan import GuardPlan
+from shapechanger.errors import ProfileError
+from shapechanger.robot.profile import load_profile, shipped_profiles, write_profile
+from shapechanger.robot.profile.load import rewrite
+from tests.robot.profile.texts import changed, finger_text, read
+
+_TEXT = shipped_profiles()["finger"].read_text()
+_PROFILE = load_profile(shipped_profiles()["finger"])
+_CAR = shipped_profiles()["car"].read_text()
+
+
+def _part(begin: str, end: str) -> str:
+    return _TEXT[_TEXT.index(begin) : _TEXT.index(end)]
+
+
+_BUS = _part("[servo_bus]", "[action.FDP]")
+_TENDONS = _part("[sensor.tendons]", "[sensor.joints]")
+_JOINTS = _part("[sensor.joints]", "[limits]")
+_MORE = _JOINTS.replace(".joints", ".more")
+
+
+def test_settings_are_plain_numbers_in_file_order() -> None:
+    """Outputs have the settings of the bus, and the sensor of the bus has its tendons."""
+    plan = _PROFILE.guard_plan()
+    assert {str(output.settings["device"]) for output in plan.outputs} == {"/dev/ttyUSB0"}
+    assert [output.settings["id"] for output in plan.outputs] == [1, 2, 3, 4, 5, 6, 7]
+    tendons, joints = plan.sensors
+    assert tendons.measures == "tendons"
+    assert [*tendons.settings["tendons"]] == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
+    assert (joints.driver, joints.measures) == ("as5600", "joints")
+    assert joints.settings == {
+        "bus": 1,
+        "mux": 0x70,
+        "joints": ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"],
+        "channels": [0, 1, 2, 3],
+        "zeros": [0, 0, 0, 0],
+        "directions": [1, 1, 1, 1],
+    }
+    assert GuardPlan.from_json(json.dumps(json.loads(plan.to_json()))) == plan
+
+
+def test_layouts_are_in_newtons_metres_and_radians() -> None:
+    """Actions run from pretension at 0 to maximum at 1; states are of tendons, then of joints."""
+    action = _PROFILE.action_layout()["FDP"]
+    assert (action.low, action.high, action.gain, action.gain_unit) == (0.0, 1.0, 14.0, "N")
+    assert _PROFILE.action_layout()["LUM"].gain == pytest.approx(5.4)
+    state = _PROFILE.state_layout()
+    assert state.names[:2] == ("FDP/length", "FDS/length")
+    assert [state[f"PI/{name}"].unit for name in ("length", "speed", "tension")] == [
+        "m",
+        "m/s",
+        "N",
+    ]
+    assert state["PI/tension"].high == 15.0
+    assert state.size == 32
+    angle = state["MCP_abduction/angle"]
+    assert (angle.unit, angle.low, angle.high) == ("rad", -math.pi, math.pi)
+    assert state.names[21:25] == tuple(
+        f"{name}/angle" for name in ("MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion")
+    )
+
+
+def test_a_finger_without_encoders_has_no_angles() -> None:
+    profile = read(_TEXT.replace(_JOINTS, ""))
+    assert [sensor.name for sensor in profile.sensors] == ["tendons"]
+    assert not [name for name in profile.state_layout().names if name.endswith("/angle")]
+
+
+def test_an_action_of_two_tendons_has_no_newtons() -> None:
+    text = _TEXT.replace(_part("[action.FDS]", "[action.EIP]"), "")
+    action = read(changed("mix = { FDS = 1.0 }", "mix = { FDP = 1.0 }", text)).action_layout()[
+        "FDP"
+    ]
+    assert (action.gain, action.gain_unit) == (1.0, "")
+
+
+def test_control_of_the_length_has_its_gain_in_metres() -> None:
+    """The action of such a tendon goes from the longest to the shortest length."""
+    keys = 'id = 1\ncontrol = "length"\nlongest_m = 0.01\nshortest_m = -0.03\n'
+    layout = read(_TEXT.replace("id = 1\n", keys, 1)).action_layout()
+    assert (layout["FDP"].gain, layout["FDP"].gain_unit) == (pytest.approx(0.04), "m")
+    assert layout["FDS"].gain_unit == "N"
+
+
+def test_a_feetech_rig_has_the_settings_of_its_power_switch() -> None:
+    """Its outputs know how long the enable line holds, and how long the servos start."""
+    profile = read(finger_text("Feetech") + "hold_ms = 50\n")
+    settings = {
+        (o.settings["model"], o.settings["cut_ms"], o.settings["arm_s"]) for o in profile.outputs
+    }
+    assert settings == {("STS3215", 100, 0.5)}
+    assert profile.action_layout()["FDP"].gain == pytest.approx(0.042)
+
+
+def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
+    """`rewrite` sets the zero as `robot home` does, and keeps comments."""
+    path = write_profile("finger", tmp_path / "mine.toml", "mine")
+    profile = rewrite(path, {"sensor.joints.PIP_flexion.zero": 1234})
+    assert profile.sensors[-1].settings["zeros"] == [0, 0, 1234, 0]
+    assert "# Counts while the finger is straight." in path.read_text()
+
+
+# Text of the finger to replace where it is first, its replacement, and part of the message.
+_TABLE = r"""
+channel = 3\n -> channel = 2\n -> has the channel 2, which PIP_flexion has, too
+channel = 3\n -> channel = 8\n -> from 0 to 7
+channel = 3\n -> chanel = 3\n -> (did you mean 'channel'?)
+channel = 3\n ->  -> lacks the key 'channel'
+[sensor.joints.DIP_flexion] -> [sensor.joints.3] -> the name '3' must
+mux = 0x70 -> mux = 0x68 -> from 112 to 119
+mux = 0x70 -> mox = 0x70 -> [sensor.joints] has no key 'mox'
+direction = 1 -> direction = 0 -> must be one of -1, 1, not 0
+then = "release" -> then = "hold" -> must be "release"
+\nid = 2\n -> \nid = 1\n -> id 1 of the servo bus is used twice: by id of [output.FDP]
+pretension_n = 1.0 -> pretension_n = 30.0 -> pretension_n of [output.FDP] must be
+watchdog_ms = 100 -> watchdog_ms = 90 -> in steps of 20 from 20 to 2540, not 90
+XL330-M077 -> XL330-M078 -> (did you mean 'XL330-M077'?)
+id = 1\n -> id = 1\ncontrol = "lenght"\n -> (did you mean 'length'?)
+id = 1\n -> id = 1\ncontrol = "length"\n -> must be below longest_m, not 0 and 0 m
+"""
+_FEETECH = r"""
+control = "length" -> control = "tension" -> must be 'length', not 'tension', because a
+shortest_m = -0.03  -> shortest_m = -0.04  -> within 0.0314 m of the zero, half a turn
+[enable]\npin = 19 ->  -> [output.FDP] is an STS3215, which does not stop when its bus is
+baud = 1_000_000 -> baud = 2_000_000 -> baud of [servo_bus] must be one that the servos have
+model = "STS3215" -> model = "XL330-M077" -> cannot have Dynamixel and Feetech servos
+"""
+_MISTAKES = [
+    (_TEXT.replace(_BUS, ""), "[output.FDP] is on a bus: add [servo_bus]"),
+    (_TEXT.replace(_TENDONS, ""), "servos need one sensor with the driver bus_servo"),
+    (_TEXT + _TENDONS.replace("tendons", "others"), "servos need one sensor"),
+    (f"{_CAR}\n[servo_bus]\n", "[servo_bus] needs an output with the driver bus_servo"),
+    (f"{_CAR}\n{_TENDONS}", "[sensor.tendons] needs an output with the driver bus_servo"),
+    (_TEXT.replace(_JOINTS, _JOINTS.split("[sensor.joints.")[0]), "needs a table for each joint"),
+    (_TEXT + _MORE, "address 0x70 of I2C bus 1 is used twice"),
+    (_TEXT + _MORE.replace("mux = 0x70", "mux = 0x71"), "address 0x36 of I2C bus 1 is used twice"),
+]
+for _base, _rows in ((_TEXT, _TABLE), (finger_text("Feetech"), _FEETECH)):
+    for _row in _rows.strip("\n").split("\n"):
+        _old, _new, _words = _row.replace(r"\n", "\n").split(" -> ")
+        assert _old in _base, _old
+        _MISTAKES.append((_base.replace(_old, _new, 1), _words))
+
+
+@pytest.mark.parametrize(("text", "words"), _MISTAKES, ids=[words for _, words in _MISTAKES])
+def test_mistake_is_named(text: str, words: str) -> None:
+    with pytest.raises(ProfileError, match=rf"line \d+: .*{re.escape(words)}"):
+        read(text)
