@@ -375,7 +375,7 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
 ) -> None:
     """Other robots are found."""
     found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
-    monkeypatch.setattr("shapechanger.robot.discovery.find", lambda _: [found])
+    monkeypatch.setattr("shapechanger.cli.robot.remote.find", lambda _: [found])
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     assert run("remember", "mine", "192.0.2.1", "--fingerprint", "ab" * 32)[0] == 0
     broken = home / "config" / "shapechanger" / "known" / "broken.toml"

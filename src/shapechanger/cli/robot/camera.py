@@ -17,6 +17,14 @@ from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture
 from shapechanger.errors import DemosError, OutputError, RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.vehicles.cameras.rectify import (
+    CANONICAL_SIZE,
+    CameraGeometry,
+    Rectifier,
+    draw_view,
+    measure_camera,
+    pitch_of_horizon,
+)
 
 if TYPE_CHECKING:
     from shapechanger.vehicles.cameras.rectify import CameraGeometry
@@ -51,8 +59,6 @@ class CameraView:
     def run(self) -> None:
         """Measure, write and draw."""
         import simplejpeg
-
-        from shapechanger.vehicles.cameras.rectify import CameraGeometry
 
         if self.board and self.horizon is not None:
             raise RobotError("Give --board or --horizon, not both.")
@@ -101,12 +107,6 @@ class CameraView:
         self, picture: NDArray[np.uint8], corners: tuple[int, int] | None, stated: CameraPlan
     ) -> CameraGeometry:
         """Measure the geometry, and print how certain it is."""
-        from shapechanger.vehicles.cameras.rectify import (
-            CameraGeometry,
-            measure_camera,
-            pitch_of_horizon,
-        )
-
         if corners is not None:
             found = measure_camera(picture, corners, self.fovy)
             say(
@@ -162,8 +162,6 @@ def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
 
 def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
     """Return the picture with the virtual camera's view drawn in, and the view next to it."""
-    from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, Rectifier, draw_view
-
     height, width = (int(n) for n in picture.shape[:2])
     seen = Rectifier(geometry, (width, height))(picture)
     drawn = draw_view(picture, geometry)

@@ -15,11 +15,15 @@ from rich.live import Live
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
+from shapechanger.demos.cloning.onnx_policy import OnnxClone
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
+from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot, can_open, open_console, recall
+from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
 from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 from shapechanger.robot.link.messages import Observation
+from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.onnx_policy import OnnxClone
@@ -51,8 +55,6 @@ class Drive:
 
     def run(self) -> None:
         """Drive until Q, or until Ctrl-C if the console is used."""
-        from shapechanger.robot.client.client import RobotClient
-
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
         known = recall(self.robot)
@@ -88,8 +90,6 @@ class Drive:
 @contextlib.contextmanager
 def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
     """Record on the robot for the duration of a block; if it fails, tell where the recording is."""
-    from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
-
     before = begin_recording(robot)
     try:
         yield
@@ -316,14 +316,9 @@ class Driving:
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
-    from shapechanger.robot.client.client import RobotClient
-    from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
-
     policy: CameraPolicy | OnnxClone
     body, hz = "", None
     if path.suffix == ".onnx":
-        from shapechanger.demos.cloning.onnx_policy import OnnxClone
-
         policy = exported = OnnxClone(path)
         body, hz = exported.body, exported.control_hz
     else:

@@ -16,7 +16,10 @@ from rich.table import Table
 from shapechanger.cli.console import counted, print_table, say
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.errors import DemosError, LinkError, RobotRefused, ShapechangerError
+from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot, forget, known_names, recall, remember
+from shapechanger.robot.client.recordings import episodes_there, fetch_episode
+from shapechanger.robot.discovery import find
 from shapechanger.robot.link.messages import VERSION
 
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
@@ -31,8 +34,6 @@ class Find:
 
     def run(self) -> None:
         """Print a table with the robots' local names."""
-        from shapechanger.robot.discovery import find
-
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
         known: dict[str, str] = {}
@@ -114,8 +115,6 @@ class Stop:
 
     def run(self) -> None:
         """Stop the robot; exit with 1 if it does not confirm."""
-        from shapechanger.robot.client.client import RobotClient
-
         known = recall(self.robot)
         try:
             with RobotClient.connect(known, role="person", frames=False) as robot:
@@ -149,9 +148,6 @@ class FetchEpisodes:
 
     def run(self) -> None:
         """Download; exit with 1 if an episode failed."""
-        from shapechanger.robot.client.client import RobotClient
-        from shapechanger.robot.client.recordings import episodes_there, fetch_episode
-
         failed = 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
             there = episodes_there(robot, self.episodes)

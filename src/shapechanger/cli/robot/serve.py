@@ -15,6 +15,7 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import require_port
+from shapechanger.demos.cloning.onnx_policy import OnnxClone
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.errors import (
     MissingExtra,
@@ -34,6 +35,7 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
 from shapechanger.robot.twin.start import Place
 from shapechanger.vehicles.courses.course import HOME, require_element
+from shapechanger.vehicles.remote.pilot import require_fit as require_policy
 
 _ROOM: Final = "room"
 
@@ -105,9 +107,6 @@ class Serve(Service):
         """Refuse a policy that does not fit the robot, before anything moves."""
         if self.policy is None:
             return
-        from shapechanger.demos.cloning.onnx_policy import OnnxClone
-        from shapechanger.vehicles.remote.pilot import require_fit
-
         files = [self.policy]
         if self.policy.is_dir():
             files = [self.policy / f"{name}{ENDING}" for name in policies_in(self.policy)]
@@ -127,7 +126,7 @@ class Serve(Service):
             policy = OnnxClone(file)
             body, hz = policy.body, policy.control_hz
             try:
-                require_fit(policy.card, plan.card, measures=False, body=body, control_hz=hz)
+                require_policy(policy.card, plan.card, measures=False, body=body, control_hz=hz)
             except (PolicyError, RobotRefused) as error:
                 raise PolicyError(f"{file} cannot drive {plan.card.robot}: {error}") from error
 
