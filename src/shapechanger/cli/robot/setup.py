@@ -318,13 +318,13 @@ class Install:
             raise RobotError(f"There is no {unit}: it is written without --dry-run.")
         unit, _ = write_unit(profile.name, path, self.credentials, user)
         text = unit.read_text(errors="replace")
+        lacks = ""
         if unit_word(str(path)) not in text:
-            raise RobotError(f"{unit} does not name {path}: remove it, and install again.")
-        if f"\nUser={user}\n" not in text:
-            raise RobotError(
-                f"{unit} does not run the robot as {user}, who installs it: remove it, and install "
-                "again."
-            )
+            lacks = f"name {path}"
+        elif f"\nUser={user}\n" not in text:
+            lacks = f"run the robot as {user}, who installs it"
+        if lacks:
+            raise RobotError(f"{unit} does not {lacks}: remove it, and install again.")
         return unit
 
 
