@@ -221,7 +221,7 @@ class Bench:
 # A supervisor gives up after five restarts within a minute, which would count as a kept promise.
 _MOST_RESTARTS: Final = 4
 # A busy machine can make a robot restart, or pause while a fault is made.
-_ATTEMPTS: Final = 5
+_ATTEMPTS: Final = 10
 # Retries of a trial in which the robot was not moving before the fault.
 _MORE_TRIES: Final = 2
 _COMMANDS: Final = 4
