@@ -13,7 +13,7 @@ from typing import Any, Final
 import msgspec
 from msgspec import inspect
 
-from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.chip import Keys
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
 from shapechanger.robot.profile.profile import QUANTITIES, RobotTable

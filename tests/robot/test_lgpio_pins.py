@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+_OURS = "shapechanger.robot.lgpio_pins"
+
 
 class _Lgpio(types.ModuleType):
     """Levels and PWM of a chip; a new duty waits for the end of the cycle, as in `lgPthTx.c`."""
@@ -76,8 +78,7 @@ class _Lgpio(types.ModuleType):
 def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
     """A Raspberry Pi 4 with the fake lgpio."""
     fake = _Lgpio()
-    ours = ("gpiozero.pins.lgpio", "shapechanger.robot.lgpio_pins")
-    for name in (*ours, "shapechanger.robot.lgpio_pins"):
+    for name in ("gpiozero.pins.lgpio", _OURS):
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "lgpio", fake)
     monkeypatch.setattr("gpiozero.pins.local.get_pi_revision", lambda: 0xC03115)
@@ -87,14 +88,12 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
         "gpiozero.pins.local.LocalPiFactory._reservations", collections.defaultdict(list)
     )
     yield fake
-    for name in (*ours, "shapechanger.robot.lgpio_pins"):
+    for name in ("gpiozero.pins.lgpio", _OURS):
         sys.modules.pop(name, None)
 
 
-def _factory(ours: bool) -> Any:
-    if ours:
-        return importlib.import_module("shapechanger.robot.lgpio_pins").LowAtOnceFactory()
-    return importlib.import_module("gpiozero.pins.lgpio").LGPIOFactory()
+def _factory() -> Any:
+    return importlib.import_module(_OURS).LowAtOnceFactory()
 
 
 def _motor(factory: Any) -> Any:
@@ -103,19 +102,17 @@ def _motor(factory: Any) -> Any:
     return Motor(22, 27, pin_factory=factory)
 
 
-@pytest.mark.parametrize(("ours", "level"), [(False, 1), (True, 0)])
-def test_zero_is_low_at_once(lgpio: _Lgpio, ours: bool, level: int) -> None:
-    """A duty of 0 is low at once; plain gpiozero leaves the pin high for up to 20 ms at 50 Hz."""
-    motor = _motor(_factory(ours))
+def test_zero_is_low_at_once(lgpio: _Lgpio) -> None:
+    """Plain gpiozero leaves the pin high for up to 20 ms at 50 Hz."""
+    motor = _motor(_factory())
     motor.forward(0.4)
     motor.stop()
-    assert lgpio.levels[22] == level
+    assert lgpio.levels[22] == 0
     motor.close()
 
 
 def test_both_inputs_are_never_high_when_reversing(lgpio: _Lgpio) -> None:
-    """The first input goes low before the second goes high, since their cycles are not in phase."""
-    motor = _motor(_factory(ours=True))
+    motor = _motor(_factory())
     motor.forward(0.4)
     motor.backward(0.4)
     assert (lgpio.levels[22], lgpio.levels[27]) == (0, 1)
@@ -124,7 +121,7 @@ def test_both_inputs_are_never_high_when_reversing(lgpio: _Lgpio) -> None:
 
 def test_closed_outputs_stay_low_outputs(lgpio: _Lgpio) -> None:
     """Closed pins remain outputs, since inputs would float without a pull-down."""
-    factory = _factory(ours=True)
+    factory = _factory()
     motor = _motor(factory)
     motor.forward(1.0)
     motor.close()
@@ -134,20 +131,11 @@ def test_closed_outputs_stay_low_outputs(lgpio: _Lgpio) -> None:
     assert lgpio.closed
 
 
-def test_plain_gpiozero_leaves_a_closed_pin_high(lgpio: _Lgpio) -> None:
-    """Documents why the custom factory exists."""
-    motor = _motor(_factory(ours=False))
-    motor.forward(1.0)
-    motor.close()
-    assert lgpio.outputs == set()
-    assert lgpio.levels[22] == 1
-
-
 def test_active_low_output_stays_high_when_opened_and_closed(lgpio: _Lgpio) -> None:
     """A low OE input of a PCA9685 would enable stale pulses."""
     from gpiozero import DigitalOutputDevice
 
-    factory = _factory(ours=True)
+    factory = _factory()
     device = DigitalOutputDevice(26, active_high=False, pin_factory=factory)
     assert lgpio.levels[26] == 1
     device.close()
@@ -155,21 +143,10 @@ def test_active_low_output_stays_high_when_opened_and_closed(lgpio: _Lgpio) -> N
     assert (26 in lgpio.outputs, lgpio.levels[26]) == (True, 1)
 
 
-def test_plain_gpiozero_sends_1400_us_for_1500_us(lgpio: _Lgpio) -> None:
-    """Documents why its Servo is not used: int(7.5) of 100 steps of 20 ms (gpiozero#1209)."""
-    from gpiozero import Servo
-
-    servo = Servo(17, initial_value=0, pin_factory=_factory(ours=False))
-    hz, duty = lgpio.pwm[17]
-    assert duty / 100 / hz * 1e6 == pytest.approx(1400)
-    servo.close()
-
-
 def test_closing_servo_pins_continues_after_a_failure(
     lgpio: _Lgpio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When one pin fails, the others go low and the chip is closed."""
-    pins = importlib.import_module("shapechanger.robot.lgpio_pins").LgpioServoPins()
+    pins = importlib.import_module(_OURS).LgpioServoPins()
     for pin in (17, 18, 19):
         pins.pulse(pin, 1500, 50)
     send = lgpio.tx_servo
@@ -187,7 +164,7 @@ def test_closing_servo_pins_continues_after_a_failure(
 
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
     """Closing sets the pin low, where lgpio keeps its present level."""
-    pins = importlib.import_module("shapechanger.robot.lgpio_pins").LgpioServoPins()
+    pins = importlib.import_module(_OURS).LgpioServoPins()
     pins.pulse(17, 1503, 50)
     assert lgpio.pulses[17] == 1503
     pins.close()

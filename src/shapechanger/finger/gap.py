@@ -153,7 +153,7 @@ _REAL_LIKE: Final = Gap(
     strength=(0.55, 0.65),
     least_tension=(1.0, 1.0),
     # Rotors at the tendon have 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
-    # (`shapechanger.robot.drivers.servos.family`) divided by the spool's radius.
+    # (`shapechanger/robot/drivers/servos/servos.toml`) divided by the spool's radius.
     motor_kg=(1.2, 1.6),
     tendon_damping=(3.0, 5.0),
     tendon_friction=(0.3, 0.8),

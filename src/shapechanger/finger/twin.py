@@ -15,7 +15,7 @@ from shapechanger.finger.model import FINGERTIP, build_finger
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.tensions import drive_of
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.servos.rig import Rig
+from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.twin.start import Place
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
@@ -97,7 +97,7 @@ class FingerWorld(World):
         return (self._arms @ self._data.qpos)[self._order].tolist()
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
-        """Move under these tensions; see `Load.pull`."""
+        """Move under these tensions; see `TendonWorld.pull`."""
         tensions = np.empty(len(TENDONS))
         tensions[self._order] = tensions_n
         self._data.qfrc_applied[:] = self._arms.T @ tensions

@@ -84,14 +84,6 @@ class I2cBus(Protocol):
         """Send one byte to a chip without registers."""
         ...
 
-    def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """Read one register."""
-        ...
-
-    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        """Write one register."""
-        ...
-
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         """Read consecutive registers."""
         ...

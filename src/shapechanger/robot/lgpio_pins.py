@@ -13,7 +13,7 @@ immediately.
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any, Final
 
 import lgpio
@@ -71,14 +71,12 @@ def _open_gpio_chip() -> int:
     pinctrl-bcm2711 or pinctrl-rp1.
     """
     for chip in range(_MOST_CHIPS):
-        try:
+        with suppress(lgpio.error):  # There are fewer, or it is another user's.
             handle = lgpio.gpiochip_open(chip)
-        except lgpio.error:
-            continue
-        _, _, _, label = lgpio.gpio_get_chip_info(handle)
-        if label.startswith("pinctrl-"):
-            return handle
-        lgpio.gpiochip_close(handle)
+            _, _, _, label = lgpio.gpio_get_chip_info(handle)
+            if label.startswith("pinctrl-"):
+                return handle
+            lgpio.gpiochip_close(handle)
     raise OSError(
         "no gpiochip of a Raspberry Pi's header can be opened; its user must be in the group gpio"
     )

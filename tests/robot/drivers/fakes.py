@@ -10,7 +10,7 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import OutputDriver, SensorDriver, open_output, open_sensor
+from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS, OutputDriver, SensorDriver
 from shapechanger.robot.drivers.servos.registers import ServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Clock
@@ -41,11 +41,9 @@ class Fault:
         self._left, self._takes_effect, self.happened = operation, takes_effect, False
 
     def disarm(self) -> None:
-        """Make no operation fail."""
         self._left = 0
 
     def during(self, operation: Callable[[], None]) -> None:
-        """Run an operation, unless it is the one that fails."""
         self._left -= 1
         fails = self._left == 0
         if not fails or self._takes_effect:
@@ -79,7 +77,6 @@ class ScriptedFactory(MockFactory):
         self.fault = Fault()
 
     def drive(self, pin: int, level: int, at_s: float) -> None:
-        """Change an input."""
         self.now_s = at_s
         (self.pin(pin).drive_high if level else self.pin(pin).drive_low)()
 
@@ -101,20 +98,11 @@ class FakeBus:
     def write_byte(self, i2c_addr: int, value: int) -> None:
         self.write_i2c_block_data(i2c_addr, value, [])
 
-    def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        return self._chip(i2c_addr).get(register, 0)
-
-    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        """Set one register."""
-        self.write_i2c_block_data(i2c_addr, register, [value])
-
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        """Read several registers."""
         chip = self._chip(i2c_addr)
         return [chip.get(register + i, 0) for i in range(length)]
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
-        """Set several registers."""
         chip = self._chip(i2c_addr)
         self.writes.append((i2c_addr, register, list(data)))
         for i, byte in enumerate(data):  # A transfer may fail in the middle.
@@ -132,7 +120,6 @@ class FakeServoPins:
         self._fault = fault
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses."""
         self._fault.during(functools.partial(self.widths_us.__setitem__, pin, width_us))
 
     def close(self) -> None:
@@ -154,11 +141,9 @@ class FakeHardware:
         self.pulses = FakeServoPins(self.fault)
 
     def pin_factory(self) -> Any:
-        """Return the scripted pins."""
         return self.factory
 
     def i2c(self, bus: int) -> FakeBus:
-        """Return the only bus."""
         return self.bus
 
     def servo_pins(self) -> FakeServoPins:
@@ -172,7 +157,7 @@ class FakeHardware:
         self.factory.close()
 
     def output(self, driver: str, **settings: Any) -> OutputDriver:
-        return open_output(OutputPlan("it", driver, settings=settings), self)
+        return OUTPUTS[driver].open(OutputPlan("it", driver, settings=settings), self)
 
     def sensor(self, driver: str, **settings: Any) -> SensorDriver:
-        return open_sensor(SensorPlan("it", driver, "", settings=settings), self)
+        return SENSORS[driver].open(SensorPlan("it", driver, "", settings=settings), self)

@@ -9,18 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.as5600 import JointEncoder
+from shapechanger.robot.drivers.as5600 import JointKeys
 from tests.robot.drivers.fakes import FakeBus, FakeHardware
 
 _MUX, _ENCODER = 0x70, 0x36
-_TWO = {
-    "bus": 1,
-    "mux": _MUX,
-    "joints": ["knee", "ankle"],
-    "channels": [2, 5],
-    "zeros": [100, 4000],
-    "directions": [1, -1],
-}
+_KNEE = {"channel": 2, "zero": 100}
+_TWO = {"rows": {"knee": _KNEE, "ankle": {"channel": 5, "zero": 4000, "direction": -1}}}
 
 
 def _registers(counts: int, status: int = 0x20) -> dict[int, int]:
@@ -48,8 +42,8 @@ def test_each_joint_is_read_on_its_channel() -> None:
 @given(zero=st.integers(0, 4095), turned=st.integers(-2047, 2047), back=st.booleans())
 def test_angles_are_within_half_a_turn_of_the_zero(zero: int, turned: int, back: bool) -> None:
     direction = -1 if back else 1
-    encoder = JointEncoder("knee", 0, zero, direction)
-    angle = encoder.angle((zero + direction * turned) % 4096)
+    keys = JointKeys(channel=0, zero=zero, direction=direction)
+    angle = keys.angle((zero + direction * turned) % 4096)
     assert angle == pytest.approx(turned * math.pi / 2048)
 
 

@@ -10,38 +10,23 @@ from typing import Any
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers import pulse
 from shapechanger.robot.drivers.chip import OUTPUTS, OutputDriver
 from shapechanger.robot.drivers.pulse import SysfsPwm
 from tests.robot.drivers.fakes import FakeHardware
 
-_DUTY = {"pwm_hz": 50, "start": 0.0, "full": 1.0}
-_SERVO = {"left_us": 1000, "centre_us": 1500, "right_us": 2000, "travel_deg_per_s": float("inf")}
-_ESC = {
-    "backward_us": 1000,
-    "neutral_us": 1500,
-    "forward_us": 2000,
-    "arm_s": 0.0,
-    "reverse": "direct",
-    "brake_ms": 0,
-}
 _OVER = {
-    "pca9685": {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1},
-    "pca9685 with OE": {
-        "over": "pca9685",
-        "bus": 1,
-        "address": 0x40,
-        "channel": 2,
-        "output_enable": 26,
-    },
+    "pca9685": {"over": "pca9685", "channel": 2},
+    "pca9685 with OE": {"over": "pca9685", "channel": 2, "output_enable": 26},
     "lgpio": {"over": "lgpio", "pin": 12},
     "sysfs": {"over": "sysfs", "chip": 0, "channel": 1},
 }
 _OUTPUTS: dict[str, tuple[str, dict[str, Any]]] = {
-    "hbridge": ("hbridge", _DUTY | {"forward": 22, "backward": 27, "enable": -1}),
-    "hbridge with enable": ("hbridge", _DUTY | {"forward": 22, "backward": 27, "enable": 24}),
-    "phase_enable": ("phase_enable", _DUTY | {"phase": 5, "enable": 6}),
-    **{f"servo over {over}": ("servo", _SERVO | {"hz": 50} | at) for over, at in _OVER.items()},
-    **{f"esc over {over}": ("esc", _ESC | {"hz": 50} | at) for over, at in _OVER.items()},
+    "hbridge": ("hbridge", {"forward": 22, "backward": 27}),
+    "hbridge with enable": ("hbridge", {"forward": 22, "backward": 27, "enable": 24}),
+    "phase_enable": ("phase_enable", {"phase": 5, "enable": 6}),
+    **{f"servo over {over}": ("servo", {"hz": 50} | at) for over, at in _OVER.items()},
+    **{f"esc over {over}": ("esc", {"hz": 50, "arm_s": 0.0} | at) for over, at in _OVER.items()},
 }
 _MOST_OPERATIONS = 100
 
@@ -56,16 +41,13 @@ class _Bench:
         self._folder.mkdir(parents=True, exist_ok=True)
         fault = self.hardware.fault
 
-        class Pwm(SysfsPwm):
-            """Kernel PWM with the same fault injection."""
+        write = SysfsPwm._write
 
-            def __init__(self, chip: int, channel: int, hz: int) -> None:
-                super().__init__(chip, channel, hz, tmp_path)
+        def faulty_write(pwm: SysfsPwm, file: str, number: int) -> None:
+            fault.during(lambda: write(pwm, file, number))
 
-            def _write(self, file: str, number: int) -> None:
-                fault.during(lambda: super(Pwm, self)._write(file, number))
-
-        monkeypatch.setattr("shapechanger.robot.drivers.pulse.SysfsPwm", Pwm)
+        monkeypatch.setattr(pulse, "_ROOT", tmp_path)
+        monkeypatch.setattr(SysfsPwm, "_write", faulty_write)
 
     def open(self) -> OutputDriver:
         return self.hardware.output(self.driver, **self.settings)

@@ -8,14 +8,13 @@ from shapechanger.contract.duty import Duty
 from shapechanger.errors import RobotError
 from tests.robot.drivers.fakes import FakeHardware
 
-_HBRIDGE = {"forward": 22, "backward": 27, "enable": -1, "pwm_hz": 50, "start": 0.0, "full": 1.0}
-_PHASE = {"phase": 5, "enable": 6, "pwm_hz": 500, "start": 0.0, "full": 1.0}
+_HBRIDGE = {"forward": 22, "backward": 27}
+_PHASE = {"phase": 5, "enable": 6}
 _values = st.floats(-1.0, 1.0)
 
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
 def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
-    """The value read back from a duty is the value written, within one step of lgpio."""
     duty = Duty(start, full)
     assert duty.size_at(duty.of(value)) == pytest.approx(abs(value), abs=0.011 / (full - start))
 
@@ -27,14 +26,12 @@ def test_duty_survives_the_truncation_of_lgpio(steps: int) -> None:
 
 
 def test_smallest_value_starts_the_motor() -> None:
-    """Any nonzero value maps to at least the start duty."""
     assert Duty(start=0.25).of(1e-6) == 0.25
     assert Duty(start=0.25).of(0.0) == 0.0
 
 
 @given(values=st.lists(_values, min_size=1, max_size=8))
 def test_never_both_directions(values: list[float]) -> None:
-    """The two inputs of an H-bridge are never high together."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     for value in values:
@@ -45,22 +42,14 @@ def test_never_both_directions(values: list[float]) -> None:
         assert min(levels.values()) == 0.0
 
 
-def test_pwm_has_the_frequency_of_the_profile() -> None:
-    """The profile sets the PWM frequency, where gpiozero defaults to 100 Hz."""
+def test_the_sign_selects_the_pin() -> None:
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
+    for value, states in ((0.4, [0.4, 0.0]), (-0.6, [0.0, 0.6])):
+        assert motor.write(value, 0) == pytest.approx(value)
+        assert [hardware.factory.pin(pin).state for pin in (22, 27)] == states
     assert [hardware.factory.pin(pin).frequency for pin in (22, 27)] == [50, 50]
     motor.close()
-
-
-def test_forward_drives_the_forward_pin() -> None:
-    """Positive values drive the forward pin, negative ones the backward pin."""
-    hardware = FakeHardware()
-    motor = hardware.output("hbridge", **_HBRIDGE)
-    assert motor.write(0.4, 0) == pytest.approx(0.4)
-    assert [hardware.factory.pin(pin).state for pin in (22, 27)] == [0.4, 0.0]
-    assert motor.write(-0.6, 0) == pytest.approx(-0.6)
-    assert [hardware.factory.pin(pin).state for pin in (22, 27)] == [0.0, 0.6]
 
 
 def test_enable_is_on_only_while_the_motor_is_held() -> None:
@@ -76,10 +65,11 @@ def test_enable_is_on_only_while_the_motor_is_held() -> None:
 
 
 @pytest.mark.parametrize(("driver", "settings"), [("hbridge", _HBRIDGE), ("phase_enable", _PHASE)])
-def test_close_leaves_everything_low(driver: str, settings: dict[str, float]) -> None:
+@pytest.mark.parametrize("value", [1.0, -1.0])
+def test_close_leaves_everything_low(driver: str, settings: dict[str, float], value: float) -> None:
     hardware = FakeHardware()
     motor = hardware.output(driver, **settings)
-    motor.write(1.0, 0)
+    motor.write(value, 0)
     motor.close()
     motor.close()
     assert set(dict(hardware.factory.log).values()) == {0.0}
@@ -97,18 +87,7 @@ def test_one_input_goes_low_also_when_the_other_one_fails(value: float, broken: 
     assert [hardware.factory.pin(pin).state for pin in (22, 27)] == [0.0, 0.0]
 
 
-def test_backward_leaves_both_inputs_low_when_it_is_closed() -> None:
-    """`close` also sets the direction input low."""
-    hardware = FakeHardware()
-    motor = hardware.output("phase_enable", **_PHASE)
-    motor.write(-1.0, 0)
-    hardware.factory.log.clear()
-    motor.close()
-    assert ("GPIO5", 0.0) in hardware.factory.log
-
-
 def test_a_pin_in_use_is_refused() -> None:
-    """Two motors on one pin raise an error that names the pin."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     with pytest.raises(RobotError, match="GPIO22"):

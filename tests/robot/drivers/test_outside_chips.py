@@ -65,7 +65,6 @@ def test_the_guide_lists_chips_of_another_package() -> None:
 
 @pytest.mark.usefixtures("_outside")
 def test_chips_of_another_package_are_driven_on_the_twin() -> None:
-    """The state has the light of the sensor, and the pin the value of the actuator."""
     profile = _read(_LINES)
     world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)
     robot = InProcessRobot(profile, world, pictures=False)

@@ -9,27 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers import pca9685
-from shapechanger.robot.drivers.pca9685 import prescale_for
-from shapechanger.robot.drivers.pulse import PulseRange, SysfsPwm
+from shapechanger.robot.drivers import pca9685, pulse
+from shapechanger.robot.drivers.pulse import PulseRange
 from tests.robot.drivers.fakes import MS, FakeHardware
 
 _AT = {"over": "lgpio", "pin": 12, "hz": 50}
-_SERVO = {
-    "left_us": 1000,
-    "centre_us": 1500,
-    "right_us": 2000,
-    "travel_deg_per_s": float("inf"),
-}
-_ESC = {
-    "backward_us": 1000,
-    "neutral_us": 1500,
-    "forward_us": 2000,
-    "arm_s": 2.5,
-    "reverse": "direct",
-    "brake_ms": 200,
-}
-_ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "hz": 50, "output_enable": -1}
+_ON_CHIP = {"over": "pca9685", "hz": 50}
 
 
 def _asleep() -> dict[int, int]:
@@ -45,7 +30,6 @@ def _width_us(hardware: FakeHardware, channel: int) -> float:
 
 @given(value=st.floats(-1.0, 1.0), ends=st.tuples(st.floats(500, 1400), st.floats(1600, 2500)))
 def test_width_and_value_are_inverse(value: float, ends: tuple[float, float]) -> None:
-    """Width and value convert back and forth, also for a reversed servo."""
     for low, high in (ends, ends[::-1]):
         pulses = PulseRange(low, 1500.0, high)
         assert pulses.value(pulses.width_us(value)) == pytest.approx(value, abs=1e-9)
@@ -59,7 +43,7 @@ def test_middle_outside_of_the_ends_is_refused() -> None:
 def test_servo_gets_no_pulse_before_the_first_write() -> None:
     """A pulse on opening would make the servo jump."""
     hardware = FakeHardware()
-    servo = hardware.output("servo", **_SERVO | _AT)
+    servo = hardware.output("servo", **_AT)
     assert hardware.pulses.widths_us == {}
     assert servo.write(-0.5, 0) == -0.5
     assert hardware.pulses.widths_us == {12: 1250}
@@ -70,7 +54,7 @@ def test_servo_gets_no_pulse_before_the_first_write() -> None:
 
 def test_servo_is_limited_in_speed() -> None:
     """At 180 degrees of travel, 90 degrees a second are a value of 1 a second."""
-    servo = FakeHardware().output("servo", **_SERVO | _AT | {"travel_deg_per_s": 90.0})
+    servo = FakeHardware().output("servo", **_AT | {"travel_deg_per_s": 90.0})
     assert servo.write(0.0, 0) == 0.0
     assert servo.write(1.0, 100 * MS) == pytest.approx(0.1)
     assert servo.write(-1.0, 300 * MS) == pytest.approx(-0.1)
@@ -79,7 +63,7 @@ def test_servo_is_limited_in_speed() -> None:
 def test_controller_gets_neutral_until_it_is_armed() -> None:
     """Neutral is sent for `arm_s`, also after a release."""
     hardware = FakeHardware()
-    esc = hardware.output("esc", **_ESC | _AT)
+    esc = hardware.output("esc", **_AT)
     assert hardware.pulses.widths_us == {12: 1500}
     assert esc.write(1.0, 5_000 * MS) == 0.0
     assert esc.write(1.0, 7_499 * MS) == 0.0
@@ -94,20 +78,16 @@ def test_controller_gets_neutral_until_it_is_armed() -> None:
 
 def _armed(reverse: str) -> tuple[Any, FakeHardware]:
     hardware = FakeHardware()
-    esc = hardware.output("esc", **_ESC | _AT | {"reverse": reverse, "arm_s": 0.0})
-    return esc, hardware
+    return hardware.output("esc", **_AT | {"reverse": reverse, "arm_s": 0.0}), hardware
 
 
-def test_controller_without_reverse_stays_at_neutral() -> None:
-    """A negative value sends neutral and returns 0."""
-    esc, hardware = _armed("none")
-    assert esc.write(-1.0, 0) == 0.0
-    assert hardware.pulses.widths_us == {12: 1500}
-
-
-def test_controller_reverses_at_once() -> None:
-    """With reverse = "direct", a negative value acts at once."""
-    assert _armed("direct")[0].write(-1.0, 0) == -1.0
+@pytest.mark.parametrize(("reverse", "value", "us"), [("none", 0.0, 1500), ("direct", -1.0, 1000)])
+def test_controller_without_a_brake_reverses_at_once_or_not(
+    reverse: str, value: float, us: int
+) -> None:
+    esc, hardware = _armed(reverse)
+    assert esc.write(-1.0, 0) == value
+    assert hardware.pulses.widths_us == {12: us}
 
 
 def test_controller_brakes_before_it_reverses() -> None:
@@ -125,15 +105,10 @@ def test_controller_brakes_before_it_reverses() -> None:
     assert esc.write(0.5, 1050 * MS) == 0.5  # Forward acts at once.
 
 
-def test_prescaler_of_50_hz() -> None:
-    """The data sheet's formula; its own example is 200 Hz, 30."""
-    assert (prescale_for(50), prescale_for(200)) == (121, 30)
-
-
 def test_chip_is_set_up_asleep_and_woken() -> None:
     """The prescaler is set while asleep, and stale channels are off before waking."""
     hardware = FakeHardware({0x40: _asleep()})
-    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    hardware.output("servo", **_ON_CHIP, channel=3)
     assert [(register, data) for _, register, data in hardware.bus.writes] == [
         (0xFD, [0x10]),
         (0x00, [0x30]),
@@ -154,21 +129,21 @@ def test_a_simulated_chip_wakes_up_without_a_pause(
     hardware = FakeHardware({0x40: _asleep()})
     if simulated:
         monkeypatch.setattr(hardware, "clock", SimpleNamespace(is_real=False))
-    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    hardware.output("servo", **_ON_CHIP, channel=3)
     assert slept == ([] if simulated else [500e-6])
 
 
 def test_a_running_chip_is_not_put_to_sleep() -> None:
     """A chip that is already configured keeps pulsing its other channels."""
     hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121}})
-    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    hardware.output("servo", **_ON_CHIP, channel=3)
     assert [register for _, register, _ in hardware.bus.writes] == [0x01, 0x00, 0x06 + 12]
 
 
 def test_pulse_is_in_whole_steps() -> None:
     """Pulses are multiples of 4.88 us, and `write` returns the value in effect."""
     hardware = FakeHardware({0x40: _asleep()})
-    servo = hardware.output("servo", **_SERVO | _ON_CHIP, channel=15)
+    servo = hardware.output("servo", **_ON_CHIP, channel=15)
     assert servo.write(0.0, 0) == pytest.approx((307 * 4.88 - 1500) / 500)
     assert hardware.bus.writes[-1] == (0x40, 0x06 + 60, [0, 0, 307 & 0xFF, 307 >> 8])
     before = len(hardware.bus.writes)
@@ -181,24 +156,24 @@ def test_pulse_is_in_whole_steps() -> None:
 def test_channels_share_their_chip() -> None:
     """Channels share one chip, which is closed with its last channel and can be reopened."""
     hardware = FakeHardware({0x40: _asleep()})
-    servos = [hardware.output("servo", **_SERVO | _ON_CHIP, channel=c) for c in range(12)]
+    servos = [hardware.output("servo", **_ON_CHIP, channel=c) for c in range(12)]
     assert sum(register == 0xFE for _, register, _ in hardware.bus.writes) == 1
     with pytest.raises(RobotError, match=r"Channel 3 .* used twice"):
-        hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+        hardware.output("servo", **_ON_CHIP, channel=3)
     with pytest.raises(RobotError, match="one frequency"):
-        hardware.output("servo", **_SERVO | _ON_CHIP | {"hz": 60}, channel=13)
+        hardware.output("servo", **_ON_CHIP | {"hz": 60}, channel=13)
     for servo in servos:
         servo.close()
         servo.close()
     assert hardware.bus.closed == 1
-    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3).close()
+    hardware.output("servo", **_ON_CHIP, channel=3).close()
     assert hardware.bus.closed == 2
 
 
 def test_output_enable_is_low_only_while_something_is_sent() -> None:
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
-    one, two = (hardware.output("servo", **_SERVO | on_chip, channel=c) for c in (0, 1))
+    one, two = (hardware.output("servo", **on_chip, channel=c) for c in (0, 1))
     enable = hardware.factory.pin(26)
     assert enable.state == 1.0
     one.write(0.0, 0)
@@ -210,9 +185,8 @@ def test_output_enable_is_low_only_while_something_is_sent() -> None:
 
 
 def test_outputs_are_off_when_the_bus_fails() -> None:
-    """When the chip does not answer, output enable goes high to stop its last pulses."""
     hardware = FakeHardware({0x40: _asleep()})
-    servo = hardware.output("servo", **_SERVO | _ON_CHIP | {"output_enable": 26}, channel=0)
+    servo = hardware.output("servo", **_ON_CHIP | {"output_enable": 26}, channel=0)
     servo.write(1.0, 0)
     chip = hardware.bus.chips.pop(0x40)
     with pytest.raises(RobotError, match="does not answer"):
@@ -224,11 +198,10 @@ def test_outputs_are_off_when_the_bus_fails() -> None:
 
 
 def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
-    """After a failed write, writing another channel must not enable the outputs."""
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
-    esc = hardware.output("esc", **_ESC | on_chip | {"arm_s": 0.0}, channel=0)
-    servo = hardware.output("servo", **_SERVO | on_chip, channel=1)
+    esc = hardware.output("esc", **on_chip | {"arm_s": 0.0}, channel=0)
+    servo = hardware.output("servo", **on_chip, channel=1)
     esc.write(0.0, 0)
     hardware.fault.arm(4, takes_effect=True)
     with pytest.raises(RobotError, match="timed out"):
@@ -244,25 +217,20 @@ def test_outputs_of_a_dead_process_do_not_come_back() -> None:
     """Opening a channel clears stale pulses on all others."""
     stale = {0x06 + 4 + 2: 410 & 0xFF, 0x06 + 4 + 3: 410 >> 8}  # Channel 1: 2000 us.
     hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121} | stale})
-    hardware.output("esc", **_ESC | _ON_CHIP | {"output_enable": 26}, channel=0)
+    hardware.output("esc", **_ON_CHIP | {"output_enable": 26}, channel=0)
     assert hardware.factory.pin(26).state == 0.0
     assert (0x40, 0xFD, [0x10]) in hardware.bus.writes
 
 
 def test_a_chip_that_lost_power_is_configured_again() -> None:
-    """After the error, the next writes restore mode, prescaler and pulses."""
+    """It is noticed within 100 writes; then writes restore mode, prescaler and pulses."""
     hardware = FakeHardware({0x40: _asleep()})
-    esc, servo = (
-        hardware.output("servo", **_SERVO | _ON_CHIP, channel=channel) for channel in (0, 1)
-    )
+    esc, servo = (hardware.output("servo", **_ON_CHIP, channel=channel) for channel in (0, 1))
     esc.write(0.0, 0)
     servo.write(0.5, 0)
     hardware.bus.chips[0x40] = _asleep()
-    for i in range(100):
-        try:
-            esc.write(0.0, i)
-        except RobotError:
-            break
+    with pytest.raises(RobotError, match="lost power"):
+        list(map(esc.write, [0.0] * 100, range(100)))
     esc.write(0.0, 100)
     servo.write(0.5, 100)
     chip = hardware.bus.chips[0x40]
@@ -274,40 +242,31 @@ def test_a_chip_that_lost_power_is_configured_again() -> None:
 def test_a_missing_chip_is_named() -> None:
     """The error gives address and bus, as for i2cdetect."""
     with pytest.raises(RobotError, match="PCA9685 at 0x40 on I2C bus 1 does not answer"):
-        FakeHardware().output("servo", **_SERVO | _ON_CHIP, channel=3)
+        FakeHardware().output("servo", **_ON_CHIP, channel=3)
 
 
-def test_a_chip_that_lost_power_is_reported() -> None:
-    """A chip that has gone to sleep raises an error within 100 writes."""
-    hardware = FakeHardware({0x40: _asleep()})
-    servo = hardware.output("servo", **_SERVO | _ON_CHIP, channel=0)
-    servo.write(0.0, 0)
-    hardware.bus.chips[0x40] = _asleep()
-
-    def write_for_a_second() -> None:
-        for _ in range(100):
-            servo.write(0.0, 0)
-
-    with pytest.raises(RobotError, match="lost power"):
-        write_for_a_second()
+_KERNEL = {"over": "sysfs", "channel": 1, "hz": 50}
 
 
-def test_kernel_pwm_is_written_in_nanoseconds(tmp_path: Path) -> None:
+def test_kernel_pwm_is_written_in_nanoseconds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Period and duty cycle are written to files in nanoseconds."""
+    monkeypatch.setattr(pulse, "_ROOT", tmp_path)
     folder = tmp_path / "pwmchip0" / "pwm1"
     folder.mkdir(parents=True)
-    pwm = SysfsPwm(0, 1, 50, tmp_path)
-    assert pwm.write_us(1500.4) == 1500.0
+    servo = FakeHardware().output("servo", **_KERNEL)
+    assert servo.write(0.0008, 0) == 0.0
 
     def files() -> dict[str, int]:
         return {file.name: int(file.read_text()) for file in folder.iterdir()}
 
     assert files() == {"period": 20_000_000, "duty_cycle": 1_500_000, "enable": 1}
-    pwm.close()
+    servo.close()
     assert files() == {"period": 20_000_000, "duty_cycle": 0, "enable": 0}
 
 
-def test_a_missing_kernel_pwm_is_named(tmp_path: Path) -> None:
+def test_a_missing_kernel_pwm_is_named() -> None:
     """Without the overlay in config.txt, opening raises an error."""
-    with pytest.raises(RobotError, match="pwmchip0 does not answer"):
-        SysfsPwm(0, 0, 50, tmp_path)
+    with pytest.raises(RobotError, match="pwmchip77 does not answer"):
+        FakeHardware().output("servo", **_KERNEL, chip=77)

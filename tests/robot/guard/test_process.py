@@ -4,8 +4,10 @@ import itertools
 import logging
 import os
 import socket
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from gpiozero import OutputDevice
@@ -339,11 +341,19 @@ class _Sensor:
         self.reading = {}
 
 
+def _open_by(
+    monkeypatch: pytest.MonkeyPatch, opens: Callable[[SensorPlan, object], _Sensor]
+) -> None:
+    """Open every sensor with a function."""
+    chips = defaultdict[str, SimpleNamespace](lambda: SimpleNamespace(open=opens))
+    monkeypatch.setattr(sensors, "SENSORS", chips)
+
+
 def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sensor = _Sensor()
-    monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: sensor)
+    _open_by(monkeypatch, lambda plan, hardware: sensor)
     bench = make(_plan(sensors=(SensorPlan("bumper", "switch", "bump"),)))
     _drives(bench)
     readings: list[dict[str, float] | Exception] = [
@@ -390,7 +400,7 @@ class _SlowSensor(_Sensor):
 def _with(
     make: _Make, monkeypatch: pytest.MonkeyPatch, drivers: dict[str, _Sensor], measures: str
 ) -> _Bench:
-    monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: drivers[plan.name])
+    _open_by(monkeypatch, lambda plan, hardware: drivers[plan.name])
     return make(_plan(sensors=tuple(SensorPlan(name, "any", measures) for name in drivers)))
 
 
@@ -442,7 +452,7 @@ def test_all_distance_sensors_must_report(make: _Make, monkeypatch: pytest.Monke
     left, right = _Sensor(), _Sensor()
     left.reading, right.reading = {"distance": 2.0}, {}
     eyes = {"left": left, "right": right}
-    monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: eyes[plan.name])
+    _open_by(monkeypatch, lambda plan, hardware: eyes[plan.name])
     plans = tuple(SensorPlan(name, "hcsr04", "distance") for name in eyes)
     bench = make(_plan(sensors=plans, limits=LimitPlan(stop_distance_m=0.5)))
     _drives(bench)
@@ -477,7 +487,7 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
             raise RobotError("No answer.")
         return opened[0]
 
-    monkeypatch.setattr(sensors, "open_sensor", open_sensor)
+    _open_by(monkeypatch, open_sensor)
     plans = (SensorPlan("good", "switch", "bump"), SensorPlan("bad", "switch", "bump"))
     daemon, guards_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with daemon, guards_end:

@@ -19,7 +19,7 @@ _SERVO = OutputPlan(
     "steer",
     "servo",
     mix={"steering": 1.0},
-    settings={"left_us": 1100, "centre_us": 1500, "right_us": 1900},
+    settings={"over": "lgpio", "left_us": 1100, "centre_us": 1500, "right_us": 1900},
 )
 _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full": 1.0})
 
@@ -27,7 +27,7 @@ _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full":
 @pytest.mark.parametrize(("left_us", "right_us"), [(1100, 1900), (1900, 1100)])
 def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
     """Works for reversed servos too."""
-    narrow = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
+    narrow = {"over": "lgpio", "left_us": left_us, "right_us": right_us}
     servo = OutputPlan("steer", "servo", settings=narrow)
     wide = replace(servo, settings=narrow | widest_pulses(servo))
     low_us, high_us = (wide.settings[key] for key in ("left_us", "right_us"))

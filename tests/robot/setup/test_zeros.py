@@ -37,7 +37,10 @@ def _board(tremble: float = 0.0, servo_zero: int = 0) -> LocalBoard:
     def changed(one: Any, **settings: object) -> Any:
         return replace(one, settings={**one.settings, **settings})
 
-    sensors = [changed(s, zeros=_ZEROS) if s.driver == "as5600" else s for s in _RIG.sensors]
+    *others, joints = _RIG.sensors
+    rows = joints.settings["rows"].items()
+    zeroed = {n: {**row, "zero": zero} for (n, row), zero in zip(rows, _ZEROS, strict=True)}
+    sensors = [*others, changed(joints, rows=zeroed)]
     outputs = [changed(output, zero=servo_zero) for output in _RIG.outputs]
     plan = replace(_RIG.guard_plan(), sensors=tuple(sensors), outputs=tuple(outputs))
     return LocalBoard(TwinWiring(plan), _Straight(tremble))
@@ -67,7 +70,7 @@ def test_zeros_are_measured_with_taut_tendons() -> None:
     # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
     assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
     assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
-    assert not any(servo.has_torque for servo in board.pins.require_rig().bus.servos.values())
+    assert not any(servo.has_torque for servo in board.pins.require_rig().servos.values())
 
 
 def test_a_loose_tendon_is_an_error() -> None:
@@ -76,6 +79,6 @@ def test_a_loose_tendon_is_an_error() -> None:
     board.pins.require_rig().break_servo("EIP", "snapped")
     with pytest.raises(RobotError, match="EIP"):
         find_zeros(_RIG, board.hardware, lambda: board.pass_ns(10_000_000))
-    assert not any(servo.has_torque for servo in board.pins.require_rig().bus.servos.values())
+    assert not any(servo.has_torque for servo in board.pins.require_rig().servos.values())
     with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
         find_zeros(_CAR, board.hardware, lambda: None)

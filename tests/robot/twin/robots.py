@@ -28,7 +28,7 @@ def hbridge(
 def servo(
     name: str, part: str, mix: dict[str, float], **over: bool | int | float | str
 ) -> OutputPlan:
-    settings = {"hz": 50, "left_us": 1000.0, "centre_us": 1500.0, "right_us": 2000.0}
+    settings = {"hz": 50, "left_us": 1000, "centre_us": 1500, "right_us": 2000}
     more = {"travel_deg_per_s": math.inf}
     return OutputPlan(name, "servo", part, mix, 0.0, {**settings, **more, **over})
 
@@ -37,7 +37,7 @@ def esc(
     name: str, part: str, mix: dict[str, float], **over: bool | int | float | str
 ) -> OutputPlan:
     """A speed controller from 1000 to 2000 us."""
-    settings = {"hz": 50, "backward_us": 1000.0, "neutral_us": 1500.0, "forward_us": 2000.0}
+    settings = {"hz": 50, "backward_us": 1000, "neutral_us": 1500, "forward_us": 2000}
     more = {"arm_s": 0.5, "reverse": "double", "brake_ms": 100}
     return OutputPlan(name, "esc", part, mix, 0.0, {**settings, **more, **over})
 

@@ -11,7 +11,7 @@ from gpiozero import DigitalOutputDevice
 
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import open_output
+from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.pca9685 import SimulatedPca9685
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.twin.hardware import connect
@@ -35,8 +35,8 @@ from gpiozero import DigitalOutputDevice
 hardware = connect(sys.argv[1])
 enable = DigitalOutputDevice(24, initial_value=False, pin_factory=hardware.pin_factory())
 bus = hardware.i2c(1)
-bus.write_byte_data(0x40, 0xFE, 121)
-bus.write_byte_data(0x40, 0x00, 0x21)
+bus.write_i2c_block_data(0x40, 0xFE, [121])
+bus.write_i2c_block_data(0x40, 0x00, [0x21])
 bus.write_i2c_block_data(0x40, 0x06 + 4 * 3, [0, 0, 307 & 0xFF, 307 >> 8])
 print("pulses", flush=True)
 sys.stdin.read()
@@ -105,7 +105,7 @@ def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written() ->
     plan = replace(_SERVO_CAR, outputs=(drive_plan, *_SERVO_CAR.outputs))
     wiring = TwinWiring(plan)
     board = LocalBoard(wiring, DrivingWorld((), (8, 6), seed=0))
-    drive, steer = (open_output(output, board.hardware) for output in plan.outputs)
+    drive, steer = (OUTPUTS[output.driver].open(output, board.hardware) for output in plan.outputs)
     steer.write(0.2, 0)
     board.pins.dead_chips.add((1, 0x40))
     with pytest.raises(RobotError, match="no chip answers"):
@@ -138,8 +138,8 @@ def test_pulses_continue_after_the_process_dies(tmp_path: Path) -> None:
         enable.on()
         assert wiring.read(operator.levels(), 0)["steer"].value is None
         with pytest.raises(OSError, match="Remote I/O"):
-            hardware.i2c(1).read_byte_data(0x41, 0)
+            hardware.i2c(1).read_i2c_block_data(0x41, 0, 1)
         operator.break_chip(1, 0x40)
         with pytest.raises(OSError, match="Remote I/O"):
-            hardware.i2c(1).write_byte_data(0x40, 0, 0)
+            hardware.i2c(1).write_i2c_block_data(0x40, 0, [0])
         hardware.close()

@@ -15,7 +15,7 @@ from shapechanger.finger.anatomy import JOINT_REST, JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
-from shapechanger.robot.drivers.servos.rig import Rig
+from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
 from tests.robot.twin.in_process import InProcessRobot
@@ -62,7 +62,7 @@ def bench() -> Iterator[_Bench]:
 def test_commands_map_to_tensions(bench: _Bench) -> None:
     """Command 0 is the pretension and 1 the largest tension, to one count of current."""
     bench.drive(_REST, 5)
-    pulls = [servo.pulls_a * _N_PER_A for servo in bench.rig.bus.servos.values()]
+    pulls = [servo.pulls_a * _N_PER_A for servo in bench.rig.servos.values()]
     assert pulls == pytest.approx([1.0] * 7, abs=0.02)
     bench.drive((1.0, *_REST[1:]), 15)
     assert bench.rig.servo("FDP").pulls_a * _N_PER_A == pytest.approx(15.0, abs=0.02)
@@ -101,7 +101,7 @@ def test_a_snapped_tendon_releases_all_tendons(bench: _Bench) -> None:
         assert steps < 40
     assert re.search("FDS .*lost its tendon", bench.seen.stop_reason), bench.seen.stop_reason
     bench.drive(_FLEX, 16)
-    others = [s for s in bench.rig.bus.servos.values() if s is not bench.rig.servo("FDS")]
+    others = [s for s in bench.rig.servos.values() if s is not bench.rig.servo("FDS")]
     goal = max(abs(servo.pulls_a) for servo in others) * _N_PER_A
     assert goal < 1.05
     bench.drive(_FLEX, 20)
@@ -122,7 +122,7 @@ def test_a_missing_magnet_releases_all_tendons(bench: _Bench) -> None:
     assert "The encoder of PIP_flexion, on channel 2, detects no magnet." in bench.seen.stop_reason
     assert not bench.seen.armed
     bench.drive(_FLEX, 36)
-    assert [servo.pulls_a for servo in bench.rig.bus.servos.values()] == [0.0] * 7
+    assert [servo.pulls_a for servo in bench.rig.servos.values()] == [0.0] * 7
     magnet.set_magnet("")
     bench.drive(_FLEX, 5)
     assert "no magnet" in bench.seen.stop_reason
@@ -165,7 +165,7 @@ def test_a_rig_that_controls_lengths_flexes_and_releases(tmp_path: Path) -> None
             seen, _ = robot.step((0.7, 0.7, 0.01, 0.01, 0.01, 0.01, 0.01))
         assert seen.state[names.index("FDP/length")] == pytest.approx(-0.0174, abs=2e-3)
         assert seen.state[names.index("PIP_flexion/angle")] > 0.3
-        assert all(servo.register(11) == 5 for servo in rig.bus.servos.values())
+        assert all(servo.register(11) == 5 for servo in rig.servos.values())
         for _ in range(60):
             robot.step(_REST)
         # The friction of the gears, 0.5 N, adds to the pretension of 1 N.

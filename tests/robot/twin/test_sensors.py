@@ -13,7 +13,7 @@ from gpiozero import Motor
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
+from shapechanger.robot.drivers.chip import SENSORS, SensorDriver
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
@@ -34,7 +34,7 @@ class _Rig:
         self.world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)
         self.board = LocalBoard(TwinWiring(plan), self.world)
         self.motor = Motor(22, 27, pin_factory=self.board.hardware.pin_factory())
-        self.sensor: SensorDriver = open_sensor(sensor, self.board.hardware)
+        self.sensor: SensorDriver = SENSORS[sensor.driver].open(sensor, self.board.hardware)
         functions = operator_functions(self.board.pins)
         self.operator: Any = SimpleNamespace(**{one.__name__: one for one in functions})
         self.seen: dict[str, float] = {}

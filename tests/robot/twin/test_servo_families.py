@@ -18,7 +18,7 @@ from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
-from shapechanger.robot.drivers.servos.rig import Rig
+from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.channel import GuardState, Order, decode_state, encode
 from shapechanger.robot.guard.outputs import Switches, make_safe
@@ -63,7 +63,7 @@ class _Bench:
         return self.seen.state[self.names.index(f"{name}/length")]
 
     def pulls(self) -> list[float]:
-        return [servo.pulls_a for servo in self.rig.bus.servos.values()]
+        return [servo.pulls_a for servo in self.rig.servos.values()]
 
     def advance_without_guard(self, ms: int) -> None:
         now_ns = self.robot.now_ns
@@ -87,7 +87,7 @@ def bench(family: str) -> Iterator[_Bench]:
 def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
     """An armed rig enables no torque without a command."""
     assert bench.seen.armed
-    assert not any(servo.has_torque for servo in bench.rig.bus.servos.values())
+    assert not any(servo.has_torque for servo in bench.rig.servos.values())
 
 
 def test_commands_move_the_finger(bench: _Bench) -> None:
@@ -119,7 +119,7 @@ def test_an_emergency_stop_ends_without_torque(bench: _Bench) -> None:
     bench.robot._orders.waiting.append(Order("emergency", issued_ns=bench.robot.now_ns))
     bench.robot._advance(40 * _TICK_NS)
     assert bench.pulls() == [0.0] * 7
-    assert not any(servo.has_torque for servo in bench.rig.bus.servos.values())
+    assert not any(servo.has_torque for servo in bench.rig.servos.values())
 
 
 def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench) -> None:
@@ -129,8 +129,8 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench) -> None:
     assert min(bench.pulls()) > 0.0
     bench.advance_without_guard(150)
     assert bench.pulls() == [0.0] * 7
-    assert max(abs(servo.motor.current) for servo in bench.rig.bus.servos.values()) == 0.0
-    assert bench.rig.bus.has_power == (bench.family == "Dynamixel")
+    assert max(abs(servo.motor.current) for servo in bench.rig.servos.values()) == 0.0
+    assert bench.rig.has_power == (bench.family == "Dynamixel")
 
 
 @pytest.mark.parametrize(
@@ -221,8 +221,8 @@ def test_zeros_are_found_and_kept(family: str) -> None:
     assert tuple(zeros) == TENDONS
     board.pass_ns(20 * _TICK_NS)
     rig = board.pins.require_rig()
-    assert [servo.pulls_a for servo in rig.bus.servos.values()] == [0.0] * 7
-    assert rig.bus.has_power == (family == "Dynamixel")
+    assert [servo.pulls_a for servo in rig.servos.values()] == [0.0] * 7
+    assert rig.has_power == (family == "Dynamixel")
 
 
 def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
@@ -230,7 +230,7 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
     plan = read(finger_text("Feetech")).guard_plan()
     board = LocalBoard(TwinWiring(plan), FingerWorld(NOMINAL, seed=3))
     switches = Switches(plan, board.hardware)
-    bus = board.pins.require_rig().bus
+    bus = board.pins.require_rig()
     for _ in range(50):
         switches.toggle()
         board.pass_ns(_TICK_NS)
@@ -257,7 +257,7 @@ def test_feetech_servos_find_their_turns_again() -> None:
     bench.drive(_FLEX, 60)
     angles = np.array([bench.robot._world.truth()[f"{name}/angle"] for name in JOINTS])
     expected = -MOMENT_ARMS @ angles
-    bench.rig.bus.set_power(on=False)
+    bench.rig.set_power(on=False)
     bench.robot._advance(60 * _TICK_NS)
     bench.robot.arm()
     bench.seen, _ = bench.robot.step(_REST)

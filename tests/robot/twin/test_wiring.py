@@ -9,7 +9,7 @@ import pytest
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import open_output
+from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.simulation import Levels, Pulse
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.start import start_board
@@ -35,7 +35,7 @@ _OUTPUTS = {
     "servo on a pin": servo("servo", "steering", {"steering": 1.0}, over="lgpio", pin=12),
     "servo on a chip": servo("servo", "steering", {"steering": 1.0}, **_CHIP),
     "reversed servo": servo(
-        "servo", "steering", {"steering": 1.0}, left_us=1900.0, right_us=1200.0, **_CHIP
+        "servo", "steering", {"steering": 1.0}, left_us=1900, right_us=1200, **_CHIP
     ),
     "esc on a chip": esc("esc", "wheels", {"throttle": 1.0}, arm_s=0.0, reverse="direct", **_CHIP),
 }
@@ -47,7 +47,7 @@ def test_the_wiring_inverts_each_driver(kind: str) -> None:
     output = _OUTPUTS[kind]
     wiring = TwinWiring(GuardPlan("robot", ACTIONS, (output,)))
     board = LocalBoard(wiring, DrivingWorld((), (8, 6), seed=0))
-    driver = open_output(output, board.hardware)
+    driver = OUTPUTS[output.driver].open(output, board.hardware)
     for value in (0.0, 0.05, 0.3, 1.0, -0.05, -0.7, -1.0, 0.0):
         driver.write(value, 10**9)
         read = wiring.read(board.pins.levels, 10**9)[output.name]

@@ -11,8 +11,7 @@ from typing import Final, NamedTuple
 from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.report import Finding, judged
-from shapechanger.robot.drivers.chip import open_output
-from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS, device_errors
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
 from shapechanger.robot.guard.outputs import enable_device
 from shapechanger.robot.hardware import Hardware
@@ -33,14 +32,18 @@ def require_pins(plan: GuardPlan) -> None:
 
 def _pins_of(plan: GuardPlan) -> dict[int, str]:
     """Return the robot's pins and their uses."""
-    used = driven_pins(plan)
+    pulsed = [output for output in plan.outputs if "over" in output.settings]
+    chips = [
+        *((output, OUTPUTS[output.driver]) for output in plan.outputs),
+        *((output, PULSES[output.settings["over"]]) for output in pulsed),
+        *((sensor, SENSORS[sensor.driver]) for sensor in plan.sensors),
+    ]
+    used: dict[int, str] = {}
+    for device, chip in chips:
+        used |= {pin: device.name for _, pin in chip.keys.of(device.settings).connected()}
     if plan.stop_pin is not None:
         used[plan.stop_pin] = "the emergency button"
-    for device in (*plan.outputs, *plan.sensors):
-        keys = ("output_enable", "a", "b", "trigger", "echo")
-        pins = [*(device.settings.get(key, -1) for key in keys), *device.settings.get("pins", [])]
-        used |= {pin: device.name for pin in pins if pin >= 0}
-    return used
+    return used | driven_pins(plan)
 
 
 def plan_of_pins(plan: GuardPlan) -> list[str]:
@@ -150,16 +153,6 @@ class BenchLamp(NamedTuple):
     pin: int | None
 
 
-_ENABLE: Final = ("enable", " enable", 1.0)
-_LIT: Final = {
-    "hbridge": (("forward", " forward", 1.0), ("backward", " backward", -1.0), _ENABLE),
-    "phase_enable": (_ENABLE, ("phase", " backward", -1.0)),
-    "servo": (("pin", ", dimly", 1.0),),
-    "esc": (("pin", ", dimly", 1.0),),
-}
-"""Setting with the pin, words and value of each LED, keyed by the driver of its output."""
-
-
 def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
     """Return the LEDs of a bench, in the order of the outputs."""
     found: list[BenchLamp] = []
@@ -168,8 +161,8 @@ def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
         if "channel" in settings:
             place = f"channel {settings['channel']} of the {settings['over']}"
             found.append(BenchLamp(f"{name}, dimly", place, output, 1.0, None))
-        elif output.driver in _LIT:
-            for key, words, value in _LIT[output.driver]:
+        elif lights := OUTPUTS[output.driver].lights:
+            for key, words, value in lights:
                 if (pin := settings[key]) >= 0:
                     found.append(BenchLamp(name + words, f"GPIO{pin}", output, value, pin))
         else:
@@ -227,7 +220,9 @@ def _lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
             opened.callback(device.off)
             device.on()
         else:
-            driver = opened.enter_context(closing(open_output(lamp.output, hardware)))
+            driver = opened.enter_context(
+                closing(OUTPUTS[lamp.output.driver].open(lamp.output, hardware))
+            )
             opened.callback(lambda: driver.write(0.0, hardware.clock.now_ns()))
             driver.write(lamp.value, hardware.clock.now_ns())
         yield

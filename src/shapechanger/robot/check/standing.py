@@ -31,8 +31,7 @@ from shapechanger.robot.check.report import (
     run_checks,
 )
 from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
-from shapechanger.robot.drivers.chip import open_sensor
-from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.chip import SENSORS, device_errors
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
 from shapechanger.robot.hardware import Hardware
@@ -170,7 +169,7 @@ def _wiring_checks(robot: StandingRobot) -> Checks:
     if any(output.driver == DRIVER for output in profile.outputs):
         yield "servo bus", _servo_bus(robot)
     for plan in encoders:
-        for joint in plan.settings["joints"]:
+        for joint in plan.settings["rows"]:
             yield "encoders", _encoder(robot, plan, joint)
 
 
@@ -395,7 +394,7 @@ def _speed_pins(robot: StandingRobot, plan: SensorPlan) -> Results:
 def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
     """Read a sensor once, by its own driver, and judge its reading."""
     clock = robot.pins.clock
-    with closing(open_sensor(plan, robot.pins)) as sensor:
+    with closing(SENSORS[plan.driver].open(plan, robot.pins)) as sensor:
         reading: dict[str, float] = {}
         for _ in range(_DISTANCE_READS if plan.measures == "distance" else 1):
             if reading := sensor.read(clock.now_ns(), 0.0):
@@ -426,7 +425,7 @@ def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
         device_errors(name),
         closing(robot.pins.i2c(bus)) as opened,
     ):
-        opened.read_byte_data(address, _MODE1)
+        opened.read_i2c_block_data(address, _MODE1, 1)
     yield "good", f"{name} answers."
 
 
@@ -445,17 +444,16 @@ def _servo_bus(robot: StandingRobot) -> Results:
 
 def _encoder(robot: StandingRobot, plan: SensorPlan, joint: str) -> Results:
     """Check the magnet of the encoder at a joint."""
-    from shapechanger.robot.drivers.as5600 import connect_encoders
+    from shapechanger.robot.drivers.as5600 import As5600
 
-    with closing(connect_encoders(plan, robot.pins)) as sensor:
-        encoder = next(one for one in sensor.encoders if one.joint == joint)
-        measured = sensor.measure(encoder)
-    if not measured.detects_magnet:
+    with closing(As5600(plan, robot.pins)) as sensor:
+        _, magnet = sensor.measure(joint)
+    if magnet == "gone":
         yield "bad", f"The encoder of {joint} detects no magnet: fit one above the chip."
         return
-    where = "far from" if measured.too_weak else "near to"
+    where = "far from" if magnet == "weak" else "near to"
     yield judged(
-        not (measured.too_weak or measured.too_strong),
+        not magnet,
         f"The encoder of {joint} detects its magnet.",
         f"The magnet of {joint} is too {where} its encoder.",
     )

@@ -10,19 +10,18 @@ from __future__ import annotations
 import errno
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import ExitStack, closing
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Protocol, runtime_checkable
 
 from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import BusNumber, Claim, KeyMistake, Keys, i2c_claims
+from shapechanger.robot.drivers.chip import Claim, KeyMistake, Keys, SensorChip, device_errors
+from shapechanger.robot.drivers.i2c import BusNumber, i2c_claims
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
-from shapechanger.robot.hardware import Hardware, I2cBus
+from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # The guard loads neither.
     from shapechanger.contract.world import World
@@ -56,6 +55,12 @@ class JointKeys(Keys, frozen=True, kw_only=True):
     zero: Annotated[int, Meta(ge=0, le=4095)] = 0
     direction: Literal[1, -1] = 1
 
+    def angle(self, counts: int) -> float:
+        """Convert counts to an angle, rad, within half a turn of the zero."""
+        half = COUNTS_PER_TURN // 2
+        turned = (counts - self.zero + half) % COUNTS_PER_TURN - half
+        return self.direction * turned * 2.0 * math.pi / COUNTS_PER_TURN
+
 
 class As5600Keys(Keys, frozen=True, kw_only=True):
     """Keys of the encoders at joints.
@@ -79,107 +84,53 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
                 words = f"has the channel {joint.channel}, which {other} has, too"
                 raise KeyMistake(name, words)
 
-    def settings(self) -> dict[str, Any]:
-        """Return the settings, with a list for each column of the joints."""
-        joints = self.rows.values()
-        return {
-            "bus": self.bus,
-            "mux": self.mux,
-            "joints": list(self.rows),
-            "channels": [one.channel for one in joints],
-            "zeros": [one.zero for one in joints],
-            "directions": [one.direction for one in joints],
-        }
-
     def claims(self) -> Iterator[Claim]:
         """Return the claims of the addresses; all encoders of a bus answer at the same one."""
         yield from i2c_claims(self.bus, "mux", self.mux)
         yield Claim("driver", f"address {ADDRESS:#x} of I2C bus {self.bus}")
 
 
-@dataclass(frozen=True, slots=True)
-class JointEncoder:
-    """Encoder of one joint.
-
-    Attributes:
-        joint: Name of the joint.
-        channel: Channel of the multiplexer, 0 to 7.
-        zero: Counts with a straight joint, 0 to 4095.
-        direction: 1 if the counts rise with the angle, -1 if they fall.
-    """
-
-    joint: str
-    channel: int
-    zero: int
-    direction: int
-
-    def angle(self, counts: int) -> float:
-        """Convert counts to an angle, rad, within half a turn of the zero."""
-        half = COUNTS_PER_TURN // 2
-        turned = (counts - self.zero + half) % COUNTS_PER_TURN - half
-        return self.direction * turned * 2.0 * math.pi / COUNTS_PER_TURN
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """Reading of an encoder.
-
-    Attributes:
-        counts: Raw angle, 0 to 4095.
-        detects_magnet: Whether there is a magnet; without one the counts are meaningless.
-        too_weak: Whether the magnet is too far away.
-        too_strong: Whether it is too near.
-    """
-
-    counts: int
-    detects_magnet: bool
-    too_weak: bool
-    too_strong: bool
+Magnet = Literal["", "gone", "weak", "strong"]
+"""State of the magnet: in order (""), missing, too weak or too strong."""
 
 
 class As5600:
     """Encoders of several joints; see `SensorDriver`.
 
-    Args:
-        bus: The I2C bus.
-        mux: Address of the multiplexer.
-        encoders: One encoder per joint.
-        words: Description of the multiplexer for messages.
-
     Attributes:
-        encoders: One encoder per joint.
+        joints: Keys of each joint, by name.
     """
 
-    def __init__(
-        self, bus: I2cBus, mux: int, encoders: tuple[JointEncoder, ...], words: str
-    ) -> None:
-        self._bus = bus
-        self._mux = mux
-        self._words = words
-        self._missed = dict.fromkeys((one.joint for one in encoders), 0)
-        self.encoders = encoders
-
-    def measure(self, encoder: JointEncoder) -> Measured:
-        """Read one encoder."""
-        with device_errors(self._words):
-            self._bus.write_byte(self._mux, 1 << encoder.channel)
-        with device_errors(f"The encoder of {encoder.joint}, on channel {encoder.channel},"):
-            status, high, low = self._bus.read_i2c_block_data(ADDRESS, _STATUS, 3)
-        return Measured(
-            counts=(high << 8 | low) % COUNTS_PER_TURN,
-            detects_magnet=bool(status & _MAGNET_DETECTED),
-            too_weak=bool(status & _TOO_WEAK),
-            too_strong=bool(status & _TOO_STRONG),
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        keys = As5600Keys.of(plan.settings)
+        self.joints = keys.rows
+        self._mux = keys.mux
+        self._words = (
+            f"The multiplexer of sensor {plan.name!r} at 0x{keys.mux:02x} on I2C bus {keys.bus}"
         )
+        self._missed = dict.fromkeys(keys.rows, 0)
+        with device_errors(self._words):
+            self._bus = hardware.i2c(keys.bus)
 
-    def counts(self, encoder: JointEncoder) -> int:
-        """Return the raw angle of one encoder, 0 to 4095."""
-        measured = self.measure(encoder)
-        if not measured.detects_magnet:
-            raise RobotError(
-                f"The encoder of {encoder.joint}, on channel {encoder.channel}, detects no magnet."
-            )
-        return measured.counts
+    def measure(self, joint: str) -> tuple[int, Magnet]:
+        """Read the raw angle of one joint, 0 to 4095, which a missing magnet makes meaningless."""
+        channel = self.joints[joint].channel
+        with device_errors(self._words):
+            self._bus.write_byte(self._mux, 1 << channel)
+        with device_errors(f"The encoder of {joint}, on channel {channel},"):
+            status, high, low = self._bus.read_i2c_block_data(ADDRESS, _STATUS, 3)
+        magnet: Magnet = "strong" if status & _TOO_STRONG else "weak" if status & _TOO_WEAK else ""
+        if not status & _MAGNET_DETECTED:
+            magnet = "gone"
+        return (high << 8 | low) % COUNTS_PER_TURN, magnet
+
+    def counts(self, joint: str) -> int:
+        """Return the raw angle of one joint, 0 to 4095."""
+        counts, magnet = self.measure(joint)
+        if magnet == "gone":
+            channel = self.joints[joint].channel
+            raise RobotError(f"The encoder of {joint}, on channel {channel}, detects no magnet.")
+        return counts
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return each joint's angle, such as `MCP_flexion/angle`, rad, -pi to pi around its zero.
@@ -191,16 +142,16 @@ class As5600:
         """
         said: dict[str, float] = {}
         failures: dict[str, None] = {}  # A missing multiplexer is reported once.
-        for encoder in self.encoders:
+        for name, joint in self.joints.items():
             try:
-                counts = self.counts(encoder)
+                counts = self.counts(name)
             except RobotError as error:
-                self._missed[encoder.joint] += 1
-                if self._missed[encoder.joint] >= _MOST_MISSED:
+                self._missed[name] += 1
+                if self._missed[name] >= _MOST_MISSED:
                     failures[str(error)] = None
                 continue
-            self._missed[encoder.joint] = 0
-            said[f"{encoder.joint}/angle"] = encoder.angle(counts)
+            self._missed[name] = 0
+            said[f"{name}/angle"] = joint.angle(counts)
         if failures:
             raise RobotError(" ".join(failures))
         return said
@@ -210,34 +161,13 @@ class As5600:
         self._bus.close()
 
 
-def _encoders(plan: SensorPlan) -> tuple[JointEncoder, ...]:
-    columns = (plan.settings[key] for key in ("joints", "channels", "zeros", "directions"))
-    return tuple(JointEncoder(*row) for row in zip(*columns, strict=True))
-
-
-def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
-    """Return the encoders without reading them.
-
-    Args:
-        plan: Has the settings `bus` and `mux`, and name, channel, zero and direction of each joint
-            in `joints`, `channels`, `zeros` and `directions`.
-        hardware: Where the bus is.
-    """
-    bus, mux = plan.settings["bus"], plan.settings["mux"]
-    words = f"The multiplexer of sensor {plan.name!r} at 0x{mux:02x} on I2C bus {bus}"
-    with device_errors(words):
-        return As5600(hardware.i2c(bus), mux, _encoders(plan), words)
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> As5600:
-    """Open the sensor and read each encoder once; see `connect_encoders`."""
-    sensor = connect_encoders(plan, hardware)
-    try:
-        for encoder in sensor.encoders:
-            sensor.counts(encoder)
-    except BaseException:
-        sensor.close()
-        raise
+def open_and_read(plan: SensorPlan, hardware: Hardware) -> As5600:
+    """Open the sensor and read each encoder once."""
+    with ExitStack() as undo:
+        sensor = undo.enter_context(closing(As5600(plan, hardware)))
+        for joint in sensor.joints:
+            sensor.counts(joint)
+        undo.pop_all()
     return sensor
 
 
@@ -249,9 +179,6 @@ class JointWorld(Protocol):
         """Return one reading of a joint's angle, rad, with the noise of its encoder."""
         ...
 
-
-Magnet = Literal["", "gone", "weak", "strong"]
-"""State of the magnet: in order (""), missing, too weak or too strong."""
 
 _RAW_ANGLE: Final = 0x0C
 _STATUS_OF: Final = {
@@ -266,20 +193,13 @@ class SimulatedAs5600(SimulatedChip):
     """AS5600: magnetic encoder of a joint.
 
     Args:
-        joint: Name of the joint on which the magnet sits.
+        keys: Keys of the joint.
         angle: Reads the measured angle, rad.
-        zero: Counts at the angle 0.
-        direction: 1 if the counts rise with the angle, -1 if they fall.
-
-    Attributes:
-        joint: Name of the joint.
     """
 
-    def __init__(self, joint: str, angle: Callable[[], float], zero: int, direction: int) -> None:
-        self.joint = joint
+    def __init__(self, keys: JointKeys, angle: Callable[[], float]) -> None:
+        self._keys = keys
         self._angle = angle
-        self._zero = zero
-        self._direction = direction
         self._magnet = ""
 
     def set_magnet(self, state: Magnet | str) -> None:
@@ -297,8 +217,8 @@ class SimulatedAs5600(SimulatedChip):
     def _counts(self) -> int:
         if self._magnet == "gone":
             return 0
-        turned = self._direction * self._angle() / (2.0 * math.pi)
-        return (self._zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
+        turned = self._keys.direction * self._angle() / (2.0 * math.pi)
+        return (self._keys.zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
 
 
 class Tca9548a(SimulatedChip):
@@ -384,18 +304,15 @@ class SimulatedJoints(SimulatedSensor):
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
-        settings = plan.settings
+        keys = As5600Keys.of(plan.settings)
         measured = world.measured_angle if isinstance(world, JointWorld) else _at_zero
         self.encoders: dict[str, SimulatedAs5600] = {}
-        behind: dict[int, SimulatedAs5600] = {}
-        for encoder in _encoders(plan):
-            joint = encoder.joint
-            measured(joint)  # Raises for an unknown joint.
-            chip = SimulatedAs5600(joint, partial(measured, joint), encoder.zero, encoder.direction)
-            self.encoders[joint] = behind[encoder.channel] = chip
+        for name, joint in keys.rows.items():
+            measured(name)  # Raises for an unknown joint.
+            self.encoders[name] = SimulatedAs5600(joint, partial(measured, name))
+        behind = {keys.rows[name].channel: chip for name, chip in self.encoders.items()}
         mux = Tca9548a(behind)
-        bus = settings["bus"]
-        super().__init__({(bus, settings["mux"]): mux, (bus, ADDRESS): ChannelsBehind(mux)})
+        super().__init__({(keys.bus, keys.mux): mux, (keys.bus, ADDRESS): ChannelsBehind(mux)})
 
 
 def _features(plan: SensorPlan) -> list[Feature]:
@@ -404,14 +321,14 @@ def _features(plan: SensorPlan) -> list[Feature]:
 
     return [
         Feature(f"{name}/angle", "rad", -math.pi, math.pi, Element("joint", name))
-        for name in plan.settings["joints"]
+        for name in plan.settings["rows"]
     ]
 
 
 AS5600: Final = SensorChip(
     measures="joints",
     keys=As5600Keys,
-    open=open_driver,
+    open=open_and_read,
     simulate=SimulatedJoints,
     features=_features,
     rows=JointKeys,

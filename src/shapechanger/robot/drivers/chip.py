@@ -7,16 +7,22 @@ The module of a chip has its keys in a profile, its driver and its simulation, a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import sys
+import traceback
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, Self, TypeVar, cast
+
+import msgspec
+from msgspec import Meta
 
 from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.pins import NO_PIN, Pin
 from shapechanger.robot.drivers.simulation import (
     DutyOf,
     I2cChips,
@@ -31,6 +37,98 @@ if TYPE_CHECKING:  # The guard loads neither.
     from shapechanger.layout import Feature
 
 _GROUP: Final = "shapechanger.drivers"
+_PRINTABLE: Final = r"\A(?=.*\S)[\x20-\x7e\xa0-\U0010ffff]+\Z"
+
+_TEXT: Final = "a text of 1 to {} characters that can be printed"
+
+Text = Annotated[
+    str,
+    Meta(min_length=1, max_length=64, pattern=_PRINTABLE, description=_TEXT.format(64)),
+]
+"""A name, as long as names in messages may be; see `shapechanger.robot.link.messages`."""
+
+FilePath = Annotated[
+    str,
+    Meta(min_length=1, max_length=4096, pattern=_PRINTABLE, description=_TEXT.format(4096)),
+]
+"""Path of a file or a device."""
+
+
+class KeyMistake(ValueError):
+    """A value of a key that the other keys of its table do not allow.
+
+    Args:
+        key: Name of the key.
+        words: What is wrong, as the end of a sentence that begins with the key and its table.
+    """
+
+    def __init__(self, key: str, words: str) -> None:
+        super().__init__(words)
+        self.key = key
+
+
+class Claim(NamedTuple):
+    """Something that only one key of a profile may use: a pin, a channel or an address.
+
+    Attributes:
+        key: Name of the key that claims it.
+        what: The pin, channel or address.
+        group: Users of one group may share it; "" for exclusive use.
+        use: What it is used for, as the end of a sentence; may be empty.
+    """
+
+    key: str
+    what: str
+    group: str = ""
+    use: str = ""
+
+
+class Keys(msgspec.Struct, frozen=True):
+    """Keys of one table; a subclass raises `KeyMistake` for values that contradict each other."""
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of a plan, as JSON can hold them."""
+        return cast("dict[str, Any]", msgspec.to_builtins(self, enc_hook=int))
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Self:
+        """Return the keys from the settings of a plan, which may have others, too."""
+        return msgspec.convert(settings, cls, dec_hook=lambda kind, pin: kind(pin))
+
+    def connected(self) -> Iterator[tuple[str, Pin]]:
+        """Return the connected pins, each with its key."""
+        for key, value in msgspec.structs.asdict(self).items():
+            for pin in cast("list[Any]", value) if isinstance(value, list) else [value]:
+                if isinstance(pin, Pin) and pin != NO_PIN:
+                    yield key, pin
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the keys: by default their pins."""
+        return (Claim(key, f"GPIO{pin}") for key, pin in self.connected())
+
+
+@contextmanager
+def device_errors(device: str) -> Generator[None]:
+    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError`.
+
+    Args:
+        device: Description of the device, such as "The motor on GPIO22 and GPIO27".
+    """
+    try:
+        yield
+    except _kinds() as error:
+        # A device that could not be opened frees its pins when nothing refers to it any more. In
+        # Python 3.13 the frame that opened it would live until a garbage collection.
+        traceback.clear_frames(error.__traceback__)
+        raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
+
+
+def _kinds() -> tuple[type[BaseException], ...]:
+    """Return the errors of the kernel, and of gpiozero and lgpio if they are loaded."""
+    names = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
+    loaded = [(sys.modules.get(module), name) for module, name in names]
+    own = tuple(getattr(module, name) for module, name in loaded if module is not None)
+    return (OSError, ImportError, *own)
 
 
 class OutputDriver(Protocol):
@@ -54,43 +152,6 @@ class OutputDriver(Protocol):
 
     def close(self) -> None:
         """Set the safest level and close the pins."""
-        ...
-
-
-class SharedDevice(Protocol):
-    """Device shared by several outputs and written once for all of them: a servo bus.
-
-    Its drivers refer to it in their attribute `device`.
-    """
-
-    def begin(self) -> None:
-        """Start the device once all of its outputs are open, without moving anything.
-
-        Raises:
-            RobotError: If it does not respond, or is not the expected device.
-        """
-        ...
-
-    def ready(self, alive: Callable[[], object]) -> None:
-        """Clear faults before the robot is armed, without moving anything.
-
-        Args:
-            alive: Feeds the enable line and the supervisor; called at least every 50 ms.
-
-        Raises:
-            RobotError: If a fault persists.
-        """
-        ...
-
-    def flush(self, *, grip: bool) -> None:
-        """Send what was written to its outputs.
-
-        Args:
-            grip: Whether released outputs are energised again.
-
-        Raises:
-            RobotError: If an output does not obey.
-        """
         ...
 
 
@@ -167,6 +228,8 @@ class OutputChip:
             the value of the pulses.
         pulses: Keys of the pulse widths at -1, 0 and 1; empty for an output without pulses.
         differs: Why its value may differ from the one that was asked for.
+        lights: LEDs of a bench that stand for it: the key of each pin, words after the name of the
+            output, and the value that lights it; empty if an LED cannot.
         drives: Whether it can propel a robot, whatever part it moves.
         stops_itself: Whether it stops by itself without the guard, and must be left alone then.
     """
@@ -178,6 +241,7 @@ class OutputChip:
     obeys: Callable[[OutputPlan], Callable[[float | None, int], float]] | None = None
     pulses: tuple[str, ...] = ()
     differs: str = "it does not follow"
+    lights: tuple[tuple[str, str, float], ...] = ()
     drives: bool = False
     stops_itself: bool = False
 
@@ -188,15 +252,15 @@ class PulseSource:
 
     Attributes:
         keys: Its keys in a profile.
-        open: Opens a channel, from the settings of an output, without sending any pulses.
+        open: Opens the channel of an output, without sending any pulses.
         pulse_of: Reads the width of its pulses on a twin, µs; None for a source that no twin has.
-        chips: Its chips on I2C buses, from the settings of an output.
+        chips: Its chips on I2C buses.
     """
 
     keys: type[Keys]
-    open: Callable[[Mapping[str, Any], Hardware], PulseChannel]
-    pulse_of: Callable[[Mapping[str, Any], DutyOf], Callable[[Levels], float]] | None = None
-    chips: Callable[[Mapping[str, Any]], I2cChips] = lambda settings: {}
+    open: Callable[[OutputPlan, Hardware], PulseChannel]
+    pulse_of: Callable[[OutputPlan, DutyOf], Callable[[Levels], float]] | None = None
+    chips: Callable[[OutputPlan], I2cChips] = lambda plan: {}
 
 
 _Chip = TypeVar("_Chip", SensorChip, OutputChip, PulseSource)
@@ -269,8 +333,8 @@ OUTPUTS: Final = Chips(
     {
         "hbridge": f"{_HERE}.motors:HBRIDGE",
         "phase_enable": f"{_HERE}.motors:PHASE_ENABLE",
-        "servo": f"{_HERE}.servo:SERVO",
-        "esc": f"{_HERE}.esc:ESC",
+        "servo": f"{_HERE}.pulse:SERVO",
+        "esc": f"{_HERE}.pulse:ESC",
         "bus_servo": f"{_HERE}.servos.output:BUS_SERVO",
     },
 )
@@ -285,29 +349,3 @@ PULSES: Final = Chips(
     },
 )
 """Sources of pulses."""
-
-
-def open_output(plan: OutputPlan, hardware: Hardware) -> OutputDriver:
-    """Open an output at rest.
-
-    Args:
-        plan: The output.
-        hardware: The pins and buses of this robot.
-
-    Raises:
-        RobotError: If the device does not respond.
-    """
-    return OUTPUTS[plan.driver].open(plan, hardware)
-
-
-def open_sensor(plan: SensorPlan, hardware: Hardware) -> SensorDriver:
-    """Open a sensor.
-
-    Args:
-        plan: The sensor.
-        hardware: The pins and buses of this robot.
-
-    Raises:
-        RobotError: If the device does not respond.
-    """
-    return SENSORS[plan.driver].open(plan, hardware)

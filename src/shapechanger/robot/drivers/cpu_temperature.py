@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.contract.plan import SensorPlan
-from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import FilePath, Keys
+from shapechanger.errors import RobotError, translate_errors
+from shapechanger.robot.drivers.chip import FilePath, Keys, SensorChip, device_errors
 from shapechanger.robot.hardware import Hardware
 
 _PERIOD_NS: Final = 1_000_000_000
@@ -29,7 +27,7 @@ class CpuTemperature:
     """Temperature in a kernel file; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        self._path = Path(plan.settings["path"])
+        self._path = Path(CpuTemperatureKeys.of(plan.settings).path)
         self._name = f"Sensor {plan.name!r}"
         self._read_ns: int | None = None
         self._celsius = self._measure()
@@ -47,12 +45,10 @@ class CpuTemperature:
     def _measure(self) -> float:
         with device_errors(self._name):
             written = self._path.read_text()
-        try:
+        words = f"{self._name} read {written!r} at {self._path}, which is no temperature."
+        with translate_errors(ValueError, to=lambda _: RobotError(words)):
             # Millidegrees: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
             return int(written) / 1000.0
-        except ValueError as error:
-            words = f"{self._name} read {written!r} at {self._path}, which is no temperature."
-            raise RobotError(words) from error
 
 
 CPU_TEMPERATURE: Final = SensorChip(

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final
 
 from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
-from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import Keys
-from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
+from shapechanger.robot.drivers.chip import Keys, SensorChip, device_errors
+from shapechanger.robot.drivers.pins import NO_PIN, EdgeInput, OptionalPin, Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -27,9 +25,10 @@ _STANDS_AFTER_S: Final = 0.5
 # A count has four edges; whole counts even out their unequal lengths.
 _EDGES_PER_COUNT: Final = 4
 
-# Step of the position from one state of (a, b) to the next, forward when a leads: 00, 10, 11, 01.
-# Missing: no change, or two at once, which leaves the direction unknown.
-_STEPS: Final = {
+# Step of the position from one state of the channels, (a, b), to the next. With two channels it is
+# forward when a leads: 00, 10, 11, 01; missing are no change, and two at once, which leaves the
+# direction unknown. With one channel each rising edge counts.
+_STEPS_OF_TWO: Final = {
     (0b00, 0b10): 1,
     (0b10, 0b11): 1,
     (0b11, 0b01): 1,
@@ -39,6 +38,8 @@ _STEPS: Final = {
     (0b01, 0b11): -1,
     (0b00, 0b01): -1,
 }
+
+_STEPS_OF_ONE: Final = {(0, 1): 1, (1, 1): 1}
 
 
 class EncoderKeys(Keys, frozen=True, kw_only=True):
@@ -56,6 +57,11 @@ class EncoderKeys(Keys, frozen=True, kw_only=True):
     counts_per_turn: Annotated[float, Meta(gt=0, le=1e6)]
     wheel_m: Annotated[float, Meta(gt=0, le=100)]
 
+    @property
+    def count_m(self) -> float:
+        """Distance of a count, m."""
+        return self.wheel_m / self.counts_per_turn
+
 
 class Encoder:
     """Encoder with one or two channels; see `SensorDriver`.
@@ -65,28 +71,28 @@ class Encoder:
     """
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        settings = plan.settings
-        count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
-        self._two_channels: bool = settings["b"] >= 0
-        self._edge_m = count_m / _EDGES_PER_COUNT if self._two_channels else count_m
+        keys = EncoderKeys.of(plan.settings)
+        self._two_channels = keys.b != NO_PIN
+        self._steps = _STEPS_OF_TWO if self._two_channels else _STEPS_OF_ONE
+        edges_per_count = _EDGES_PER_COUNT if self._two_channels else 1
+        self._edge_m = keys.count_m / edges_per_count
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._state = 0
-        self._edges: deque[tuple[float, int]] = deque(
-            maxlen=_EDGES_PER_COUNT + 1 if self._two_channels else 2
-        )
+        self._edges: deque[tuple[float, int]] = deque(maxlen=edges_per_count + 1)
         self._count = 0
         self._count_read = 0
         self._last_edge_ns = 0
         self._speed = 0.0
         self._sign = 1.0
+        pins = [keys.b, keys.a] if self._two_channels else [keys.a]
         with device_errors(f"Sensor {plan.name!r}"):
             factory = hardware.pin_factory()
-            self._inputs = [EdgeInput(settings["a"], "up", factory, self._a_changed)]
-            if self._two_channels:
-                self._inputs.append(EdgeInput(settings["b"], "up", factory, self._b_changed))
+            self._inputs = [
+                EdgeInput(pin, "up", factory, partial(self._changed, 1 << i))
+                for i, pin in enumerate(pins)
+            ]
             with self._lock:
-                levels = [one.level for one in self._inputs]
-                self._state = levels[0] << 1 | levels[-1] if self._two_channels else levels[0]
+                self._state = sum(one.level << i for i, one in enumerate(self._inputs))
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "speed" in m/s, positive forward."""
@@ -118,23 +124,12 @@ class Encoder:
         moved_m = sum(step for _, step in edges[1:]) * self._edge_m
         return moved_m / (edges[-1][0] - edges[0][0])
 
-    def _a_changed(self, at_s: float, level: int) -> None:
-        if self._two_channels:
-            with self._lock:
-                self._enter(at_s, (self._state & 0b01) | level << 1)
-        elif level == 1:
-            with self._lock:
-                self._add(at_s, 1)
-
-    def _b_changed(self, at_s: float, level: int) -> None:
+    def _changed(self, bit: int, at_s: float, level: int) -> None:
         with self._lock:
-            self._enter(at_s, (self._state & 0b10) | level)
-
-    def _enter(self, at_s: float, state: int) -> None:
-        step = _STEPS.get((self._state, state))
-        self._state = state
-        if step is not None:
-            self._add(at_s, step)
+            before, self._state = self._state, self._state & ~bit | bit * level
+            step = self._steps.get((before, self._state))
+            if step is not None:
+                self._add(at_s, step)
 
     def _add(self, at_s: float, step: int) -> None:
         # Edges before a reversal or a stop do not count towards the current speed.
@@ -155,14 +150,13 @@ class SimulatedEncoder(SimulatedSensor):
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
-        self._pins = (plan.settings["a"], plan.settings["b"])
-        self._states = ((0, 0), (1, 0), (1, 1), (0, 1)) if self._pins[1] >= 0 else ((0,), (1,))
-        count_m: float = plan.settings["wheel_m"] / plan.settings["counts_per_turn"]
-        self._edge_m = count_m / len(self._states)
-        travelled_m = world.inputs().travelled_m
+        keys = EncoderKeys.of(plan.settings)
+        self._pins = (keys.a, keys.b)
+        self._states = ((0,), (1,)) if keys.b == NO_PIN else ((0, 0), (1, 0), (1, 1), (0, 1))
+        self._edge_m = keys.count_m / len(self._states)
         # The distance rolled before power-on makes no edges.
-        self._travelled = travelled_m
-        self._position = math.floor(travelled_m / self._edge_m)
+        self._travelled = world.inputs().travelled_m
+        self._position = math.floor(self._travelled / self._edge_m)
         state = self._states[self._position % len(self._states)]
         # A single channel has no second pin.
         super().__init__(levels=dict(zip(self._pins, state, strict=False)))

@@ -14,11 +14,8 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import Keys
-from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.chip import Keys, SensorChip, device_errors
+from shapechanger.robot.drivers.pins import EdgeInput, Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -49,9 +46,9 @@ class Hcsr04:
     """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        settings = plan.settings
+        keys = Hcsr04Keys.of(plan.settings)
         self._name = f"Sensor {plan.name!r}"
-        self._max_m: float = settings["max_m"]
+        self._max_m = keys.max_m
         # Simulated pins need no pulse width.
         self._trigger_ns = _TRIGGER_NS if hardware.clock.is_real else 0
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
@@ -66,8 +63,8 @@ class Hcsr04:
 
             factory = hardware.pin_factory()
             self._ticks_diff = factory.ticks_diff
-            self._trigger = DigitalOutputDevice(settings["trigger"], pin_factory=factory)
-            self._echo = EdgeInput(settings["echo"], "down", factory, self._changed)
+            self._trigger = DigitalOutputDevice(keys.trigger, pin_factory=factory)
+            self._echo = EdgeInput(keys.echo, "down", factory, self._changed)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "distance" in m, at most `max_m`; empty before the first echo.
@@ -137,24 +134,24 @@ class SimulatedHcsr04(SimulatedSensor):
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
-        self._trigger = plan.settings["trigger"]
-        self._echo = plan.settings["echo"]
+        self._keys = keys = Hcsr04Keys.of(plan.settings)
         self._world = world
         self._busy_until_ns = 0
         self.override_m: float | None = None
         self.dead = False
-        super().__init__(levels={self._echo: 0})
+        super().__init__(levels={keys.echo: 0})
 
     def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:
         """Return the edges of the echo."""
-        if pin != self._trigger or level or self.dead or t < self._busy_until_ns:
+        if pin != self._keys.trigger or level or self.dead or t < self._busy_until_ns:
             return []
         distance = self._world.distance_m() if self.override_m is None else self.override_m
         echo_ns = _NO_ECHO_NS
         if distance <= _FARTHEST_M:
             echo_ns = round(2e9 * max(distance, _NEAREST_M) / _SOUND_M_PER_S)
         self._busy_until_ns = t + _PING_NS + echo_ns
-        return [Edge(t + _PING_NS, self._echo, 1), Edge(self._busy_until_ns, self._echo, 0)]
+        echo = self._keys.echo
+        return [Edge(t + _PING_NS, echo, 1), Edge(self._busy_until_ns, echo, 0)]
 
 
 HCSR04: Final = SensorChip(

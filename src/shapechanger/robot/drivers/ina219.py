@@ -12,9 +12,8 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import I2cKeys
-from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
+from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, simulated_at_address
+from shapechanger.robot.drivers.simulation import SimulatedChip
 from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # Only a twin has a world.
@@ -38,26 +37,23 @@ class Ina219:
     """Voltage sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        bus, self._address = plan.settings["bus"], plan.settings["address"]
-        self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {bus}"
+        keys = Ina219Keys.of(plan.settings)
         self._read_ns: int | None = None
         self._volts = 0.0
-        with device_errors(self._name):
-            self._bus = hardware.i2c(bus)
-            self._bus.write_i2c_block_data(self._address, _CONFIGURATION, _CONTINUOUS_32_V)
+        self._device = I2cDevice(f"Sensor {plan.name!r}", keys, hardware)
+        self._device.write(_CONFIGURATION, *_CONTINUOUS_32_V)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the voltage of the "battery" in V, updated ten times a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
-            with device_errors(self._name):
-                high, low = self._bus.read_i2c_block_data(self._address, _BUS_VOLTAGE, 2)
-            self._volts = ((high << 8 | low) >> _STATUS_BITS) * _V_PER_STEP
+            word = int.from_bytes(self._device.read(_BUS_VOLTAGE, 2))
+            self._volts = (word >> _STATUS_BITS) * _V_PER_STEP
             self._read_ns = now_ns
         return {"battery": self._volts}
 
     def close(self) -> None:
         """Close the bus."""
-        self._bus.close()
+        self._device.close()
 
 
 _RESET: Final = 0x8000  # Bit of the configuration.
@@ -91,10 +87,10 @@ class SimulatedIna219(SimulatedChip):
             self._configuration = _AT_POWER_ON if word & _RESET else word
 
 
-def _simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
-    at = plan.settings["bus"], plan.settings["address"]
-    return SimulatedSensor({at: SimulatedIna219(world)})
-
-
-INA219: Final = SensorChip(measures="battery", keys=Ina219Keys, open=Ina219, simulate=_simulate)
+INA219: Final = SensorChip(
+    measures="battery",
+    keys=Ina219Keys,
+    open=Ina219,
+    simulate=simulated_at_address(SimulatedIna219),
+)
 """A voltage sensor."""

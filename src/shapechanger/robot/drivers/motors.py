@@ -11,9 +11,7 @@ from msgspec import Meta
 
 from shapechanger.contract.duty import Duty
 from shapechanger.contract.plan import OutputPlan
-from shapechanger.robot.drivers.chip import OutputChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import KeyMistake, Keys
+from shapechanger.robot.drivers.chip import KeyMistake, Keys, OutputChip, device_errors
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
 from shapechanger.robot.hardware import Hardware
@@ -36,6 +34,11 @@ class _DutyKeys(Keys, frozen=True, kw_only=True):
         """Refuse an empty range of duties."""
         if not self.start < self.full:
             raise KeyMistake("start", f"must be below full, which is {self.full:g}")
+
+    @property
+    def duty(self) -> Duty:
+        """Duty of a speed, and the reverse."""
+        return Duty(self.start, self.full)
 
 
 class HBridgeKeys(_DutyKeys, frozen=True, kw_only=True):
@@ -65,17 +68,11 @@ class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
 
 
 class _DutyMotor:
-    """Bidirectional motor; see `OutputDriver`.
+    """Bidirectional motor on two pins; see `OutputDriver`."""
 
-    Args:
-        plan: The output.
-        pins: Settings that hold the two pins of the motor.
-    """
-
-    def __init__(self, plan: OutputPlan, pins: tuple[str, str]) -> None:
-        first, second = (plan.settings[key] for key in pins)
+    def __init__(self, plan: OutputPlan, duty: Duty, first: Pin, second: Pin) -> None:
         self._name = f"Output {plan.name!r} on GPIO{first} and GPIO{second}"
-        self._duty = Duty(plan.settings["start"], plan.settings["full"])
+        self._duty = duty
         self._written: float | None = None
         self._opened = ExitStack()
         self._is_closed = False
@@ -123,19 +120,19 @@ class HBridge(_DutyMotor):
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         from gpiozero import DigitalOutputDevice, Motor  # A twin's worlds need no gpiozero.
 
-        super().__init__(plan, ("forward", "backward"))
-        settings = plan.settings
+        keys = HBridgeKeys.of(plan.settings)
+        super().__init__(plan, keys.duty, keys.forward, keys.backward)
         with device_errors(self._name), ExitStack() as undo:
             factory = hardware.pin_factory()
             self._enable: Any = None
-            if settings["enable"] >= 0:
+            if keys.enable != NO_PIN:
                 # Not the one of `Motor`, which would be on before the first write.
-                self._enable = DigitalOutputDevice(settings["enable"], pin_factory=factory)
+                self._enable = DigitalOutputDevice(keys.enable, pin_factory=factory)
                 undo.callback(self._enable.close)
-            self._motor = Motor(settings["forward"], settings["backward"], pin_factory=factory)
+            self._motor = Motor(keys.forward, keys.backward, pin_factory=factory)
             undo.callback(self._motor.close)
             for device in (self._motor.forward_device, self._motor.backward_device):
-                device.frequency = settings["pwm_hz"]
+                device.frequency = keys.pwm_hz
             self.write(0.0, 0)
             self._opened = undo.pop_all()
 
@@ -148,18 +145,16 @@ class HBridge(_DutyMotor):
             self._enable.on()
 
     def _stop(self) -> None:
-        try:
+        with ExitStack() as stack:
+            stack.callback(self._set_low)
             if self._enable is not None:
                 self._enable.off()
-        finally:
-            self._set_low()
 
     def _set_low(self) -> None:
         # Unlike in `Motor.stop`, one input goes low even if the other fails.
-        try:
+        with ExitStack() as stack:
+            stack.callback(self._motor.backward_device.off)
             self._motor.forward_device.off()
-        finally:
-            self._motor.backward_device.off()
 
 
 class PhaseEnable(_DutyMotor):
@@ -172,14 +167,15 @@ class PhaseEnable(_DutyMotor):
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         from gpiozero import PhaseEnableMotor
 
-        super().__init__(plan, ("phase", "enable"))
-        pins = plan.settings["phase"], plan.settings["enable"]
+        keys = PhaseEnableKeys.of(plan.settings)
+        super().__init__(plan, keys.duty, keys.phase, keys.enable)
         with device_errors(self._name), ExitStack() as undo:
-            self._motor = PhaseEnableMotor(*pins, pin_factory=hardware.pin_factory())
+            factory = hardware.pin_factory()
+            self._motor = PhaseEnableMotor(keys.phase, keys.enable, pin_factory=factory)
             undo.callback(self._motor.close)
             # A plain output would keep its level.
             undo.callback(self._motor.phase_device.off)
-            self._motor.enable_device.frequency = plan.settings["pwm_hz"]
+            self._motor.enable_device.frequency = keys.pwm_hz
             self.write(0.0, 0)
             self._opened = undo.pop_all()
 
@@ -196,11 +192,12 @@ class PhaseEnable(_DutyMotor):
 
 
 def _wired_hbridge(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
-    forward, backward, enable = (plan.settings[key] for key in ("forward", "backward", "enable"))
+    keys = HBridgeKeys.of(plan.settings)
 
     def state(levels: Levels) -> WiredOutput:
-        drive = duty(levels, forward) - duty(levels, backward)
-        return _turning(plan, drive * (duty(levels, enable) if enable >= 0 else 1.0), rest)
+        enabled = 1.0 if keys.enable == NO_PIN else duty(levels, keys.enable)
+        drive = duty(levels, keys.forward) - duty(levels, keys.backward)
+        return _turning(keys.duty, drive * enabled, rest)
 
     return state
 
@@ -208,27 +205,39 @@ def _wired_hbridge(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Lev
 def _wired_phase_enable(
     plan: OutputPlan, rest: float, duty: DutyOf
 ) -> Callable[[Levels], WiredOutput]:
-    enable, phase = plan.settings["enable"], plan.settings["phase"]
+    keys = PhaseEnableKeys.of(plan.settings)
 
     def state(levels: Levels) -> WiredOutput:
         # A phase that is high part of the time turns the motor back and forth.
-        return _turning(plan, duty(levels, enable) * (1.0 - 2.0 * duty(levels, phase)), rest)
+        sign = 1.0 - 2.0 * duty(levels, keys.phase)
+        return _turning(keys.duty, duty(levels, keys.enable) * sign, rest)
 
     return state
 
 
-def _turning(plan: OutputPlan, drive: float, rest: float) -> WiredOutput:
-    size = Duty(plan.settings["start"], plan.settings["full"]).size_at(abs(drive))
-    value = math.copysign(size, drive)
+def _turning(duty: Duty, drive: float, rest: float) -> WiredOutput:
+    value = math.copysign(duty.size_at(abs(drive)), drive)
     return WiredOutput(value, abs(value - rest) <= (0.01 if rest else 0.0))
 
 
 _OFF: Final = WiredOutput(0.0, True)
 
-HBRIDGE: Final = OutputChip(keys=HBridgeKeys, open=HBridge, wire=_wired_hbridge, unpowered=_OFF)
+_LIT_ENABLE: Final = ("enable", " enable", 1.0)
+
+HBRIDGE: Final = OutputChip(
+    keys=HBridgeKeys,
+    open=HBridge,
+    wire=_wired_hbridge,
+    unpowered=_OFF,
+    lights=(("forward", " forward", 1.0), ("backward", " backward", -1.0), _LIT_ENABLE),
+)
 """A motor on an H-bridge."""
 
 PHASE_ENABLE: Final = OutputChip(
-    keys=PhaseEnableKeys, open=PhaseEnable, wire=_wired_phase_enable, unpowered=_OFF
+    keys=PhaseEnableKeys,
+    open=PhaseEnable,
+    wire=_wired_phase_enable,
+    unpowered=_OFF,
+    lights=(_LIT_ENABLE, ("phase", " backward", -1.0)),
 )
 """A motor on a driver in phase/enable mode."""

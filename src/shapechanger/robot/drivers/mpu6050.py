@@ -16,9 +16,8 @@ from msgspec import Meta
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import I2cKeys
-from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
+from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, simulated_at_address
+from shapechanger.robot.drivers.simulation import SimulatedChip
 from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # Only a twin has a world.
@@ -27,8 +26,8 @@ if TYPE_CHECKING:  # Only a twin has a world.
 _CONFIG: Final = 0x1A
 _GYRO_CONFIG: Final = 0x1B
 _ACCEL_CONFIG: Final = 0x1C
-# Seven big-endian numbers follow: acceleration x y z, temperature, rate x y z.
 _ACCEL_XOUT_H: Final = 0x3B
+_MEASURED: Final = struct.Struct(">7h")  # From there: acceleration x y z, temperature, rate x y z.
 _PWR_MGMT_1: Final = 0x6B
 _WHO_AM_I: Final = 0x75
 
@@ -57,21 +56,19 @@ class Mpu6050:
     """Inertial sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        number, self._address = plan.settings["bus"], plan.settings["address"]
-        self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {number}"
+        keys = Mpu6050Keys.of(plan.settings)
         self._zero_rad_per_s: float | None = None
-        with device_errors(self._name):
-            self._bus = bus = hardware.i2c(number)
-            identity = bus.read_byte_data(self._address, _WHO_AM_I)
-            if identity != _IDENTITY:
-                raise RobotError(
-                    f"{self._name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
-                    f"not 0x{_IDENTITY:02x}."
-                )
-            bus.write_byte_data(self._address, _PWR_MGMT_1, _AWAKE)
-            bus.write_byte_data(self._address, _CONFIG, _LOW_PASS_44_HZ)
-            bus.write_byte_data(self._address, _GYRO_CONFIG, _RANGE_500_DEG_PER_S)
-            bus.write_byte_data(self._address, _ACCEL_CONFIG, _RANGE_4_G)
+        self._device = device = I2cDevice(f"Sensor {plan.name!r}", keys, hardware)
+        (identity,) = device.read(_WHO_AM_I)
+        if identity != _IDENTITY:
+            raise RobotError(
+                f"{device.name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
+                f"not 0x{_IDENTITY:02x}."
+            )
+        device.write(_PWR_MGMT_1, _AWAKE)
+        device.write(_CONFIG, _LOW_PASS_44_HZ)
+        device.write(_GYRO_CONFIG, _RANGE_500_DEG_PER_S)
+        device.write(_ACCEL_CONFIG, _RANGE_4_G)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return acceleration forward and left in m/s², and yaw rate to the left in rad/s.
@@ -81,11 +78,10 @@ class Mpu6050:
         Raises:
             RobotError: If it does not respond, or sleeps, as after a loss of power.
         """
-        with device_errors(self._name):
-            data = self._bus.read_i2c_block_data(self._address, _ACCEL_XOUT_H, 14)
-        x, y, z, _, _, _, yaw = struct.unpack(">7h", bytes(data))
+        measured = self._device.read(_ACCEL_XOUT_H, _MEASURED.size)
+        x, y, z, _, _, _, yaw = _MEASURED.unpack(measured)
         if x == y == z == 0:  # Not even gravity is measured.
-            raise RobotError(f"{self._name} is asleep: it lost power for a moment.")
+            raise RobotError(f"{self._device.name} is asleep: it lost power for a moment.")
         rate = yaw * _RAD_PER_S
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
             zero = rate if self._zero_rad_per_s is None else self._zero_rad_per_s
@@ -98,11 +94,10 @@ class Mpu6050:
 
     def close(self) -> None:
         """Close the bus."""
-        self._bus.close()
+        self._device.close()
 
 
 _GYRO_ZOUT_L: Final = 0x48
-_MEASURED: Final = struct.Struct(">7h")  # Acceleration, temperature, rate of turn.
 _RESET: Final = 0x80  # PWR_MGMT_1.
 _SLEEP: Final = 0x40
 
@@ -163,10 +158,10 @@ class SimulatedMpu6050(SimulatedChip):
         _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *words)
 
 
-def _simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
-    at = plan.settings["bus"], plan.settings["address"]
-    return SimulatedSensor({at: SimulatedMpu6050(world)})
-
-
-MPU6050: Final = SensorChip(measures="imu", keys=Mpu6050Keys, open=Mpu6050, simulate=_simulate)
+MPU6050: Final = SensorChip(
+    measures="imu",
+    keys=Mpu6050Keys,
+    open=Mpu6050,
+    simulate=simulated_at_address(SimulatedMpu6050),
+)
 """An inertial sensor."""

@@ -8,16 +8,17 @@ input.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Annotated, Any, Final
+from weakref import WeakValueDictionary
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import PulseSource
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.chip import Claim, PulseSource, device_errors
+from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, i2c_claims
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin
 from shapechanger.robot.drivers.simulation import (
     DutyOf,
@@ -49,7 +50,7 @@ _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section
 _UNCHANGED_PER_CHECK: Final = 50
 
 
-class Pca9685Keys(Keys, frozen=True, kw_only=True):
+class Pca9685Keys(I2cKeys, frozen=True, kw_only=True):
     """Keys of a channel of a PCA9685.
 
     Attributes:
@@ -60,7 +61,6 @@ class Pca9685Keys(Keys, frozen=True, kw_only=True):
             output, it applies to the board. -1 for none.
     """
 
-    bus: BusNumber = 1
     address: Annotated[int, Meta(ge=0x40, le=0x7F)] = 0x40
     channel: Annotated[int, Meta(ge=0, le=15)]
     output_enable: OptionalPin = NO_PIN
@@ -87,36 +87,34 @@ class Pca9685:
     if there is a pin for it, until all channels have been rewritten.
     """
 
-    def __init__(
-        self, hardware: Hardware, bus: int, address: int, hz: int, output_enable: int
-    ) -> None:
-        self.name = f"The PCA9685 at 0x{address:02x} on I2C bus {bus}"
+    def __init__(self, keys: Pca9685Keys, hz: int, hardware: Hardware) -> None:
         self.hz = hz
-        self.output_enable = output_enable
+        self.output_enable = keys.output_enable
         self.channels: set[int] = set()
-        self._hardware = hardware
-        self._address = address
+        self._wakes_up_s = _WAKE_UP_S if hardware.clock.is_real else 0.0
         self._prescale = prescale_for(hz)
         self._steps: dict[int, int] = {}  # By channel; missing for a channel in doubt.
         self._must_start = False
         self._unchanged = 0
         self._enable: Any = None
+        self._device = device = I2cDevice("The PCA9685", keys, hardware)
+        self.name = device.name
+        self._opened = ExitStack()
         with device_errors(self.name), ExitStack() as undo:
-            if output_enable >= 0:
+            undo.callback(device.close)
+            if keys.output_enable != NO_PIN:
                 from gpiozero import DigitalOutputDevice  # Boards without such a pin need none.
 
                 # OE is active low, and a resistor pulls it up until we drive it.
                 self._enable = DigitalOutputDevice(
-                    output_enable, active_high=False, pin_factory=hardware.pin_factory()
+                    keys.output_enable, active_high=False, pin_factory=hardware.pin_factory()
                 )
                 undo.callback(self._enable.close)
-            self._bus = hardware.i2c(bus)
-            undo.callback(self._bus.close)
             self._start()
             if self._enable is not None:
                 # Pulses left by a dead process must not return with the first pulse.
-                self._bus.write_byte_data(address, _ALL_OFF_H, _NO_PULSE >> 8)
-            undo.pop_all()
+                device.write(_ALL_OFF_H, _NO_PULSE >> 8)
+            self._opened = undo.pop_all()
 
     def step_us(self) -> float:
         """Width of one step, µs: 4.88 µs at 50 Hz."""
@@ -140,48 +138,44 @@ class Pca9685:
     def stop(self, channel: int) -> None:
         """Stop the pulses of a channel; after the last one, disable the outputs."""
         self._steps.pop(channel, None)
-        try:
+        with ExitStack() as stack:
+            stack.callback(self._write, channel, _NO_PULSE)
             if not self._sends():
                 self._switch(False)  # First, because a hanging bus takes a second to fail.
-        finally:
-            self._write(channel, _NO_PULSE)
 
     def leave(self, channel: int) -> None:
         """Remove a channel; the last one closes the chip."""
         self.channels.discard(channel)
         self._steps.pop(channel, None)
         if not self.channels:
-            self._bus.close()
-            if self._enable is not None:
-                self._enable.close()
+            self._opened.close()
 
     def _start(self) -> None:
-        bus, address = self._bus, self._address
-        mode = bus.read_byte_data(address, _MODE1)
-        asleep = mode & _SLEEP or bus.read_byte_data(address, _PRESCALE) != self._prescale
+        device = self._device
+        (mode,), (prescale,) = device.read(_MODE1), device.read(_PRESCALE)
+        asleep = mode & _SLEEP or prescale != self._prescale
         if asleep:
             # No pulses first, so that none restart with the oscillator.
-            bus.write_byte_data(address, _ALL_OFF_H, _NO_PULSE >> 8)
-            bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT | _SLEEP)
-            bus.write_byte_data(address, _PRESCALE, self._prescale)
-        bus.write_byte_data(address, _MODE2, _TOTEM_POLE)
-        bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT)
-        if asleep and self._hardware.clock.is_real:
-            time.sleep(_WAKE_UP_S)
+            device.write(_ALL_OFF_H, _NO_PULSE >> 8)
+            device.write(_MODE1, _AUTO_INCREMENT | _SLEEP)
+            device.write(_PRESCALE, self._prescale)
+        device.write(_MODE2, _TOTEM_POLE)
+        device.write(_MODE1, _AUTO_INCREMENT)
+        if asleep and self._wakes_up_s:
+            time.sleep(self._wakes_up_s)
         self._must_start = False
 
     def _check(self) -> None:
         """Check that the chip is awake."""
         with self._doubt_on_failure():
-            if self._bus.read_byte_data(self._address, _MODE1) & _SLEEP:
+            if self._device.read(_MODE1)[0] & _SLEEP:
                 raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
 
     def _write(self, channel: int, steps: int) -> None:
         with self._doubt_on_failure():
             if self._must_start:
                 self._start()
-            registers = [0, 0, steps & 0xFF, steps >> 8]
-            self._bus.write_i2c_block_data(self._address, _CHANNEL_0 + 4 * channel, registers)
+            self._device.write(_CHANNEL_0 + 4 * channel, 0, 0, steps & 0xFF, steps >> 8)
             self._steps[channel] = steps
             self._switch(self._sends() and self.channels <= self._steps.keys())
 
@@ -195,14 +189,12 @@ class Pca9685:
 
     @contextmanager
     def _doubt_on_failure(self) -> Generator[None]:
-        try:
-            with device_errors(self.name):
-                yield
-        except Exception:
-            self._steps.clear()
-            self._must_start = True
-            self._switch(False)
-            raise
+        with ExitStack() as failed:
+            failed.callback(self._switch, False)
+            failed.callback(setattr, self, "_must_start", True)
+            failed.callback(self._steps.clear)
+            yield
+            failed.pop_all()
 
 
 class Pca9685Channel:
@@ -210,70 +202,56 @@ class Pca9685Channel:
 
     def __init__(self, chip: Pca9685, channel: int) -> None:
         chip.channels.add(channel)
-        self._chip: Pca9685 | None = chip
+        self._chip = chip
         self._channel = channel
+        self._opened = ExitStack()
+        self._opened.callback(chip.leave, channel)
+        self._opened.callback(chip.stop, channel)
 
     def write_us(self, width_us: float) -> float:
         """Send pulses of this width, rounded to steps; see `PulseChannel.write_us`."""
-        chip = self._open_chip()
-        steps = min(max(round(width_us / chip.step_us()), 0), _STEPS - 1)
-        chip.send(self._channel, steps)
-        return steps * chip.step_us()
+        step_us = self._chip.step_us()
+        steps = min(max(round(width_us / step_us), 0), _STEPS - 1)
+        self._chip.send(self._channel, steps)
+        return steps * step_us
 
     def release(self) -> None:
         """Stop the pulses."""
-        self._open_chip().stop(self._channel)
+        self._chip.stop(self._channel)
 
     def close(self) -> None:
         """Stop the pulses and close, even if the chip does not respond."""
-        if (chip := self._chip) is not None:
-            try:
-                chip.stop(self._channel)
-            finally:
-                self._chip = None
-                chip.leave(self._channel)
-
-    def _open_chip(self) -> Pca9685:
-        if self._chip is None:
-            raise RobotError(f"Channel {self._channel} of a PCA9685 is closed.")
-        return self._chip
+        self._opened.close()
 
 
-# The chips that are open in this process, by hardware, bus and address.
-_OPEN: Final[dict[tuple[int, int, int], tuple[Hardware, Pca9685]]] = {}
+# The chips of this process, by hardware, bus and address, while a channel has them.
+_OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 
 
-def open_channel(settings: Mapping[str, Any], hardware: Hardware) -> Pca9685Channel:
+def open_channel(plan: OutputPlan, hardware: Hardware) -> Pca9685Channel:
     """Open a channel without pulses.
-
-    Args:
-        settings: Settings of the plan: bus, address, channel, frequency and enable pin.
-        hardware: The pins and buses of this robot.
 
     Raises:
         RobotError: If the chip does not respond, the channel is used twice, or another channel of
             the chip has another frequency or enable pin.
     """
-    bus, address, number = settings["bus"], settings["address"], settings["channel"]
-    hz, output_enable = settings["hz"], settings["output_enable"]
-    key = (id(hardware), bus, address)
-    _, chip = _OPEN.get(key, (hardware, None))
+    keys, hz = Pca9685Keys.of(plan.settings), plan.settings["hz"]
+    place = (hardware, keys.bus, keys.address)
+    chip = _OPEN.get(place)
     if chip is None or not chip.channels:
-        chip = Pca9685(hardware, bus, address, hz, output_enable)
-        _OPEN[key] = (hardware, chip)
-    if (chip.hz, chip.output_enable) != (hz, output_enable):
+        chip = _OPEN[place] = Pca9685(keys, hz, hardware)
+    if (chip.hz, chip.output_enable) != (hz, keys.output_enable):
         raise RobotError(
             f"{chip.name} has one frequency and one output_enable for all of its channels, not "
-            f"{chip.hz} and {hz} Hz, GPIO{chip.output_enable} and GPIO{output_enable}."
+            f"{chip.hz} and {hz} Hz, GPIO{chip.output_enable} and GPIO{keys.output_enable}."
         )
-    if number in chip.channels:
-        raise RobotError(f"Channel {number} of {chip.name} is used twice.")
-    channel = Pca9685Channel(chip, number)
-    try:
+    if keys.channel in chip.channels:
+        raise RobotError(f"Channel {keys.channel} of {chip.name} is used twice.")
+    channel = Pca9685Channel(chip, keys.channel)
+    with ExitStack() as undo:
+        undo.callback(chip.leave, keys.channel)  # A retry finds the channel free.
         channel.release()
-    except Exception:
-        chip.leave(number)  # A retry finds the channel free.
-        raise
+        undo.pop_all()
     return channel
 
 
@@ -369,20 +347,20 @@ class SimulatedPca9685(SimulatedChip):
         return (off - on) % _STEPS
 
 
-def _pulse_of(settings: Mapping[str, Any], duty: DutyOf) -> Callable[[Levels], float]:
-    channel = PwmChannel(*(settings[key] for key in ("bus", "address", "channel")))
+def _pulse_of(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
+    keys = Pca9685Keys.of(plan.settings)
+    channel = PwmChannel(keys.bus, keys.address, keys.channel)
 
     def pulse_us(levels: Levels) -> float:
-        enable = settings["output_enable"]
-        if enable >= 0 and duty(levels, enable) > 0.0:
+        if keys.output_enable != NO_PIN and duty(levels, keys.output_enable) > 0.0:
             return 0.0
         return levels.channels.get(channel, Pulse(0.0, 0.0)).us
 
     return pulse_us
 
 
-def _chips(settings: Mapping[str, Any]) -> I2cChips:
-    return {(settings["bus"], settings["address"]): SimulatedPca9685()}
+def _chips(plan: OutputPlan) -> I2cChips:
+    return {(plan.settings["bus"], plan.settings["address"]): SimulatedPca9685()}
 
 
 PCA9685: Final = PulseSource(keys=Pca9685Keys, open=open_channel, pulse_of=_pulse_of, chips=_chips)

@@ -1,25 +1,32 @@
-"""Pulses for servos and speed controllers: their widths and their sources."""
+"""Hobby servos and electronic speed controllers (ESC), and the sources of their pulses."""
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, ClassVar, Final, Literal
 
 from msgspec import Meta
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, PulseChannel, PulseSource
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import Claim, KeyMistake, Keys
+from shapechanger.robot.drivers.chip import (
+    OUTPUTS,
+    PULSES,
+    Claim,
+    KeyMistake,
+    Keys,
+    OutputChip,
+    PulseSource,
+    device_errors,
+)
 from shapechanger.robot.drivers.pins import Pin
-from shapechanger.robot.drivers.simulation import DutyOf, Levels, Pulse
+from shapechanger.robot.drivers.simulation import DutyOf, Levels, Pulse, WiredOutput
 from shapechanger.robot.hardware import Hardware
-
-_SECOND_US: Final = 1_000_000
 
 Width = Annotated[int, Meta(ge=500, le=2500)]
 """Width of a pulse, µs, that lgpio.tx_servo accepts; servos and controllers use no others."""
@@ -33,8 +40,7 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
         hz: Pulses per second; equal for all channels of a chip.
     """
 
-    widths: ClassVar[tuple[str, str, str]]
-    """Keys of the widths at -1, 0 and 1."""
+    widths: ClassVar[tuple[str, str, str]]  # Keys of the widths at -1, 0 and 1.
 
     over: str
     hz: Annotated[int, Meta(ge=40, le=400)] = 50
@@ -46,7 +52,7 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
         if not low < middle < high:
             ends = f"{self.widths[0]} and {self.widths[2]}, {low} and {high}"
             raise KeyMistake(self.widths[1], f"must lie between {ends}")
-        if high * self.hz >= _SECOND_US:
+        if high * self.hz >= 1_000_000:
             raise KeyMistake("hz", f"leaves no time for a pulse of {high} µs")
 
 
@@ -75,7 +81,8 @@ class PulseRange:
     @classmethod
     def of(cls, output: OutputPlan) -> PulseRange:
         """Return the pulse widths of a servo or a controller."""
-        return cls(*(output.settings[key] for key in OUTPUTS[output.driver].pulses))
+        chip = OUTPUTS[output.driver]
+        return cls(*(getattr(chip.keys.of(output.settings), key) for key in chip.pulses))
 
     def width_us(self, value: float) -> float:
         """Return the width for a value, which is clipped to -1 to 1."""
@@ -90,31 +97,11 @@ class PulseRange:
         return -(width_us - self.middle_us) / (self.low_us - self.middle_us)
 
 
-DEAD_BAND_US: Final = 20.0
-"""Dead band of a speed controller on each side of neutral; makers state 10 to 50."""
-
-
-def wired_pulse(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
-    """Return a reader of the width of an output's pulses on a twin, µs; 0 for no pulse."""
-    over = plan.settings["over"]
-    pulse_of = PULSES[over].pulse_of
-    if pulse_of is None:
-        has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_of)
-        raise RobotError(
-            f"Output {plan.name!r}: the twin has no servos over {over!r}; it has them over {has}."
-        )
-    return pulse_of(plan.settings, duty)
-
-
-def open_pulse_channel(settings: Mapping[str, Any], hardware: Hardware) -> PulseChannel:
-    """Open the source of pulses of an output, without sending any."""
-    return PULSES[settings["over"]].open(settings, hardware)
-
-
 class _WholeMicroseconds:
     """Channel with pulses of whole microseconds, sent only when they change."""
 
-    def __init__(self) -> None:
+    def __init__(self, pulse: Callable[[int], None]) -> None:
+        self._pulse = pulse
         self._width_us: int | None = None
 
     def write_us(self, width_us: float) -> float:
@@ -132,26 +119,21 @@ class _WholeMicroseconds:
             self._pulse(width_us)
             self._width_us = width_us
 
-    def _pulse(self, width_us: int) -> None:
-        raise NotImplementedError
-
 
 class _PinChannel(_WholeMicroseconds):
     """Pulses on a pin; see `ServoPins`."""
 
-    def __init__(self, pin: int, hz: int, hardware: Hardware) -> None:
-        super().__init__()
-        self._pin = pin
-        self._hz = hz
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        super().__init__(self._send_pulse)
+        self._pin: int = plan.settings["pin"]
+        self._hz: int = plan.settings["hz"]
         self._pins = hardware.servo_pins()
 
     def close(self) -> None:
-        try:
+        with closing(self._pins):
             self._send(0)
-        finally:
-            self._pins.close()
 
-    def _pulse(self, width_us: int) -> None:
+    def _send_pulse(self, width_us: int) -> None:
         self._pins.pulse(self._pin, width_us, self._hz)
 
 
@@ -165,16 +147,12 @@ class _LgpioKeys(Keys, frozen=True, kw_only=True):
     pin: Pin
 
 
-def _pulse_on_pin(settings: Mapping[str, Any], duty: DutyOf) -> Callable[[Levels], float]:
-    pin = settings["pin"]
+def _pulse_on_pin(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
+    pin = plan.settings["pin"]
     return lambda levels: levels.pulses.get(pin, Pulse(0.0, 0.0)).us
 
 
-LGPIO: Final = PulseSource(
-    keys=_LgpioKeys,
-    open=lambda settings, hardware: _PinChannel(settings["pin"], settings["hz"], hardware),
-    pulse_of=_pulse_on_pin,
-)
+LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_of=_pulse_on_pin)
 """Pulses on a pin, by lgpio."""
 
 
@@ -183,35 +161,28 @@ _EXPORT_S: Final = 1.0  # udev takes a moment to assign a new channel to the gro
 
 
 class SysfsPwm(_WholeMicroseconds):
-    """One channel of the PWM hardware; see `PulseChannel`.
+    """One channel of the PWM hardware; see `PulseChannel`."""
 
-    Args:
-        chip: Number of the PWM chip.
-        channel: Channel of the chip.
-        hz: Pulses per second.
-        root: Folder of the kernel's PWM chips.
-    """
-
-    def __init__(self, chip: int, channel: int, hz: int, root: Path = _ROOT) -> None:
-        super().__init__()
-        self._name = f"Channel {channel} of {root}/pwmchip{chip}"
-        self._folder = root / f"pwmchip{chip}" / f"pwm{channel}"
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        super().__init__(self._send_pulse)
+        keys = _SysfsKeys.of(plan.settings)
+        chip = _ROOT / f"pwmchip{keys.chip}"
+        self._name = f"Channel {keys.channel} of {chip}"
+        self._folder = chip / f"pwm{keys.channel}"
         with device_errors(self._name):
             if not self._folder.exists():
-                (self._folder.parent / "export").write_text(f"{channel}\n")
-            self._write_when_allowed("period", 1_000_000_000 // hz)
+                (chip / "export").write_text(f"{keys.channel}\n")
+            self._write_when_allowed("period", 1_000_000_000 // plan.settings["hz"])
             self._send(0)
             self._write("enable", 1)
 
     def close(self) -> None:
         """Stop the pulses and disable the channel."""
-        with device_errors(self._name):
-            try:
-                self._send(0)
-            finally:
-                self._write("enable", 0)
+        with device_errors(self._name), ExitStack() as stack:
+            stack.callback(self._write, "enable", 0)
+            self._send(0)
 
-    def _pulse(self, width_us: int) -> None:
+    def _send_pulse(self, width_us: int) -> None:
         with device_errors(self._name):
             self._write("duty_cycle", width_us * 1000)
 
@@ -245,8 +216,285 @@ class _SysfsKeys(Keys, frozen=True, kw_only=True):
         yield Claim("channel", f"channel {self.channel} of PWM chip {self.chip}")
 
 
-SYSFS: Final = PulseSource(
-    keys=_SysfsKeys,
-    open=lambda settings, _: SysfsPwm(settings["chip"], settings["channel"], settings["hz"]),
-)
+SYSFS: Final = PulseSource(keys=_SysfsKeys, open=SysfsPwm)
 """Pulses of the kernel's PWM."""
+
+
+# Dead band of a speed controller on each side of neutral, µs; makers state 10 to 50.
+_DEAD_BAND_US: Final = 20.0
+
+_LIT_PIN: Final = (("pin", ", dimly", 1.0),)
+
+
+class _PulsedOutput:
+    """An output that takes pulses; see `OutputDriver`."""
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        self._name = f"Output {plan.name!r}"
+        self._pulses = PulseRange.of(plan)
+        with device_errors(self._name):
+            self._channel = PULSES[plan.settings["over"]].open(plan, hardware)
+
+    def release(self) -> None:
+        """Stop the pulses, which releases most servos."""
+        with device_errors(self._name):
+            self._channel.release()
+
+    def close(self) -> None:
+        """Stop the pulses and close the channel."""
+        with device_errors(self._name):
+            self._channel.close()
+
+    def _send(self, value: float) -> float:
+        """Send the pulse of a value, and return the value of the applied pulse."""
+        with device_errors(self._name):
+            width_us = self._channel.write_us(self._pulses.width_us(value))
+        return self._pulses.value(width_us)
+
+
+def _wired_pulse(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
+    """Return a reader of the width of an output's pulses on a twin, µs; 0 for no pulse."""
+    over = plan.settings["over"]
+    pulse_of = PULSES[over].pulse_of
+    if pulse_of is None:
+        has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_of)
+        raise RobotError(
+            f"Output {plan.name!r}: the twin has no servos over {over!r}; it has them over {has}."
+        )
+    return pulse_of(plan, duty)
+
+
+_DEG_PER_VALUE: Final = 90.0  # Assumed travel from end to end, a value of 2: 180 degrees.
+
+
+class ServoKeys(PulsedKeys, frozen=True, kw_only=True):
+    """Keys of a servo.
+
+    Attributes:
+        left_us: Pulse width at -1; larger than `right_us` for one that turns the other way.
+        centre_us: Pulse width at 0.
+        right_us: Pulse width at 1.
+        travel_deg_per_s: Largest speed; infinite for no limit. A servo is assumed to turn by 180
+            degrees from end to end; for one that turns by 90, double the speed.
+    """
+
+    widths: ClassVar = ("left_us", "centre_us", "right_us")
+    left_us: Width = 1000
+    centre_us: Width = 1500
+    right_us: Width = 2000
+    travel_deg_per_s: Annotated[float, Meta(gt=0)] = math.inf
+
+
+class ServoDriver(_PulsedOutput):
+    """Servo; see `OutputDriver`. It gets no pulse before the first position."""
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        super().__init__(plan, hardware)
+        self._speed_per_s = ServoKeys.of(plan.settings).travel_deg_per_s / _DEG_PER_VALUE
+        self._value: float | None = None
+        self._written_ns = 0
+
+    def write(self, value: float, now_ns: int) -> float:
+        """Move towards a position at the permitted speed; see `OutputDriver.write`."""
+        value = min(max(value, -1.0), 1.0)
+        if self._value is not None and math.isfinite(self._speed_per_s):
+            most = self._speed_per_s * (now_ns - self._written_ns) / 1e9
+            value = min(max(value, self._value - most), self._value + most)
+        applied = self._send(value)
+        self._value, self._written_ns = value, now_ns
+        return applied
+
+    def release(self) -> None:
+        """Stop the pulses, after which the next position is reached at any speed."""
+        self._value = None
+        super().release()
+
+
+def _wired_servo(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    pulses, pulse_us = PulseRange.of(plan), _wired_pulse(plan, duty)
+    tolerance = _DEAD_BAND_US / abs(pulses.high_us - pulses.middle_us)
+
+    def state(levels: Levels) -> WiredOutput:
+        if not (us := pulse_us(levels)):
+            return WiredOutput(None, True)
+        value = max(-1.0, min(1.0, pulses.value(us)))
+        return WiredOutput(value, abs(value - rest) <= tolerance)
+
+    return state
+
+
+SERVO: Final = OutputChip(
+    keys=ServoKeys,
+    open=ServoDriver,
+    wire=_wired_servo,
+    pulses=ServoKeys.widths,
+    lights=_LIT_PIN,
+    differs="it turns no faster than its profile allows",
+)
+"""A hobby servo."""
+
+
+class EscKeys(PulsedKeys, frozen=True, kw_only=True):
+    """Keys of a speed controller.
+
+    Attributes:
+        backward_us: Pulse width at full reverse.
+        neutral_us: Pulse width at rest.
+        forward_us: Pulse width at full speed.
+        arm_s: Time at neutral before it obeys, s.
+        reverse: "double" for one that brakes at the first pulse backward and reverses at the
+            second, "none" for one without reverse.
+        brake_ms: How long "double" brakes, and then waits at neutral, ms.
+    """
+
+    widths: ClassVar = ("backward_us", "neutral_us", "forward_us")
+    backward_us: Width = 1000
+    neutral_us: Width = 1500
+    forward_us: Width = 2000
+    arm_s: Annotated[float, Meta(ge=0, le=30)] = 2.5
+    reverse: Literal["direct", "double", "none"] = "direct"
+    brake_ms: Annotated[int, Meta(ge=0, le=2000)] = 200
+
+
+class Esc(_PulsedOutput):
+    """Electronic speed controller; see `OutputDriver`.
+
+    It arms after some time at neutral, until which only neutral is sent. A car's controller brakes
+    at the first pulse below neutral and reverses at the second: `reverse` "double" sends brake,
+    neutral and reverse in sequence. Pulses at neutral or above are sent at once.
+    """
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        keys = EscKeys.of(plan.settings)
+        super().__init__(plan, hardware)
+        self._reverse = keys.reverse
+        self._arm_ns = round(keys.arm_s * 1e9)
+        self._brake_ns = keys.brake_ms * 1_000_000
+        self._neutral_since_ns: int | None = None
+        self._backward_since_ns: int | None = None
+        self._reverses = False
+        with ExitStack() as undo:
+            undo.callback(self._channel.close)
+            self._send(0.0)
+            undo.pop_all()
+
+    def write(self, value: float, now_ns: int) -> float:
+        """Write a throttle and return the applied one; see `OutputDriver.write`."""
+        if self._neutral_since_ns is None:
+            self._neutral_since_ns = now_ns
+        if now_ns - self._neutral_since_ns < self._arm_ns:
+            return self._send(0.0)
+        if value < 0.0:
+            return self._backward(value, now_ns)
+        self._backward_since_ns = None
+        if value > 0.0:
+            self._reverses = False  # After forward motion it brakes first.
+        return self._send(value)
+
+    def release(self) -> None:
+        """Stop the pulses; the controller then has to see neutral again."""
+        self._neutral_since_ns = self._backward_since_ns = None
+        self._reverses = False
+        super().release()
+
+    def _backward(self, value: float, now_ns: int) -> float:
+        if self._reverse == "none":
+            return self._send(0.0)
+        if self._reverse == "direct" or self._reverses:
+            return self._send(value)
+        if self._backward_since_ns is None:
+            self._backward_since_ns = now_ns
+        since_ns = now_ns - self._backward_since_ns
+        if since_ns < self._brake_ns:
+            self._send(value)
+            return 0.0  # It brakes and does not reverse.
+        if since_ns < 2 * self._brake_ns:
+            return self._send(0.0)
+        self._reverses = True
+        return self._send(value)
+
+    def _send(self, value: float) -> float:
+        # Neutral reads as 0, even if the pulse steps do not hit it exactly.
+        applied = super()._send(value)
+        return applied if value else 0.0
+
+
+def _wired_esc(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    pulses, pulse_us = PulseRange.of(plan), _wired_pulse(plan, duty)
+
+    def state(levels: Levels) -> WiredOutput:
+        us = pulse_us(levels)
+        if not us:
+            return WiredOutput(None, True)
+        if abs(us - pulses.middle_us) <= _DEAD_BAND_US:
+            return WiredOutput(0.0, True)
+        return WiredOutput(max(-1.0, min(1.0, pulses.value(us))), False)
+
+    return state
+
+
+# A controller arms a little earlier than its driver expects.
+_ARM_SHARE: Final = 0.8
+
+
+class SpeedController:
+    """Hobby speed controller: turns the value of its pulses into the motor's.
+
+    With `reverse` "double" the first backward pulses after driving forward brake; only those after
+    another neutral drive backward.
+
+    Args:
+        plan: Its output.
+    """
+
+    def __init__(self, plan: OutputPlan) -> None:
+        keys = EscKeys.of(plan.settings)
+        self._reverse = keys.reverse
+        self._arm_ns = keys.arm_s * 1e9 * _ARM_SHARE
+        self._neutral_since_ns: int | None = None
+        self._armed = False
+        self._braked = False
+        self._reverses = False
+
+    def __call__(self, value: float | None, now_ns: int) -> float:
+        """Return the value for the motor, -1 to 1.
+
+        Args:
+            value: Value of the pulses, -1 to 1; None without pulses or power, when it stops and
+                must see neutral again.
+            now_ns: Time, ns.
+        """
+        if value is None:
+            self._neutral_since_ns = None
+            self._armed = self._braked = self._reverses = False
+            return 0.0
+        if value == 0.0:
+            if self._neutral_since_ns is None:
+                self._neutral_since_ns = now_ns
+            self._armed = self._armed or now_ns - self._neutral_since_ns >= self._arm_ns
+            self._reverses = self._reverses or self._braked
+            return 0.0
+        self._neutral_since_ns = None
+        if not self._armed:
+            return 0.0
+        if value > 0.0:
+            self._braked = self._reverses = False
+            return value
+        if self._reverse == "direct" or (self._reverse == "double" and self._reverses):
+            return value
+        self._braked = True
+        return 0.0
+
+
+ESC: Final = OutputChip(
+    keys=EscKeys,
+    open=Esc,
+    wire=_wired_esc,
+    unpowered=WiredOutput(None, True),
+    obeys=SpeedController,
+    pulses=EscKeys.widths,
+    lights=_LIT_PIN,
+    differs="its controller waits, brakes or changes direction",
+    drives=True,
+)
+"""A hobby speed controller."""

@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
-from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import Keys
-from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.chip import Keys, SensorChip, device_errors
+from shapechanger.robot.drivers.pins import EdgeInput, Pin
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -35,15 +32,13 @@ class Switch:
     """One or more switches; see `SensorDriver`. Pushes between two reads are not missed."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        pull = plan.settings["pull"]
+        keys = SwitchKeys.of(plan.settings)
         self._name = f"Sensor {plan.name!r}"
-        self._pressed_level = 0 if pull == "up" else 1
+        self._pressed_level = int(keys.pull == "down")
         self._was_pressed = False
         with device_errors(self._name):
             factory = hardware.pin_factory()
-            self._inputs = [
-                EdgeInput(pin, pull, factory, self._changed) for pin in plan.settings["pins"]
-            ]
+            self._inputs = [EdgeInput(p, keys.pull, factory, self._changed) for p in keys.pins]
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return "bump", 1 if any switch is or was pressed since the last read, else 0."""
@@ -75,8 +70,9 @@ class SimulatedSwitch(SimulatedSensor):
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
-        self._pins: list[int] = plan.settings["pins"]
-        self._open = int(plan.settings["pull"] == "up")
+        keys = SwitchKeys.of(plan.settings)
+        self._pins = keys.pins
+        self._open = int(keys.pull == "up")
         self._pressed = False
         self.held = False
         super().__init__(levels=self._levels())

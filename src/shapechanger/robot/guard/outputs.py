@@ -7,18 +7,15 @@ import importlib
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import (
-    OUTPUTS,
-    PULSES,
-    OutputDriver,
-    SharedDevice,
-    open_output,
-)
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, OutputDriver
 from shapechanger.robot.hardware import REAL, Hardware, load
+
+if TYPE_CHECKING:  # Most robots have none.
+    from shapechanger.robot.drivers.servos.bus import ServoBus
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
@@ -138,7 +135,7 @@ class OutputBank:
         self.values = {output.name: 0.0 for output in plan.outputs}
         with ExitStack() as undo:
             for output in plan.outputs:
-                driver = open_output(output, hardware)
+                driver = OUTPUTS[output.driver].open(output, hardware)
                 undo.callback(driver.close)
                 self._drivers.append((output, driver))
             self._devices = _devices(driver for _, driver in self._drivers)
@@ -214,11 +211,11 @@ class OutputBank:
         return failures
 
 
-def _devices(drivers: Iterable[OutputDriver]) -> list[SharedDevice]:
-    """Return the distinct devices that the drivers share."""
-    found: list[SharedDevice] = []
+def _devices(drivers: Iterable[OutputDriver]) -> list[ServoBus]:
+    """Return the servo buses that the drivers share, to which their attribute `device` refers."""
+    found: list[ServoBus] = []
     for driver in drivers:
-        device: SharedDevice | None = getattr(driver, "device", None)
+        device: ServoBus | None = getattr(driver, "device", None)
         if device is not None and device not in found:
             found.append(device)
     return found
@@ -248,7 +245,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
         if OUTPUTS[output.driver].stops_itself:
             continue
         with errors_noted(failures, f"Output {output.name}"):
-            opened.append((output.name, open_output(output, hardware)))
+            opened.append((output.name, OUTPUTS[output.driver].open(output, hardware)))
     # Closed only when all are at rest: lgpio takes 100 ms for each handle that it closes.
     for name, driver in opened:
         with errors_noted(failures, f"Output {name}"):

@@ -11,7 +11,7 @@ from typing import Final
 
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
+from shapechanger.robot.drivers.chip import SENSORS, SensorDriver
 from shapechanger.robot.hardware import Hardware
 
 # Larger is more cautious, and the most cautious reading wins: of two speeds the smaller, so that a
@@ -95,7 +95,8 @@ class Sensors:
         with contextlib.ExitStack() as undo:
             undo.callback(self.close)
             for sensor in plan.sensors:
-                self._drivers.append((sensor.name, open_sensor(sensor, hardware)))
+                driver = SENSORS[sensor.driver].open(sensor, hardware)
+                self._drivers.append((sensor.name, driver))
             undo.pop_all()
 
     def read(self, now_ns: int, direction: float) -> Sensing:

@@ -14,8 +14,7 @@ from msgspec import Meta
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.chip import SENSORS
-from shapechanger.robot.drivers.keys import Text
+from shapechanger.robot.drivers.chip import SENSORS, Text
 
 _INF: Final = math.inf
 # Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the

@@ -15,8 +15,7 @@ from msgspec import Meta
 from shapechanger.contract.plan import ActionPlan, LimitPlan, OutputPlan, SensorPlan, StopPlan
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
-from shapechanger.robot.drivers.keys import FilePath, Keys
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS, FilePath, Keys
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.drivers.servos.settings import ServoBusKeys
 from shapechanger.robot.profile.profile import CommandTable, Profile, ResetStep, RobotTable

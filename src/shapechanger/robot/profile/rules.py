@@ -11,8 +11,7 @@ from typing import Any, Final, get_args
 
 from shapechanger.contract.plan import DrivingPart, OutputPlan
 from shapechanger.errors import translate_errors
-from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
-from shapechanger.robot.drivers.keys import Claim, KeyMistake
+from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS, Claim, KeyMistake
 from shapechanger.robot.drivers.pins import NO_PIN
 from shapechanger.robot.drivers.servos.settings import (
     DRIVER,

@@ -18,7 +18,7 @@ import msgspec
 from msgspec import inspect
 
 from shapechanger.errors import ProfileError
-from shapechanger.robot.drivers.keys import KeyMistake, Keys
+from shapechanger.robot.drivers.chip import KeyMistake, Keys
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin, bcm
 
 Place = tuple[str | int, ...]

@@ -10,10 +10,10 @@ from typing import Any, Final, Literal
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
+from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, As5600
 from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.pulse import PulseRange
-from shapechanger.robot.drivers.servos.bus import BusState, open_bus
+from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
 from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_settings
 from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
@@ -112,15 +112,15 @@ def find_joint_zeros(
     zeros: dict[str, int] = {}
     counts_per_rad = COUNTS_PER_TURN / (2.0 * math.pi)
     for sensor in (one for one in plan.sensors if one.driver == "as5600"):
-        with closing(connect_encoders(sensor, hardware)) as opened:
-            for encoder in opened.encoders:
+        with closing(As5600(sensor, hardware)) as opened:
+            for joint in opened.joints:
                 # The mean direction: the mean of counts around 0 would be half a turn.
                 mean = 0j
                 for _ in range(_READINGS):
-                    mean += cmath.exp(1j * opened.counts(encoder) / counts_per_rad)
+                    mean += cmath.exp(1j * opened.counts(joint) / counts_per_rad)
                     wait()
                 counts = round(cmath.phase(mean) * counts_per_rad) % COUNTS_PER_TURN
-                zeros[f"{sensor.name}.{encoder.joint}"] = counts
+                zeros[f"{sensor.name}.{joint}"] = counts
     return zeros
 
 
@@ -215,7 +215,7 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
     require_homing(settings)
     with (
         closing(Switches(plan, hardware)) as switches,
-        closing(open_bus(settings, hardware)) as bus,
+        closing(ServoBus(settings, hardware)) as bus,
     ):
 
         def cycle(tensions: Mapping[str, float]) -> BusState:
@@ -228,6 +228,7 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
         for _ in range(_START_TICKS if plan.enable_pin is not None else 0):
             switches.toggle()
             wait()
+        bus.open()
         bus.set_up(switches.toggle)
         bus.hold()
         return home(settings, cycle)

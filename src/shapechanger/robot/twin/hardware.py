@@ -110,14 +110,6 @@ class TwinBus:
         """Send one byte, which on the bus is a register without data."""
         self.write_i2c_block_data(i2c_addr, value, [])
 
-    def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """Read one register."""
-        return self.read_i2c_block_data(i2c_addr, register, 1)[0]
-
-    def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        """Write one register."""
-        self.write_i2c_block_data(i2c_addr, register, [value])
-
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         """Read several bytes, starting at one register."""
         return self._board.ask(list[int], "read_chip", self._bus, i2c_addr, register, length)

@@ -11,7 +11,7 @@ from shapechanger.contract.world import RESTING_V
 from shapechanger.errors import RobotError, WorldError, translate_errors
 from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
-from shapechanger.robot.drivers.servos.rig import ServoFault
+from shapechanger.robot.drivers.servos.simulation import ServoFault
 from shapechanger.robot.drivers.simulation import Levels
 from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.twin.camera import CameraFault

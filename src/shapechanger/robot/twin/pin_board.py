@@ -17,8 +17,8 @@ from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.drivers.servos.rig import Rig
-from shapechanger.robot.drivers.servos.settings import DRIVER
+from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
+from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.drivers.simulation import (
     Edge,
     Levels,
@@ -100,8 +100,14 @@ class PinBoard:
         self._inputs = {pin: level for one in self._sensors for pin, level in one.levels.items()}
         if plan.stop_pin is not None:
             self._inputs[plan.stop_pin] = 1  # A button to ground, with a pull-up.
-        has_bus = any(output.driver == DRIVER for output in plan.outputs)
-        self.rig = Rig(plan.outputs, world) if has_bus else None
+        self.rig: Rig | None = None
+        self._switches_rig = False
+        if servos := [output for output in plan.outputs if output.driver == DRIVER]:
+            settings = bus_settings(servos)
+            self.rig = Rig(settings, world)
+            # Without watchdogs, the power of the servos comes from the enable line.
+            self._switches_rig = not settings.family.has_watchdog
+            self.rig.set_power(on=not self._switches_rig)
         self._obeys = {
             one.name: obeys(one)
             for one in plan.outputs
@@ -111,7 +117,7 @@ class PinBoard:
         for output in plan.outputs:
             if over := output.settings.get("over"):
                 # Channels of one board share it.
-                self._chips = {**PULSES[over].chips(output.settings), **self._chips}
+                self._chips = {**PULSES[over].chips(output), **self._chips}
         for sensor in self._sensors:
             self._chips.update(sensor.chips)
         for at, chip in self._chips.items():
@@ -127,10 +133,10 @@ class PinBoard:
         start_ns = self._now_ns
         if now_ns > start_ns:
             if self.rig is not None:
-                if self.rig.is_switched:
+                if self._switches_rig:
                     ends_ns = self._wiring.power_ends_ns(self.levels)
-                    self.rig.bus.set_power(on=ends_ns is None or now_ns < ends_ns)
-                self.rig.bus.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
+                    self.rig.set_power(on=ends_ns is None or now_ns < ends_ns)
+                self.rig.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
             self.world.advance((now_ns - start_ns) / 1e9, self._parts())
             self._now_ns = now_ns
         seen = self.world.inputs()
@@ -236,11 +242,11 @@ class PinBoard:
 
     def read_servos(self, device: str, ids: list[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of servos, and return their replies by id."""
-        return self._rig_at(device).bus.read(ids, at, size)
+        return self._rig_at(device).read(ids, at, size)
 
     def write_servos(self, device: str, data: dict[int, bytes], at: int) -> dict[int, ServoReply]:
         """Write bytes of servos, and return their replies by id."""
-        return self._rig_at(device).bus.write(data, at)
+        return self._rig_at(device).write(data, at)
 
     def free(self, caller: BoardConnection, died: bool) -> None:
         """Free the pins of a process that has ended; outputs keep their level of that moment.
@@ -277,7 +283,8 @@ class PinBoard:
 
     def _rig_at(self, device: str) -> Rig:
         rig = self.require_rig()
-        rig.require(device)
+        if device != rig.device:
+            raise RobotError(f"There is no {device} at this twin, only {rig.device}.")
         return rig
 
     def _update_channels(self, at: tuple[int, int], chip: SimulatedChip) -> list[tuple[int, Pulse]]:

@@ -92,7 +92,8 @@ class Awake(NamedTuple):
     edges: list[Edge]
 
 
-encode = msgspec.msgpack.encode
+# The keys of a chip have their pins as integers of a class of their own, `Pin`.
+encode: Callable[[object], bytes] = msgspec.msgpack.Encoder(enc_hook=int).encode
 _decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
 _decode_reply: Callable[[bytes], Reply] = msgspec.msgpack.Decoder(Reply).decode
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
+from shapechanger.contract.world import World
 from shapechanger.layout import Element, Feature
 from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import I2cKeys
-from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
+from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, simulated_at_address
+from shapechanger.robot.drivers.simulation import SimulatedChip
 from shapechanger.robot.hardware import Hardware
-
-if TYPE_CHECKING:
-    from shapechanger.contract.world import World
 
 _MEASURE = 0x10  # Continuously, in steps of 1/1.2 lx.
 _COUNTS_PER_LUX = 1.2
@@ -33,29 +30,28 @@ class Bh1750:
     """Light sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        self._name, self._address = plan.name, plan.settings["address"]
-        self._bus = hardware.i2c(plan.settings["bus"])
+        self._name = plan.name
+        keys = Bh1750Keys.of(plan.settings)
+        self._device = I2cDevice(f"Sensor {plan.name!r}", keys, hardware)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the light, lx."""
-        with device_errors(f"Sensor {self._name!r}"):
-            high, low = self._bus.read_i2c_block_data(self._address, _MEASURE, 2)
-        return {f"{self._name}/light": (high << 8 | low) / _COUNTS_PER_LUX}
+        counts = int.from_bytes(self._device.read(_MEASURE, 2))
+        return {f"{self._name}/light": counts / _COUNTS_PER_LUX}
 
     def close(self) -> None:
-        self._bus.close()
+        self._device.close()
 
 
 class SimulatedBh1750(SimulatedChip):
     """A BH1750 in constant light."""
 
+    def __init__(self, world: World) -> None:
+        """Take no notice of the world."""
+
     def read(self, register: int, length: int) -> list[int]:
         """Return the measurement."""
         return list(round(LUX * _COUNTS_PER_LUX).to_bytes(length, "big"))
-
-
-def _simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
-    return SimulatedSensor({(plan.settings["bus"], plan.settings["address"]): SimulatedBh1750()})
 
 
 def _features(plan: SensorPlan) -> list[Feature]:
@@ -63,5 +59,9 @@ def _features(plan: SensorPlan) -> list[Feature]:
 
 
 CHIP = SensorChip(
-    measures="light", keys=Bh1750Keys, open=Bh1750, simulate=_simulate, features=_features
+    measures="light",
+    keys=Bh1750Keys,
+    open=Bh1750,
+    simulate=simulated_at_address(SimulatedBh1750),
+    features=_features,
 )

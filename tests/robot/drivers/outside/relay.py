@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from shapechanger.contract.plan import OutputPlan
-from shapechanger.robot.drivers.chip import OutputChip
-from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.chip import Keys, OutputChip, device_errors
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
 from shapechanger.robot.hardware import Hardware
@@ -25,9 +23,10 @@ class Relay:
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         from gpiozero import DigitalOutputDevice
 
+        keys = RelayKeys.of(plan.settings)
         with device_errors(f"Output {plan.name!r}"):
             factory = hardware.pin_factory()
-            self._coil = DigitalOutputDevice(plan.settings["pin"], pin_factory=factory)
+            self._coil = DigitalOutputDevice(keys.pin, pin_factory=factory)
 
     def write(self, value: float, now_ns: int) -> float:
         """Switch the relay."""
@@ -45,8 +44,10 @@ class Relay:
 
 
 def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    keys = RelayKeys.of(plan.settings)
+
     def state(levels: Levels) -> WiredOutput:
-        value = duty(levels, plan.settings["pin"])
+        value = duty(levels, keys.pin)
         return WiredOutput(value, value == rest)
 
     return state

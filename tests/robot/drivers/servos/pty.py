@@ -7,10 +7,9 @@ import os
 import select
 import threading
 import tty
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
-from shapechanger.robot.drivers.servos.rig import SimulatedBus
+from shapechanger.robot.drivers.servos.simulation import Rig
 from tests.robot.drivers.servos import wire
 
 _CHUNK: Final = 4096
@@ -32,7 +31,7 @@ class ServoPty:
         lock: Lock of the bus.
     """
 
-    def __init__(self, bus: SimulatedBus) -> None:
+    def __init__(self, bus: Rig) -> None:
         self.bus = bus
         self.lock = threading.Lock()
         self._host, self._far = os.openpty()
@@ -44,28 +43,14 @@ class ServoPty:
         self._thread.start()
 
     def advance(self, ns: int) -> None:
-        """Advance the time of the bus."""
         with self.lock:
             self.bus.advance(ns)
 
     def close(self) -> None:
-        """Stop the thread and close the device."""
-        if self._thread.is_alive():
-            os.write(self._wake_out, b"x")
-            self._thread.join()
-            for fd in (self._host, self._far, self._wake_in, self._wake_out):
-                os.close(fd)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
+        os.write(self._wake_out, b"x")
+        self._thread.join()
+        for fd in (self._host, self._far, self._wake_in, self._wake_out):
+            os.close(fd)
 
     def _run(self) -> None:
         data = b""

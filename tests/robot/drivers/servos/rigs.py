@@ -9,10 +9,11 @@ from dynamixel_sdk import PortHandler
 from msgspec.structs import replace
 
 from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
-from shapechanger.robot.drivers.servos.rig import SimulatedBus
 from shapechanger.robot.drivers.servos.serial_port import SerialServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
-from shapechanger.robot.drivers.servos.simulation import ServoPlan, SimulatedServo
+from shapechanger.robot.drivers.servos.simulation import Rig as Line
+from shapechanger.robot.drivers.servos.simulation import SimulatedServo
+from tests.robot.drivers.fakes import FakeHardware
 from tests.robot.drivers.servos import wire
 
 NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
@@ -25,7 +26,6 @@ MODEL = "XL330-M077"
 
 
 def servo(name: str, **changes: Any) -> ServoSettings:
-    """Return the settings of one servo."""
     plain = ServoSettings(
         name=name,
         id=NAMES.index(name) + 1,
@@ -46,7 +46,6 @@ def feetech(name: str, **changes: Any) -> ServoSettings:
 
 
 def settings(**changes: Any) -> BusSettings:
-    """Return the settings of the bus."""
     return replace(
         BusSettings(device="the twin", servos=tuple(servo(name) for name in NAMES)), **changes
     )
@@ -73,7 +72,7 @@ class FaultyPort(PortHandler):
         received: Number of bytes that the servos have answered.
     """
 
-    def __init__(self, line: SimulatedBus) -> None:
+    def __init__(self, line: Line) -> None:
         super().__init__("the twin")
         self._line = line
         self._arrived = bytearray()
@@ -85,16 +84,13 @@ class FaultyPort(PortHandler):
         self.received = 0
 
     def inject(self, data: bytes) -> None:
-        """Add bytes to the receive buffer."""
         self._arrived += data
 
     def clearPort(self) -> None:
-        """Discard the receive buffer."""
         self.getBytesAvailable()
         self._arrived.clear()
 
     def writePort(self, packet: Sequence[int]) -> int:
-        """Send a packet."""
         self.getBytesAvailable()
         self.sent.append(bytes(packet))
         if not self.is_cut:
@@ -108,7 +104,6 @@ class FaultyPort(PortHandler):
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
-        """Return at most `length` received bytes."""
         self.getBytesAvailable()
         data = bytes(self._arrived[: max(length, 0)])
         del self._arrived[: max(length, 0)]
@@ -131,33 +126,36 @@ class FaultyPort(PortHandler):
         return len(self._arrived)
 
     def closePort(self) -> None:
-        """Record that the port was closed."""
         self.is_closed = True
 
 
-class Rig:
+def line(*servos: ServoSettings) -> Line:
+    """Return a simulated bus with these servos; a Dynamixel without any."""
+    return Line(settings(servos=servos or (servo("FDP"),)))
+
+
+class Rig(FakeHardware):
     """A simulated bus, its port and its driver on one clock.
 
     Args:
         bus: Settings of the bus.
-        plans: Simulated servos; None for one per servo of the settings.
+        wired: Servos that are on the bus; None for those of the settings.
     """
 
     def __init__(
-        self, bus: BusSettings | None = None, plans: list[ServoPlan] | None = None
+        self, bus: BusSettings | None = None, wired: Sequence[ServoSettings] | None = None
     ) -> None:
+        super().__init__()
         self.settings = settings() if bus is None else bus
-        if plans is None:
-            plans = [
-                ServoPlan(s.id, s.model, direction=s.direction, angle=2.0 * s.id)
-                for s in self.settings.servos
-            ]
-        self.line = SimulatedBus(plans)
+        # Anywhere: each servo is some turns away from its position 0.
+        there = [replace(one, zero=1304 * one.id) for one in wired or self.settings.servos]
+        self.line = line(*there)
         self.port = FaultyPort(self.line)
-        self.bus = ServoBus(self.settings, self._open())
+        self.bus = ServoBus(self.settings, self)
+        self.bus.open()
 
-    def _open(self) -> SerialServoPort:
-        return SerialServoPort(self.port, self.settings.device, self.settings.family)
+    def servo_port(self, settings: BusSettings, open_port: object) -> SerialServoPort:
+        return SerialServoPort(self.port, settings.device, settings.family)
 
     def position(self, name: str) -> int:
         """Return the present position in the registers of a servo, counts."""
@@ -185,7 +183,6 @@ class Rig:
         return state
 
     def cycle(self, tensions: Mapping[str, float]) -> BusState:
-        """Command the tension of each tendon, and return the next state."""
         return self.run(0.0, **tensions)
 
     def pulls(self) -> list[float]:

@@ -5,12 +5,10 @@ import math
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.simulation import ServoPlan
 from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, servo, settings
 
 
 def test_all_missing_servos_are_named() -> None:
-    """The error lists all missing servos at once."""
     rig = Rig()
     rig.twin("FDS").mute = rig.twin("PI").deaf = True
     words = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
@@ -20,39 +18,38 @@ def test_all_missing_servos_are_named() -> None:
 
 def test_another_model_is_refused() -> None:
     """A servo of another model is refused, since its torque constant differs."""
-    plans = [ServoPlan(i, "XL330-M288" if i == 3 else MODEL) for i in range(1, 8)]
+    wired = [servo(n, model="XL330-M288" if n == "EIP" else MODEL) for n in NAMES]
     with pytest.raises(RobotError, match=r"EIP \(id 3\) is not an XL330-M077.* is 1200, not 1190"):
-        Rig(plans=plans).bus.set_up()
+        Rig(wired=wired).bus.set_up()
 
 
 def test_firmware_without_a_watchdog_is_refused() -> None:
-    """A servo that cannot stop by itself is refused."""
     bus = settings(servos=(servo("FDP", model="XM430-W210", pretension_n=2.0),))
+    rig = Rig(bus)
+    rig.twin("FDP").firmware = 37
     with pytest.raises(RobotError, match="firmware 37; its own watchdog needs 38"):
-        Rig(bus, [ServoPlan(1, "XM430-W210", firmware=37)]).bus.set_up()
+        rig.bus.set_up()
 
 
-def test_setup_configures_servos_without_torque() -> None:
+@pytest.mark.parametrize(
+    ("family", "expected"),
+    [
+        # 683 counts of 0.0293 N are 19.98 N.
+        ("Dynamixel", {9: 0, 10: 0, 11: 0, 38: 683, 98: 5, 102: 0}),
+        # Positions over many turns, all other bits of the phase kept, and the EEPROM locked again.
+        (
+            "Feetech",
+            {7: 0, 8: 1, 9: 0, 11: 0, 18: 28, 33: 0, 16: 157, 41: 254, 48: 0, 55: 1},
+        ),
+    ],
+)
+def test_setup_configures_servos_without_torque(family: str, expected: dict[int, int]) -> None:
     """Mode, limits, goal and watchdog are set before torque is enabled."""
-    rig = Rig()
+    rig = Rig(of(family))
     rig.bus.set_up()
     for one in rig.line.servos.values():
         assert not one.has_torque
-        registers = [one.register(at) for at in (9, 10, 11, 38, 98, 102)]
-        assert registers == [0, 0, 0, 683, 5, 0]  # 683 counts of 0.0293 N are 19.98 N.
-    rig.bus.hold()
-    assert all(one.has_torque for one in rig.line.servos.values())
-    assert rig.pulls() == [0.0] * 7
-
-
-def test_setup_configures_feetech_servos_without_torque() -> None:
-    """Positions over many turns, all other bits of the phase kept, and the EEPROM locked again."""
-    rig = Rig(of("Feetech"))
-    rig.bus.set_up()
-    for one in rig.line.servos.values():
-        assert not one.has_torque
-        registers = [one.register(at) for at in (7, 8, 9, 11, 18, 33, 16, 41, 48, 55)]
-        assert registers == [0, 1, 0, 0, 28, 0, 157, 254, 0, 1]
+        assert {at: one.register(at) for at in expected} == expected
     rig.bus.hold()
     assert all(one.has_torque for one in rig.line.servos.values())
     assert rig.pulls() == [0.0] * 7
@@ -91,7 +88,6 @@ def test_eeprom_is_written_only_on_change() -> None:
 
 
 def test_hold_requires_setup() -> None:
-    """`hold` raises before `set_up`, since no limits are in place."""
     with pytest.raises(RobotError, match="not held: they are not set up"):
         Rig().bus.hold()
 
@@ -110,19 +106,7 @@ def test_a_cycle_commands_and_reads_tensions() -> None:
     assert reading.length_m == pytest.approx(-rig.twin("EDC").motor.tension / 300.0, abs=1e-3)
 
 
-def test_a_reversed_spool() -> None:
-    """Direction -1 negates current, speed and length."""
-    bus = settings(servos=tuple(servo(name, direction=-1) for name in NAMES))
-    rig = Rig(bus)
-    state = rig.start().run(6.0, 150)
-    assert min(rig.pulls()) == pytest.approx(-0.205, abs=0.001)
-    assert state.servos["PI"].tension_n == pytest.approx(6.0, abs=0.03)
-    assert rig.twin("PI").motor.tension > 4.0
-    assert (state.servos["PI"].length_m or 0.0) < -0.01
-
-
 def test_tensions_are_clipped() -> None:
-    """Tensions are clipped to the range from pretension to cap."""
     rig = Rig().start()
     state = rig.run(500.0, LUM=-3.0)
     assert state.servos["FDP"].goal_n == pytest.approx(20.0, abs=0.03)
@@ -131,7 +115,6 @@ def test_tensions_are_clipped() -> None:
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_a_non_finite_tension_changes_no_goal(wrong: float) -> None:
-    """A non-finite tension raises before any goal is sent, also for the other tendons."""
     rig = Rig().start()
     rig.run(4.0)
     before, sent = rig.pulls(), len(rig.port.sent)
@@ -143,7 +126,6 @@ def test_a_non_finite_tension_changes_no_goal(wrong: float) -> None:
 
 
 def test_a_stop_ramps_down_and_releases() -> None:
-    """Goals fall to the pretension within the ramp time, then torque goes off."""
     rig = Rig().start()
     rig.run(12.0, 50)
     rig.bus.stop(rig.line.now_ns)
@@ -161,7 +143,6 @@ def test_a_stop_ramps_down_and_releases() -> None:
 
 
 def test_a_stop_without_a_ramp_releases_at_once() -> None:
-    """A ramp of 0 ms ends in the first cycle."""
     rig = Rig(settings(ramp_ms=0)).start()
     rig.run(12.0, 5)
     rig.bus.stop(rig.line.now_ns)
@@ -169,34 +150,24 @@ def test_a_stop_without_a_ramp_releases_at_once() -> None:
     assert rig.pulls() == [0.0] * 7
 
 
-def test_a_command_does_not_end_a_stop() -> None:
-    """Tensions requested after a stop have no effect."""
+def test_only_a_new_hold_ends_a_stop() -> None:
+    """Tensions requested after a stop have no effect until then."""
     rig = Rig().start()
     rig.run(12.0, 5)
     rig.bus.stop(rig.line.now_ns)
-    state = rig.run(12.0, 31)
-    assert state.mode == "off"
+    assert rig.run(12.0, 31).mode == "off"
     rig.run(12.0, 5)
     assert rig.pulls() == [0.0] * 7
+    rig.bus.hold()
+    assert rig.run(5.0, 20).reason == ""
+    assert min(rig.pulls()) > 0.1
 
 
 def test_a_stop_before_the_first_pull_does_not_pull() -> None:
-    """A stop leaves slack tendons slack."""
     rig = Rig().start()
     rig.bus.stop(rig.line.now_ns)
     rig.run(None, 5)
     assert rig.pulls() == [0.0] * 7
-
-
-def test_it_can_be_held_again_after_a_stop() -> None:
-    """`hold` after a completed stop allows tensions again."""
-    rig = Rig().start()
-    rig.run(5.0, 5)
-    rig.bus.stop(rig.line.now_ns)
-    rig.run(None, 31)
-    rig.bus.hold()
-    assert rig.run(5.0, 20).reason == ""
-    assert min(rig.pulls()) > 0.1
 
 
 def test_close_leaves_no_torque() -> None:

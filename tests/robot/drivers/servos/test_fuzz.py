@@ -8,13 +8,13 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.family import FEETECH
+from shapechanger.robot.drivers.servos.family import FAMILIES
 from tests.robot.drivers.servos.rigs import Rig, of
 from tests.robot.drivers.servos.wire import pack, status
 
 
 def _feetech(servo_id: int, error: int, data: bytes = b"") -> bytes:
-    return status(servo_id, error, data, FEETECH)
+    return status(servo_id, error, data, FAMILIES["Feetech"])
 
 
 _ids = st.integers(0, 255)
@@ -38,7 +38,6 @@ _slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 def test_noise_never_breaks_the_driver_or_its_caps(
     family: str, noise: list[bytes], tension: float
 ) -> None:
-    """With noise on the bus, cycles do not raise and no goal exceeds its cap."""
     rig = Rig(of(family)).start()
     first = rig.settings.servos[0]
     cap = first.most_counts * first.known.ampere_per_goal
@@ -55,7 +54,6 @@ def test_noise_never_breaks_the_driver_or_its_caps(
 @_slow
 @given(noise=st.lists(_noise, max_size=2))
 def test_setup_with_noise_succeeds_or_raises(family: str, noise: list[bytes]) -> None:
-    """`set_up` succeeds or raises RobotError, and succeeds once the noise ends."""
     rig = Rig(of(family))
     errors: list[str] = []
     for data in noise:

@@ -29,14 +29,12 @@ def test_homing_finds_the_position_at_the_homing_tension(rig: Rig) -> None:
 
 
 def test_a_tendon_without_load_is_named(rig: Rig) -> None:
-    """A snapped tendon is wound in to the travel limit and then named."""
     rig.twin("EDC").motor.snapped = True
     with pytest.raises(RobotError, match=r"EDC \(id 4\) has no zero: it was wound in by 3"):
         home(rig.settings, rig.cycle, travel_m=0.03)
 
 
 def test_homing_times_out(rig: Rig) -> None:
-    """The error names the tendons that still move."""
     with pytest.raises(RobotError, match=f"zero: {', '.join(NAMES)} still moved after 0.1 s"):
         home(rig.settings, rig.cycle, within_ms=100, still_ms=1000)
 

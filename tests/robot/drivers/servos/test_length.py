@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.keys import KeyMistake
+from shapechanger.robot.drivers.chip import KeyMistake
 from shapechanger.robot.setup.calibration import home
 from tests.robot.drivers.servos.rigs import CYCLE_NS, NAMES, Rig, servo, settings
 
@@ -29,7 +29,6 @@ def _go(rig: Rig, length: float, cycles: int) -> None:
 
 
 def test_servos_are_in_current_based_position_mode() -> None:
-    """Mode 5, a goal at the present position, and no current before the first command."""
     rig = _rig()
     for one in rig.line.servos.values():
         assert (one.register(11), one.register(102)) == (5, 0)
@@ -81,7 +80,6 @@ def test_a_stop_lowers_the_limit_and_releases() -> None:
 
 
 def test_the_watchdog_stops_servos_that_control_a_length() -> None:
-    """Without a packet for 100 ms no current flows."""
     rig = _rig()
     _go(rig, -0.02, 50)
     assert min(rig.pulls()) > 0.3
@@ -116,7 +114,6 @@ def test_lengths_without_meaning_are_refused() -> None:
 
 
 def test_invalid_control_is_refused() -> None:
-    """An empty range of lengths raises an error; one beyond it is clipped."""
     with pytest.raises(KeyMistake, match="must be below longest_m, not 0 and 0 m"):
         servo("FDP", control="length")
     one = servo("FDP", control="length", longest_m=0.01, shortest_m=-0.02)

@@ -5,8 +5,17 @@ import math
 import pytest
 
 from shapechanger.robot.drivers.servos.family import MODELS
-from shapechanger.robot.drivers.servos.rig import EndStops
-from shapechanger.robot.drivers.servos.simulation import ServoPlan, SimulatedMotor
+from shapechanger.robot.drivers.servos.simulation import (
+    CABLE_N_PER_M,
+    EndStops,
+    SimulatedMotor,
+)
+from tests.robot.drivers.servos.rigs import feetech, servo
+
+
+def _motor(model: str = "XL330-M077", direction: int = 1) -> SimulatedMotor:
+    made = (feetech if model == "STS3215" else servo)("FDP", model=model, direction=direction)
+    return SimulatedMotor(made)
 
 
 def _run(
@@ -23,7 +32,7 @@ def _run(
 def test_the_no_load_speed_matches_the_data_sheet(name: str) -> None:
     """At the stall current limit and without load, the motor reaches its data-sheet speed."""
     model = MODELS[name]
-    motor = SimulatedMotor(ServoPlan(model=name))
+    motor = _motor(name)
     motor.snapped = True
     _run(motor, model.stall_a, model.volts, 3.0)
     assert motor.speed * 60 / (2 * math.pi) == pytest.approx(model.no_load_rpm, rel=0.02)
@@ -37,7 +46,7 @@ def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) ->
     The tension can exceed the goal: the spool overshoots, and friction holds it there.
     """
     model = MODELS[name]
-    motor = SimulatedMotor(ServoPlan(model=name, direction=direction))
+    motor = _motor(name, direction)
     amperes = 0.4 * model.stall_a
     _run(motor, direction * amperes, model.volts, 1.5)
     pull = model.torque_constant * amperes / 0.005
@@ -47,36 +56,35 @@ def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) ->
 
 
 def test_friction_holds_a_torque_below_it() -> None:
-    """A motor torque below the friction of the gears moves nothing."""
     model = MODELS["XL330-M288"]
-    motor = SimulatedMotor(ServoPlan(model=model.name, angle=0.0))
+    motor = _motor(model.name)
+    angle = motor.angle
     _run(motor, 0.9 * model.gears.friction_nm / model.torque_constant, 5.0, 0.5)
-    assert (motor.angle, motor.tension) == (0.0, 0.0)
+    assert (motor.angle, motor.tension) == (angle, 0.0)
 
 
 def test_a_tendon_carries_no_compression() -> None:
-    """Unwinding the spool makes the tendon slack."""
-    motor = SimulatedMotor(ServoPlan(model="XL330-M077", angle=0.0))
+    motor = _motor()
     _run(motor, -0.3, 5.0, 0.3)
     assert motor.angle < -1.0
     assert motor.tension == 0.0
 
 
 def test_a_pull_ends_at_the_stop_of_its_load() -> None:
-    """At the stop of the load, spool and load differ by the stretch of the cable alone."""
-    load = EndStops(1, nearest_m=0.01)
-    motor = SimulatedMotor(ServoPlan(model="XL330-M077", angle=0.0))
+    load = EndStops(1)
+    motor = _motor()
+    start = motor.angle
     _run(motor, 0.5, 5.0, 2.0, load)
-    assert load.travels[0] == 0.01
-    stretch = motor.tension / ServoPlan().stiffness
-    assert motor.angle * 0.005 == pytest.approx(0.01 + stretch, abs=1e-6)
+    assert load.travels()[0] == 0.02
+    stretch = motor.tension / CABLE_N_PER_M
+    assert (motor.angle - start) * 0.005 == pytest.approx(0.02 + stretch, abs=1e-6)
 
 
 def test_the_temperature_rises_with_the_square_of_the_current() -> None:
     """The temperature rise is proportional to i^2 and follows the thermal time constant."""
     rises: list[float] = []
     for share in (0.25, 0.5):
-        motor = SimulatedMotor(ServoPlan(model="XL330-M077", angle=0.0))
+        motor = _motor()
         motor.advance(share * 1.47, 5.0, 0.0, 120.0)
         rises.append(motor.temperature - 25.0)
     assert rises[1] == pytest.approx(4 * rises[0], rel=1e-9)
@@ -86,7 +94,7 @@ def test_the_temperature_rises_with_the_square_of_the_current() -> None:
 def test_a_lower_supply_voltage_lowers_the_top_speed() -> None:
     speeds: list[float] = []
     for volts in (5.0, 2.5):
-        motor = SimulatedMotor(ServoPlan(model="XL330-M077"))
+        motor = _motor()
         motor.snapped = True
         _run(motor, 1.47, volts, 2.0)
         speeds.append(motor.speed)

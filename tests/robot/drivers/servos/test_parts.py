@@ -2,11 +2,12 @@
 
 import pytest
 
-from shapechanger.robot.drivers.servos.family import DYNAMIXEL, FEETECH
+from shapechanger.robot.drivers.servos.family import FAMILIES
 from shapechanger.robot.drivers.servos.tendon import TendonServo
-from tests.robot.drivers.servos.rigs import servo, settings
+from tests.robot.drivers.servos.rigs import Rig
 
 MS = 1_000_000
+DYNAMIXEL, FEETECH = FAMILIES["Dynamixel"], FAMILIES["Feetech"]
 _MM = -4096 / (2 * 3.14159 * 5)  # Counts for a millimetre of length on a spool of 5 mm.
 
 
@@ -23,7 +24,8 @@ def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0)
 @pytest.fixture
 def one() -> TendonServo:
     """A servo with a zero. 70 % of its speed without load, 383 turns/min, are 140 mm/s."""
-    made = TendonServo(servo("FDP"), settings())
+    rig = Rig()
+    made = TendonServo(rig.settings.servos[0], rig.settings)
     made.zero = 0
     return made
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.family import FEETECH, MODELS
+from shapechanger.robot.drivers.servos.family import MODELS
 from shapechanger.robot.drivers.servos.settings import ServoSettings
 from tests.robot.drivers.servos.rigs import feetech, servo
 
@@ -27,7 +27,7 @@ def _servos(draw: st.DrawFn) -> ServoSettings:
         pretension_n=draw(st.floats(least, most)),
         homing_n=most,
         direction=draw(st.sampled_from((1, -1))),
-        control="length" if model.family is FEETECH else "tension",
+        control="length" if model.family_name == "Feetech" else "tension",
         shortest_m=-0.001,
     )
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dynamixel_sdk import PacketHandler
 
-from shapechanger.robot.drivers.servos.family import DYNAMIXEL, ServoFamily
+from shapechanger.robot.drivers.servos.family import FAMILIES, ServoFamily
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.drivers.servos.rig import SimulatedBus
+from shapechanger.robot.drivers.servos.simulation import Rig
 
+DYNAMIXEL = FAMILIES["Dynamixel"]
 _SDK = PacketHandler(2.0)
 _STATUS = 0x55
 
 
 def pack(servo_id: int, code: int, body: bytes, family: ServoFamily = DYNAMIXEL) -> bytes:
-    """Return a packet."""
     if family is not DYNAMIXEL:
         plain = bytes([servo_id, len(body) + 2, code]) + body
         return b"\xff\xff" + plain + bytes([~sum(plain) & 0xFF])
@@ -24,14 +24,12 @@ def pack(servo_id: int, code: int, body: bytes, family: ServoFamily = DYNAMIXEL)
 
 
 def status(servo_id: int, error: int, data: bytes = b"", family: ServoFamily = DYNAMIXEL) -> bytes:
-    """Return a status packet."""
     if family is not DYNAMIXEL:
         return pack(servo_id, error, data, family)
     return pack(servo_id, _STATUS, bytes([error]) + data)
 
 
-def family_of(bus: SimulatedBus) -> ServoFamily:
-    """Return the family of the servos on a bus."""
+def family_of(bus: Rig) -> ServoFamily:
     return next(iter(bus.servos.values())).family
 
 
@@ -42,29 +40,7 @@ def size_of(data: bytes | bytearray, family: ServoFamily = DYNAMIXEL) -> int:
     return 7 + int.from_bytes(data[5:7], "little")
 
 
-def instruct(
-    bus: SimulatedBus, servo_id: int, code: int, body: bytes = b""
-) -> dict[int, ServoReply]:
-    """Execute an instruction on the bus and return the replies by servo id."""
-    size = family_of(bus).address_size
-    at, rest = int.from_bytes(body[:size], "little"), body[size:]
-    length, content = int.from_bytes(rest[:size], "little"), rest[size:]
-    match code:
-        case 0x02:
-            return bus.read([servo_id], at, length)
-        case 0x03:
-            return bus.write({servo_id: rest}, at)
-        case 0x82:
-            return bus.read(content, at, length)
-        case 0x83:
-            step = range(0, len(content), length + 1)
-            bus.write({content[i]: content[i + 1 : i + 1 + length] for i in step}, at)
-            return {}
-        case _:
-            return {}
-
-
-def execute(bus: SimulatedBus, packet: bytes) -> dict[int, bytes]:
+def execute(bus: Rig, packet: bytes) -> dict[int, bytes]:
     """Execute a packet on the bus and return the status packets by servo id.
 
     A damaged packet of protocol 1.0 is ignored; the SDK makes those of 2.0.
@@ -78,5 +54,20 @@ def execute(bus: SimulatedBus, packet: bytes) -> dict[int, bytes]:
         plain = _SDK.removeStuffing(list(packet))
         end = size_of(bytes(plain[:7])) - 2
         servo_id, code, body = plain[4], plain[7], bytes(plain[8:end])
-    replies = instruct(bus, servo_id, code, body)
+    size = family.address_size
+    at, rest = int.from_bytes(body[:size], "little"), body[size:]
+    length, content = int.from_bytes(rest[:size], "little"), rest[size:]
+    replies: dict[int, ServoReply] = {}
+    match code:
+        case 0x02:
+            replies = bus.read([servo_id], at, length)
+        case 0x03:
+            replies = bus.write({servo_id: rest}, at)
+        case 0x82:
+            replies = bus.read(content, at, length)
+        case 0x83:
+            step = range(0, len(content), length + 1)
+            bus.write({content[i]: content[i + 1 : i + 1 + length] for i in step}, at)
+        case _:
+            pass
     return {one: status(one, reply.error, reply.data, family) for one, reply in replies.items()}

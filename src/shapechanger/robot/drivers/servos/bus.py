@@ -1,13 +1,16 @@
 """Bus of servos that pull tendons, with control of the current or of a limited position.
 
-The bus has no thread, never sleeps, and takes the time from its caller.
+The bus has no thread and never sleeps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Literal
+
+from msgspec.structs import replace
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN, Register
@@ -49,33 +52,129 @@ class BusState:
 
 
 class ServoBus:
-    """A bus of servos that pull tendons.
+    """A bus of servos that pull tendons, which the guard drives through its outputs.
 
-    Call `set_up` once, then `hold`, then `cycle` regularly, and finally `stop`. Without further
-    cycles the servos' own watchdogs stop them, or in a family without any their power switch must.
+    Without further cycles the servos' own watchdogs stop them. Servos of a family without any get
+    their power from a switch that the guard feeds while it runs, so they are only set up when the
+    robot is armed. If one of them cannot be released, `flush` and `let_go` raise errors, so that
+    the guard stops to feed the switch, until that has cut the power.
 
     Args:
-        settings: The bus and its servos.
-        port: Port of the bus, which `close` closes.
+        settings: The bus and its servos; `add` adds others until it is opened.
+        hardware: Where its port is.
 
     Attributes:
+        settings: The bus and its servos.
+        tensions: Tension of each tendon from the next `flush` on, N; with a length its limit.
+        lengths: Length beyond its zero of each tendon that is to have one, m.
         mode: Mode of the bus.
         is_ready: Whether `set_up` has succeeded.
     """
 
-    def __init__(self, settings: BusSettings, port: ServoPort) -> None:
-        self._settings = settings
-        self._family = family = settings.family
-        self._ids = {servo.id: TendonServo(servo, settings) for servo in settings.servos}
-        self._names = {one.settings.name: one for one in self._ids.values()}
-        self._registers = RegisterBus(port, settings.device, family, tuple(self._ids))
-        # One of them is read in each cycle, so a trip is detected within four.
-        self._audited = (family.mark, family.torque_enable, family.goal, family.hardware_error)
+    def __init__(self, settings: BusSettings, hardware: Hardware) -> None:
+        self.settings = settings
+        self.tensions: dict[str, float] = {}
+        self.lengths: dict[str, float] = {}
         self.mode: Mode = "off"
+        self.is_ready = False
+        self._hardware = hardware
+        self._opened = ExitStack()
+        self._ids = {servo.id: TendonServo(servo, settings) for servo in settings.servos}
+        self._users: set[str] = set()
         self._stopped_ns = 0
+        self._silent_since_ns: int | None = None
         self._cycles = 0
         self._gone = ""
-        self.is_ready = False
+
+    def add(self, servo: ServoSettings) -> None:
+        """Add a servo, which has to `leave`."""
+        self.settings = replace(self.settings, servos=(*self.settings.servos, servo))
+        self._ids[servo.id] = TendonServo(servo, self.settings)
+        self._users.add(servo.name)
+        self.tensions[servo.name] = servo.pretension_n
+
+    def leave(self, name: str) -> None:
+        """Let a servo that was added leave; the last one closes the bus."""
+        self._users.discard(name)
+        if not self._users:
+            self.close()
+
+    @property
+    def in_use(self) -> bool:
+        """Whether a servo that was added has not left."""
+        return bool(self._users)
+
+    def open(self) -> None:
+        """Open the port."""
+        port = self._hardware.servo_port(self.settings, _serial_port)
+        self._opened.callback(port.close)
+        self._opened.callback(self._release_finally)
+        self._family = family = self.settings.family
+        self._names = {one.settings.name: one for one in self._ids.values()}
+        self._registers = RegisterBus(port, self.settings)
+        # One of them is read in each cycle, so a trip is detected within four.
+        self._audited = (family.mark, family.torque_enable, family.goal, family.hardware_error)
+
+    def begin(self) -> None:
+        """Open the bus once all of its outputs are open, and set up servos that have power.
+
+        Nothing moves.
+
+        Raises:
+            RobotError: If a servo does not respond, or is not the expected one.
+        """
+        self.open()
+        if self._family.has_watchdog:
+            self.set_up()
+            self.set_zeros(self._known_zeros)
+
+    def ready(self, alive: Callable[[], object] = lambda: None) -> None:
+        """Clear all faults before the robot is armed, without moving anything.
+
+        Args:
+            alive: Feeds the enable line and the supervisor; called at least every 50 ms.
+
+        Raises:
+            RobotError: If a fault persists.
+        """
+        if self.faults or not self.is_ready:
+            self.let_go()
+            self.set_up(alive)
+            self._silent_since_ns = None
+            if not self._family.has_watchdog:
+                self.set_zeros(self._known_zeros, knows_turns=False)
+        if lost := [name for name, one in self._names.items() if one.zero is None]:
+            raise RobotError(
+                f"{', '.join(lost)} lost the power, and so the zero of its tendon: find the zeros "
+                "with `shapechanger robot home`, and serve the robot afresh."
+            )
+
+    def flush(self, *, grip: bool) -> None:
+        """Send the tensions of all servos.
+
+        Args:
+            grip: Whether released servos are energised again.
+
+        Raises:
+            RobotError: If a servo does not obey.
+        """
+        self._require_release()
+        if self.faults:
+            return  # The bus is stopping, which its cycles complete.
+        if self.mode == "off" and grip:
+            self.hold()
+        if self.mode == "held":
+            self.send(self.tensions, self.lengths)
+
+    def let_go(self) -> None:
+        """Switch the torque of all servos off."""
+        if self.mode not in ("off", "silent"):
+            self.release()
+        self._require_release()
+
+    def close(self) -> None:
+        """Let go of all tendons and close the port."""
+        self._opened.close()
 
     @property
     def faults(self) -> dict[str, str]:
@@ -84,21 +183,16 @@ class ServoBus:
         return {name: fault for name, fault in faults.items() if fault}
 
     @property
-    def zeros(self) -> dict[str, int]:
-        """Position of each servo at the zero of its tendon, in counts, for those with a zero."""
-        return {name: one.zero for name, one in self._names.items() if one.zero is not None}
+    def _known_zeros(self) -> dict[str, int]:
+        return {servo.name: servo.zero for servo in self.settings.servos}
 
     def set_up(self, alive: Callable[[], object] = lambda: None) -> None:
         """Check and prepare all servos, without torque, and clear all faults."""
         self.is_ready = False
         if self.mode != "silent":  # A servo may still pull, until all have been set up.
             self.mode = "off"
-        self._let_go()
-        self._check_servos(alive)
-        for servo in self._settings.servos:
-            alive()
-            self._prepare(servo)
-        self._registers.suspects.clear()
+        self._send_no_torque()
+        self._registers.set_up(alive)
         for one in self._ids.values():
             one.clear()
         self.mode, self._gone, self.is_ready = "off", "", True
@@ -112,20 +206,19 @@ class ServoBus:
         if self.mode != "off" or self.faults or not self.is_ready:
             why = " ".join(self.faults.values())
             why = why or ("they are not set up." if not self.is_ready else "they are already.")
-            raise RobotError(f"The servos at {self._settings.device} are not held: {why}")
+            raise RobotError(f"The servos at {self.settings.device} are not held: {why}")
         registers, family = self._registers, self._family
-        try:
+        with ExitStack() as undo:
+            undo.callback(self.release)
             for one in self._ids.values():
                 servo, one.goal, one.length = one.settings, 0, None
                 registers.write(servo.id, family.mark, 0)
-                self._set_mark(servo)
+                registers.set_mark(servo)
                 if servo.control == "length":  # An old goal must not turn it.
                     one.position = registers.read(servo.id, family.position)
                     registers.write(servo.id, family.goal_position, one.position)
                 registers.write(servo.id, family.torque_enable, 1)
-        except RobotError:
-            self.release()
-            raise
+            undo.pop_all()
         self.mode = "held"
 
     def set_zeros(self, zeros: Mapping[str, int], *, knows_turns: bool = True) -> None:
@@ -151,14 +244,12 @@ class ServoBus:
         if self.mode == "silent" or not self.is_ready:
             return BusState(now_ns, self.mode, {}, self.faults)
         heard: dict[int, ServoReply] = {}
-        try:
+        with self._loss_noted():
             if self.mode == "stopping":
                 left = self._ramp_left(now_ns)
                 self._send_goals({id_: one.ramp_n(left) for id_, one in self._ids.items()})
             heard = self._registers.poll(self._family.present)
             self._audit(heard)
-        except RobotError as error:
-            self._gone = self._gone or str(error)
         servos = self._evaluate(heard, now_ns, late=self._registers.port.has_stray)
         self._registers.port.has_stray = False
         if self.faults and self.mode == "held":
@@ -204,10 +295,8 @@ class ServoBus:
         if self.mode == "held":
             for name, one in self._names.items():
                 one.length = lengths.get(name)
-            try:
+            with self._loss_noted():
                 self._send_goals(pulls)
-            except RobotError as error:
-                self._gone = self._gone or str(error)
 
     def stop(self, now_ns: int) -> None:
         """Start to ramp the tensions down in the coming cycles, and then to let go."""
@@ -224,94 +313,47 @@ class ServoBus:
         watchdog of that servo stops it, or the power switch. `set_up` ends the silence.
         """
         holding = set(self._ids)
-        try:
+        with self._loss_noted():
             for _ in range(2):
-                self._let_go()
+                self._send_no_torque()
                 torques = self._registers.read_each(self._family.torque_enable)
                 holding -= {one for one, torque in torques.items() if torque == 0}
                 if not holding:
                     self.mode = "off"
                     return
-        except RobotError as error:
-            self._gone = self._gone or str(error)
         names = ", ".join(one.settings.name for id_, one in self._ids.items() if id_ in holding)
         silence = f"{names} did not confirm to let go, so nothing is sent any more"
         who = "the servos' own watchdogs stop" if self._family.has_watchdog else "[enable] stops"
         self._gone = f"{self._gone} {silence}: {who} them.".lstrip()
         self.mode = "silent"
 
-    def close(self) -> None:
-        """Let go of all tendons and close the port."""
+    def _release_finally(self) -> None:
         if self.mode != "silent" and (self.is_ready or self._family.has_watchdog):
             self.release()
-        self._registers.port.close()
+        self.is_ready = False
 
-    def _let_go(self) -> None:
-        """Send to all servos that they have no torque."""
+    def _require_release(self) -> None:
+        """Raise RobotError while a servo pulls that only the power switch can stop."""
+        if self.mode != "silent" or self._family.has_watchdog:
+            return
+        now_ns = self._hardware.clock.now_ns()
+        if self._silent_since_ns is None:
+            self._silent_since_ns = now_ns
+        if now_ns - self._silent_since_ns < self.settings.cut_ms * 1_000_000:
+            raise RobotError(" ".join(self.faults.values()))
+
+    @contextmanager
+    def _loss_noted(self) -> Generator[None]:
+        """Note an error of the port as the fault of the bus."""
+        try:
+            yield
+        except RobotError as error:
+            self._gone = self._gone or str(error)
+
+    def _send_no_torque(self) -> None:
         for one in self._ids.values():
             one.goal = 0
         self._registers.write_all(self._family.torque_enable, dict.fromkeys(self._ids, 0))
-
-    def _check_servos(self, alive: Callable[[], object]) -> None:
-        """Check that every servo answers, has the right model and firmware that is new enough."""
-        bus, registers, models = self._settings, self._registers, dict[int, int | None]()
-        for servo in bus.servos:
-            alive()
-            models[servo.id] = registers.find(servo.id, self._family.model_number)
-        names = {servo.id: f"{servo.name} (id {servo.id})" for servo in bus.servos}
-        if missing := [names[one] for one, number in models.items() if number is None]:
-            there = [names[one] for one, number in models.items() if number is not None]
-            raise RobotError(
-                f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
-                f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and "
-                "baud, and at the latency timer of the adapter."
-            )
-        for servo in bus.servos:
-            known, number = servo.known, models[servo.id]
-            if number != known.number:
-                raise RobotError(
-                    f"{servo.words} is not an {known.name}: its model number is {number}, "
-                    f"not {known.number}."
-                )
-            firmware = registers.read(servo.id, self._family.firmware)
-            if firmware < known.least_firmware:
-                raise RobotError(
-                    f"{servo.words} has firmware {firmware}; its own watchdog needs "
-                    f"{known.least_firmware} or newer."
-                )
-
-    def _prepare(self, servo: ServoSettings) -> None:
-        """Set up the mode, the limit of the goal, no goal and no torque."""
-        registers, family = self._registers, self._family
-        registers.write(servo.id, family.torque_enable, 0)
-        registers.write(servo.id, family.mark, 0)  # A tripped watchdog blocks all goals.
-        if error := registers.read(servo.id, family.hardware_error):
-            raise RobotError(
-                f"{servo.words} has switched itself off: {family.error_words(error)}. Only a "
-                "reboot gives it torque again, after which its zero must be found again."
-            )
-        if family.lock is not None:
-            registers.write(servo.id, family.lock, 0)
-        for register, value, kept_bits in (
-            *family.constants,
-            (family.mode, family.modes[servo.control], 0),
-            (family.most, servo.most_counts, 0),
-        ):
-            # These are in the EEPROM, which wears out: write them only if they differ.
-            found = registers.read(servo.id, register)
-            if (wanted := found & kept_bits | value) != found:
-                registers.write(servo.id, register, wanted)
-                if registers.read(servo.id, register) != wanted:  # Not every family refuses.
-                    raise RobotError(f"{servo.words} does not keep {wanted} as {register.name}.")
-        if family.lock is not None:
-            registers.write(servo.id, family.lock, 1)
-        self._set_mark(servo)
-
-    def _set_mark(self, servo: ServoSettings) -> None:
-        """Set the goal to 0, and what shows a restart, which starts a watchdog."""
-        # A change of mode sets the goal to the limit.
-        self._registers.write(servo.id, self._family.goal, 0)
-        self._registers.write(servo.id, self._family.mark, self._settings.mark)
 
     def _send_goals(self, pulls: Mapping[int, float]) -> None:
         """Send the tensions, N, by id, and the positions of servos with control of the length."""
@@ -326,7 +368,7 @@ class ServoBus:
 
     def _ramp_left(self, now_ns: int) -> float:
         """Return the share of the ramp of a stop that is left, 1 to 0."""
-        gone_ns, ramp_ns = now_ns - self._stopped_ns, self._settings.ramp_ms * 1_000_000
+        gone_ns, ramp_ns = now_ns - self._stopped_ns, self.settings.ramp_ms * 1_000_000
         return 0.0 if gone_ns >= ramp_ns else min(1.0, 1.0 - gone_ns / ramp_ns)
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
@@ -359,11 +401,6 @@ class ServoBus:
             else:
                 one.miss(late=late)
         return states
-
-
-def open_bus(settings: BusSettings, hardware: Hardware) -> ServoBus:
-    """Open a bus, without torque."""
-    return ServoBus(settings, hardware.servo_port(settings, _serial_port))
 
 
 def _serial_port(settings: BusSettings) -> ServoPort:

@@ -1,12 +1,13 @@
-"""Reading and writing of registers of servos, independent of how packets travel."""
+"""Registers of the servos on a bus: set-up, reading and writing, however packets travel."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.family import Register, ServoFamily
+from shapechanger.robot.drivers.servos.family import Register
+from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 
 # A single lost packet must not keep a rig from starting. Cycles never retry.
 _TRIES: Final = 3
@@ -80,23 +81,33 @@ class RegisterBus:
 
     Args:
         port: Port of the bus.
-        device: Name of the bus in messages.
-        family: Family of the servos.
-        ids: Ids of the servos.
+        settings: The bus and its servos.
 
     Attributes:
         port: Port of the bus.
-        suspects: Servos that did not answer when they were last read.
     """
 
-    def __init__(
-        self, port: ServoPort, device: str, family: ServoFamily, ids: Sequence[int]
-    ) -> None:
+    def __init__(self, port: ServoPort, settings: BusSettings) -> None:
         self.port = port
-        self._device = device
-        self._refused = family.refused
-        self._ids = tuple(ids)
-        self.suspects: list[int] = []
+        self._settings = settings
+        self._device = settings.device
+        self._family = settings.family
+        self._ids = [servo.id for servo in settings.servos]
+        self._suspects: list[int] = []  # Did not answer when they were last read.
+
+    def set_up(self, alive: Callable[[], object]) -> None:
+        """Check and prepare all servos, without torque."""
+        self._check_servos(alive)
+        for servo in self._settings.servos:
+            alive()
+            self._prepare(servo)
+        self._suspects.clear()
+
+    def set_mark(self, servo: ServoSettings) -> None:
+        """Set the goal to 0, and what shows a restart, which starts a watchdog."""
+        # A change of mode sets the goal to the limit.
+        self.write(servo.id, self._family.goal, 0)
+        self.write(servo.id, self._family.mark, self._settings.mark)
 
     def find(self, servo_id: int, register: Register) -> int | None:
         """Read a register of one servo; None if it does not answer, even when asked again."""
@@ -151,19 +162,19 @@ class RegisterBus:
         missing = [one for one in asked if one not in heard]
         if missing:
             first, *behind = missing
-            self.suspects.append(first)
+            self._suspects.append(first)
             heard |= self.read_several(register, behind)
-            self.suspects += [one for one in behind if one not in heard][:1]
-        elif self.suspects:
-            suspect = self.suspects.pop(0)
+            self._suspects += [one for one in behind if one not in heard][:1]
+        elif self._suspects:
+            suspect = self._suspects.pop(0)
             heard |= (answer := self.read_several(register, [suspect]))
             if not answer:
-                self.suspects.append(suspect)
+                self._suspects.append(suspect)
         return heard
 
     def read_each(self, register: Register) -> dict[int, int]:
         """Read a register of all servos, suspects one by one; silent ones are missing."""
-        groups = [self._trusted(), *([one] for one in self.suspects)]
+        groups = [self._trusted(), *([one] for one in self._suspects)]
         return {
             one: register.decode(reply.data)
             for group in groups
@@ -171,10 +182,65 @@ class RegisterBus:
         }
 
     def _trusted(self) -> list[int]:
-        return [one for one in self._ids if one not in self.suspects]
+        return [one for one in self._ids if one not in self._suspects]
 
     def _check(self, reply: ServoReply, servo_id: int, what: str) -> None:
         """Raise RobotError if a servo refuses to do something."""
-        if number := reply.error & self._refused:
+        if number := reply.error & self._family.refused:
             why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
             raise RobotError(f"Servo {servo_id} at {self._device} refuses to {what}: {why}.")
+
+    def _check_servos(self, alive: Callable[[], object]) -> None:
+        """Check that every servo answers, has the right model and firmware that is new enough."""
+        bus, models = self._settings, dict[int, int | None]()
+        for servo in bus.servos:
+            alive()
+            models[servo.id] = self.find(servo.id, self._family.model_number)
+        names = {servo.id: f"{servo.name} (id {servo.id})" for servo in bus.servos}
+        if missing := [names[one] for one, number in models.items() if number is None]:
+            there = [names[one] for one, number in models.items() if number is not None]
+            raise RobotError(
+                f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "
+                f"those that do: {', '.join(there) or 'none'}. Look at power, cables, ids and "
+                "baud, and at the latency timer of the adapter."
+            )
+        for servo in bus.servos:
+            known, number = servo.known, models[servo.id]
+            if number != known.number:
+                raise RobotError(
+                    f"{servo.words} is not an {known.name}: its model number is {number}, "
+                    f"not {known.number}."
+                )
+            firmware = self.read(servo.id, self._family.firmware)
+            if firmware < known.least_firmware:
+                raise RobotError(
+                    f"{servo.words} has firmware {firmware}; its own watchdog needs "
+                    f"{known.least_firmware} or newer."
+                )
+
+    def _prepare(self, servo: ServoSettings) -> None:
+        """Set up the mode, the limit of the goal, no goal and no torque."""
+        family = self._family
+        self.write(servo.id, family.torque_enable, 0)
+        self.write(servo.id, family.mark, 0)  # A tripped watchdog blocks all goals.
+        if error := self.read(servo.id, family.hardware_error):
+            raise RobotError(
+                f"{servo.words} has switched itself off: {family.error_words(error)}. Only a "
+                "reboot gives it torque again, after which its zero must be found again."
+            )
+        if family.lock is not None:
+            self.write(servo.id, family.lock, 0)
+        for register, value, kept_bits in (
+            *((one, one.value, one.kept_bits) for one in family.constants),
+            (family.mode, family.modes[servo.control], 0),
+            (family.most, servo.most_counts, 0),
+        ):
+            # These are in the EEPROM, which wears out: write them only if they differ.
+            found = self.read(servo.id, register)
+            if (wanted := found & kept_bits | value) != found:
+                self.write(servo.id, register, wanted)
+                if self.read(servo.id, register) != wanted:  # Not every family refuses.
+                    raise RobotError(f"{servo.words} does not keep {wanted} as {register.name}.")
+        if family.lock is not None:
+            self.write(servo.id, family.lock, 1)
+        self.set_mark(servo)

@@ -9,15 +9,13 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from shapechanger.errors import MissingExtra, RobotError
+from shapechanger.errors import MissingExtra, RobotError, translate_errors
 from shapechanger.robot.drivers.servos.family import ServoFamily
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
 
-try:
+with translate_errors(ImportError, to=lambda _: MissingExtra("dynamixel-sdk", "finger")):
     from dynamixel_sdk import PacketHandler, PortHandler
-except ImportError as error:
-    raise MissingExtra("dynamixel-sdk", "finger") from error
 
 # Bytes that may still be read after the timeout of an answer: they arrived while the process did
 # not run. More is endless noise, which the SDK would read endlessly.
@@ -138,7 +136,7 @@ class SerialServoPort:
         packet = [0] * self._id_at + [servo_id, *self._number(size)]
         packet += [instruction, *parameters] + [0] * self._length_size
         self._port.is_using = False  # The SDK leaves it set after an exception.
-        try:
+        with translate_errors(OSError, termios.error, to=self._gone):
             self.has_stray |= self._port.getBytesAvailable() > 0
             if self._sdk.txPacket(self._port, packet) != _SUCCESS:
                 raise RobotError(f"The bus at {self._device} does not take what is written to it.")
@@ -146,8 +144,9 @@ class SerialServoPort:
                 return {}
             self._port.setPacketTimeout((_STATUS_BYTES + length) * len(ids))
             return self._replies(ids, length)
-        except (OSError, termios.error) as error:
-            raise RobotError(f"The bus at {self._device} is gone: {error}.") from error
+
+    def _gone(self, error: Exception) -> RobotError:
+        return RobotError(f"The bus at {self._device} is gone: {error}.")
 
     def _replies(self, ids: Sequence[int], length: int) -> dict[int, ServoReply]:
         # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
@@ -178,14 +177,14 @@ class SerialServoPort:
 
 def open_serial_port(settings: BusSettings) -> SerialServoPort:
     """Open the port of a bus."""
-    port = PromptPort(settings.device, settings.answer_ms)
-    try:
+    bus, port = f"The bus at {settings.device}", PromptPort(settings.device, settings.answer_ms)
+    with translate_errors(
+        OSError, to=lambda error: RobotError(f"{bus} cannot be opened: {error}.")
+    ):
         opened = port.setBaudRate(settings.baud)
-    except OSError as error:
-        raise RobotError(f"The bus at {settings.device} cannot be opened: {error}.") from error
     if not opened:
         raise RobotError(
-            f"The bus at {settings.device} cannot have {settings.baud} baud; "
+            f"{bus} cannot have {settings.baud} baud; "
             "57600, 115200, 1000000, 2000000, 3000000 and 4000000 are usual."
         )
     return SerialServoPort(port, settings.device, settings.family)

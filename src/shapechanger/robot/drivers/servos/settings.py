@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from msgspec import Meta
+from msgspec.structs import replace
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.keys import Claim, FilePath, KeyMistake, Keys
+from shapechanger.robot.drivers.chip import Claim, FilePath, KeyMistake, Keys
 from shapechanger.robot.drivers.servos.family import (
     COUNTS_PER_TURN,
     MODELS,
@@ -93,12 +94,6 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
                 raise KeyMistake(key, f"must be {least:.2g} to {end}, not {value:g} N")
             most = self.most_tension_n  # Of the others.
             end = f"{most:g} N"
-
-    def settings(self) -> dict[str, Any]:
-        """Return the settings of the output, which has the name."""
-        settings = super().settings()
-        del settings["name"]
-        return settings
 
     def claims(self) -> Iterator[Claim]:
         """Return the claim of its id."""
@@ -215,7 +210,7 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
         cut_ms: Time after which a power switch that is not fed has cut the servos' power, ms.
     """
 
-    servos: tuple[ServoSettings, ...]
+    servos: tuple[ServoSettings, ...] = ()
     most_missed: int = 5
     cut_ms: int = 200
 
@@ -224,8 +219,7 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
         names = {one.known.family.name: None for one in self.servos}
         if len(names) > 1:
             raise KeyMistake("device", f"cannot have {' and '.join(names)} servos together")
-        rates = self.family.baud_rates
-        if self.baud not in rates:
+        if self.servos and self.baud not in (rates := self.family.baud_rates):
             words = ", ".join(map(str, rates))
             raise KeyMistake("baud", f"must be one that the servos have, {words}, not {self.baud}")
 
@@ -241,15 +235,7 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
         return self.watchdog_ms // WATCHDOG_STEP_MS if family.has_watchdog else 254
 
 
-def servo_settings(plan: OutputPlan) -> ServoSettings:
-    """Return the servo of an output, which a profile has checked, by the name of the output."""
-    keys = plan.settings.keys() & set(ServoSettings.__struct_fields__)
-    return ServoSettings(name=plan.name, **{key: plan.settings[key] for key in keys})
-
-
 def bus_settings(outputs: Sequence[OutputPlan]) -> BusSettings:
     """Return the bus of outputs, each of which has its settings."""
-    settings = outputs[0].settings
-    keys = settings.keys() & set(BusSettings.__struct_fields__)
-    servos = tuple(map(servo_settings, outputs))
-    return BusSettings(servos=servos, **{key: settings[key] for key in keys})
+    servos = tuple(ServoSettings.of(output.settings) for output in outputs)
+    return replace(BusSettings.of(outputs[0].settings), servos=servos)

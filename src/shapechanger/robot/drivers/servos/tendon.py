@@ -153,7 +153,7 @@ class TendonServo:
             value: Its value.
             pulls: Whether the servo should have torque.
         """
-        family = self._bus.family
+        family = self.settings.known.family
         if register == family.hardware_error and value:
             error = family.error_words(value)
             self._fail(f"has switched itself off: {error}. Only a reboot gives it torque again")

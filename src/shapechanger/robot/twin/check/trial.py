@@ -15,7 +15,7 @@ from shapechanger.errors import RobotError, ShapechangerError, translate_errors
 from shapechanger.robot.check.pins import SHOWN_S, Ask, BenchLamp, check_lamps, lamps_of, probed_pin
 from shapechanger.robot.check.report import Finding, Level, judged
 from shapechanger.robot.check.standing import StandingRobot, examine
-from shapechanger.robot.drivers.edges import EdgeInput
+from shapechanger.robot.drivers.pins import EdgeInput
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.outputs import make_safe
 from shapechanger.robot.hardware import Hardware
