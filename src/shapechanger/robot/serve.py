@@ -17,7 +17,7 @@ from typing import Final, Literal
 
 import msgspec
 
-from shapechanger.errors import LinkError, RobotError, UnknownName
+from shapechanger.errors import LinkError, RobotError, UnknownName, translate_errors
 from shapechanger.robot.client.known_robots import (
     KnownRobot,
     check_name,
@@ -209,7 +209,13 @@ def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
 
 def require_free(host: str, port: int) -> int:
     """Check that an address is free before starting anything, and return its port."""
-    try:
+    with translate_errors(
+        OSError,
+        to=lambda error: RobotError(
+            f"Cannot listen at {host} port {port}: {error.strerror or error}. "
+            "Does the robot run already?"
+        ),
+    ):
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
@@ -218,11 +224,6 @@ def require_free(host: str, port: int) -> int:
             listener.bind(address)
             listener.listen(1)
             return listener.getsockname()[1]
-    except OSError as error:
-        raise RobotError(
-            f"Cannot listen at {host} port {port}: {error.strerror or error}. "
-            "Does the robot run already?"
-        ) from error
 
 
 def recordings_folder(name: str) -> Path:

@@ -105,10 +105,9 @@ class Pipe(WaitingCamera):
         """Return data that waits in the pipe, b"" at its end; None without data."""
         if self._fd is None or not self._live:
             return None
-        try:
+        with suppress(BlockingIOError):
             return os.read(self._fd, _CHUNK)
-        except BlockingIOError:
-            return None
+        return None
 
     def _await_data(self) -> None:
         if self._fd is None:

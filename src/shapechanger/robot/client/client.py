@@ -22,7 +22,7 @@ from typing import Final, Self, TypeVar
 
 import aiohttp
 
-from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.errors import LinkError, RobotRefused, translate_errors
 from shapechanger.robot.client.connection import (
     CLOSE_S,
     Inbox,
@@ -489,7 +489,9 @@ class RobotClient(Inbox):
     async def _send_pending(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
         while self._pending:
             message = self._pending.pop(0)
-            try:
+            with translate_errors(
+                ConnectionError,
+                aiohttp.ClientError,
+                to=lambda error: lost(str(error) or "the connection broke"),
+            ):
                 await websocket.send_bytes(messages.encode(message))
-            except (ConnectionError, aiohttp.ClientError) as error:
-                raise lost(str(error) or "the connection broke") from None

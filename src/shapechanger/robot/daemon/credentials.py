@@ -7,7 +7,6 @@ import datetime
 import os
 import ssl
 import stat
-from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -169,16 +168,15 @@ def _check_private(file: Path) -> None:
         )
 
 
-@contextlib.contextmanager
-def _readable(file: Path) -> Generator[None]:
+def _readable(file: Path) -> contextlib.AbstractContextManager[None]:
     """Refuse a file that is missing or cannot be read."""
-    try:
-        yield
-    except FileNotFoundError as error:
-        hint = "Run `shapechanger robot init` to make it."
-        raise RobotError(f"{file} does not exist. {hint}") from error
-    except (OSError, ValueError) as error:
-        raise RobotError(f"Cannot read {file}: {error}.") from error
+
+    def refusal(error: Exception) -> RobotError:
+        if isinstance(error, FileNotFoundError):
+            return RobotError(f"{file} does not exist. Run `shapechanger robot init` to make it.")
+        return RobotError(f"Cannot read {file}: {error}.")
+
+    return translate_errors(OSError, ValueError, to=refusal)
 
 
 def _self_signed(name: str) -> tuple[bytes, bytes]:

@@ -46,10 +46,9 @@ class _Said(msgspec.Struct):
 
 def policies_in(folder: Path) -> list[str]:
     """Return the names of the policies in a folder, in order; none if it cannot be read."""
-    try:
+    files: list[str] = []
+    with contextlib.suppress(OSError):
         files = sorted(path.name for path in folder.iterdir() if path.suffix == ENDING)
-    except OSError:
-        return []
     return [name.removesuffix(ENDING) for name in files][:_MOST_NAMES]
 
 

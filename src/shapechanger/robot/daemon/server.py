@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from aiohttp import web
 
-from shapechanger.errors import LinkError, RobotError
+from shapechanger.errors import LinkError, RobotError, translate_errors
 from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
 from shapechanger.robot.daemon.session import Authenticator, ClientConnection, Session
@@ -70,7 +70,15 @@ class Listener:
             The port.
         """
         loop = asyncio.get_running_loop()
-        try:
+
+        def refusal(error: OSError) -> RobotError:
+            why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+            return RobotError(
+                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
+            )
+
+        with translate_errors(OSError, to=refusal), contextlib.ExitStack() as undo:
+            undo.callback(self._close_sockets)
             found = await loop.getaddrinfo(
                 host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             )
@@ -78,12 +86,7 @@ class Listener:
                 listening = socket.create_server(address, family=family, backlog=_BACKLOG)
                 self._sockets.append(listening)
                 listening.setblocking(False)
-        except OSError as error:
-            self._close_sockets()
-            why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-            raise RobotError(
-                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
-            ) from error
+            undo.pop_all()
         self._tasks = [asyncio.create_task(self._accept(each)) for each in self._sockets]
         return self._sockets[0].getsockname()[1]
 

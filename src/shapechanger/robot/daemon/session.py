@@ -449,11 +449,9 @@ class ClientConnection:
         loop = asyncio.get_running_loop()
         while not (self._by_frames and self._session.has_new_frame) and loop.time() < self._due_s:
             self._client.updated.clear()
-            try:
+            with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout_at(self._due_s):
                     await self._client.updated.wait()
-            except TimeoutError:
-                break
         now_s = loop.time()
         if self._by_frames and self._hub.frame is not None:
             self._due_s = now_s + _FRAME_PACE * self._period_s

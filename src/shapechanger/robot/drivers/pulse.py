@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Final, Literal
@@ -191,13 +191,11 @@ class SysfsPwm(_WholeMicroseconds):
 
     def _write_when_allowed(self, file: str, number: int) -> None:
         deadline = time.monotonic() + _EXPORT_S
-        while True:
-            try:
+        while time.monotonic() < deadline:
+            with suppress(PermissionError, FileNotFoundError):
                 return self._write(file, number)
-            except (PermissionError, FileNotFoundError):
-                if time.monotonic() > deadline:
-                    raise
-                time.sleep(0.01)
+            time.sleep(0.01)
+        self._write(file, number)
 
 
 class _SysfsKeys(Keys, frozen=True, kw_only=True):

@@ -67,19 +67,20 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         ProfileError: If the file is missing, unreadable or not UTF-8.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST + 1)
+
+    def refusal(error: Exception) -> ProfileError:
+        if isinstance(error, FileNotFoundError):
+            return ProfileError(f"There is no file {path}{_nearest(path)}")
+        if isinstance(error, UnicodeDecodeError):
+            line = error.object.count(b"\n", 0, error.start) + 1
+            return ProfileError(f"{path}, line {line}: this is not UTF-8 text.")
+        return ProfileError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.")
+
+    # ValueError: NUL in the path.
+    with translate_errors(OSError, ValueError, to=refusal), path.open("rb") as file:
+        data = file.read(_LARGEST + 1)
         # Like tomllib for files; Windows editors may prepend a byte-order mark.
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
-    except FileNotFoundError:
-        raise ProfileError(f"There is no file {path}{_nearest(path)}") from None
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from None
-    except (OSError, ValueError) as error:  # ValueError: NUL in the path.
-        reason = getattr(error, "strerror", None) or error
-        raise ProfileError(f"{path} cannot be read: {reason}.") from error
     if len(data) > _LARGEST:
         raise ProfileError(f"{path} is longer than a profile can be, 1 MiB.")
     return text

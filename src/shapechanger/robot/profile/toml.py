@@ -8,6 +8,7 @@ import reprlib
 import tomllib
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import date, time
 from functools import cache
@@ -17,7 +18,7 @@ from typing import Any, Final, cast
 import msgspec
 from msgspec import inspect
 
-from shapechanger.errors import ProfileError
+from shapechanger.errors import ProfileError, translate_errors
 from shapechanger.robot.drivers.chip import KeyMistake, Keys
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin, bcm
 
@@ -50,12 +51,11 @@ def _has(lines: list[str], count: int, place: Place) -> bool:
             break
         except tomllib.TOMLDecodeError:
             count += 1
-    try:
+    with suppress(KeyError, IndexError, TypeError):
         for name in place:
             data = data[name]
-    except (KeyError, IndexError, TypeError):
-        return False
-    return True
+        return True
+    return False
 
 
 def choice(name: str, known: Iterable[str]) -> str:
@@ -75,10 +75,9 @@ def shown(value: Any) -> str:
     """Format a value of a TOML file, shortening long ones."""
     if isinstance(value, bool | float | date | time):
         return str(value).lower()
-    try:
+    with suppress(ValueError):  # Python refuses to print thousands of digits.
         return reprlib.repr(value)
-    except ValueError:  # Python refuses to print thousands of digits.
-        return "a number too large to write"
+    return "a number too large to write"
 
 
 _MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
@@ -125,10 +124,10 @@ def _pin(kind: type[Pin], written: Any) -> Pin:
     """Convert a pin for msgspec; the message of the error is the end of a sentence."""
     if kind is OptionalPin and type(written) is int and written == NO_PIN:
         return NO_PIN
-    try:
+    with translate_errors(
+        ValueError, to=lambda error: ValueError(str(error) or f"not {shown(written)}")
+    ):
         return kind(bcm(written))
-    except ValueError as error:
-        raise ValueError(str(error) or f"not {shown(written)}") from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from typing import Any
 
 import msgspec
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel
 
 
@@ -107,12 +107,15 @@ def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
     text = Path(path).read_text(encoding="utf-8")
     decode = msgspec.json.Decoder(Transition).decode
     transitions: list[Transition] = []
-    # After the last newline there is at most a broken line.
-    for number, line in enumerate(text.split("\n")[:-1], 1):
-        try:
+    with translate_errors(
+        msgspec.MsgspecError,
+        to=lambda error: RobotError(
+            f"Line {len(transitions) + 1} of {path} is malformed: {error}."
+        ),
+    ):
+        # After the last newline there is at most a broken line.
+        for line in text.split("\n")[:-1]:
             transitions.append(decode(line))
-        except msgspec.MsgspecError as error:
-            raise RobotError(f"Line {number} of {path} is malformed: {error}.") from error
     return sorted(transitions, key=lambda transition: transition.t)
 
 
