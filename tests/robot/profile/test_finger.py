@@ -42,10 +42,12 @@ def test_settings_are_plain_numbers_in_file_order() -> None:
     assert joints.settings == {
         "bus": 1,
         "mux": 0x70,
-        "joints": ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"],
-        "channels": [0, 1, 2, 3],
-        "zeros": [0, 0, 0, 0],
-        "directions": [1, 1, 1, 1],
+        "rows": {
+            joint: {"channel": channel, "zero": 0, "direction": 1}
+            for channel, joint in enumerate(
+                ("MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion")
+            )
+        },
     }
     assert GuardPlan.from_json(json.dumps(json.loads(plan.to_json()))) == plan
 
@@ -107,7 +109,8 @@ def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
     """`rewrite` sets the zero as `robot home` does, and keeps comments."""
     path = write_profile("finger", tmp_path / "mine.toml", "mine")
     profile = rewrite(path, {"sensor.joints.PIP_flexion.zero": 1234})
-    assert profile.sensors[-1].settings["zeros"] == [0, 0, 1234, 0]
+    rows = profile.sensors[-1].settings["rows"]
+    assert [row["zero"] for row in rows.values()] == [0, 0, 1234, 0]
     assert "# Counts while the finger is straight." in path.read_text()
 
 
