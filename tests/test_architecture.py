@@ -78,6 +78,22 @@ def test_exported_names_exist_once(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert wrong == []
 
 
+def test_imports_inside_functions_are_few_and_have_reasons() -> None:
+    """Each has a comment, on its line or above it, that says why it is not at the top."""
+    found = 0
+    for path in _MODULES.values():
+        text = path.read_text()
+        lines = text.splitlines()
+        for function in ast.walk(ast.parse(text)):
+            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+                for node in ast.walk(function):
+                    if isinstance(node, ast.ImportFrom) and "shapechanger" in (node.module or ""):
+                        found += 1
+                        near = lines[node.lineno - 2 : node.end_lineno]
+                        assert any("# " in line for line in near), (path, node.lineno)
+    assert 0 < found <= 40
+
+
 def test_no_program_is_started_from_the_command_line_package() -> None:
     """No string names a module of `cli`, which `lint-imports` would not see."""
     found = [

@@ -51,7 +51,7 @@ def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any
     """Return an env with a policy's layouts, through the body map of same names if needed."""
     settings: Any = getattr(card, "settings", None)
     if settings is not None and "many bodies" in settings.takes:
-        from shapechanger.transfer.limbs.envs import fitted
+        from shapechanger.transfer.limbs.envs import fitted  # PyTorch.
 
         return fitted(env, card.observation, settings.room)
     observation, action = layouts_of(env)

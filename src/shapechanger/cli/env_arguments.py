@@ -101,7 +101,7 @@ def executor_of(kind: str, workers: int | None, address: str | None) -> Executor
     if kind == "ray":
         if workers is not None:
             raise StudyError("Ray runs one run on each core of its nodes: leave out --workers.")
-        from shapechanger.transfer.ray_executor import RayCluster
+        from shapechanger.transfer.ray_executor import RayCluster  # An extra.
 
         return RayCluster(address)
     if address is not None:

@@ -151,21 +151,18 @@ class PullDemonstrations:
 
 def _described_policy(file: Path) -> dict[str, Any]:
     """Load a policy, which checks its hash, and return its card."""
-    from shapechanger.demos.cloning.policy import CameraPolicy
-
-    if kind_of(file) == "clone":
-        clone = CameraPolicy.load(file).card
-        return {
-            "env": clone.data.get("env", "recorded"),
-            "learner": "cloning",
-            "steps": clone.steps,
-            "seed": ", ".join(map(str, clone.seeds)),
-            "version": clone.version,
-            "command": clone.command,
-            "observation": _features(clone.state_layout, f"picture ({clone.eyes})"),
-            "action": _features(clone.action_layout, "steering, throttle"),
-        }
     card = load_policy(file).card
+    if kind_of(file) == "clone":
+        return {
+            "env": card.data.get("env", "recorded"),
+            "learner": "cloning",
+            "steps": card.steps,
+            "seed": ", ".join(map(str, card.seeds)),
+            "version": card.version,
+            "command": card.command,
+            "observation": _features(card.state_layout, f"picture ({card.eyes})"),
+            "action": _features(card.action_layout, "steering, throttle"),
+        }
     return {
         "env": card.env,
         "learner": card.learner,

@@ -22,7 +22,7 @@ from shapechanger.envs.naming import allow_own_modules, driven, env_ref
 from shapechanger.errors import ShapechangerError, StudyError
 from shapechanger.identity import identify_env
 from shapechanger.own_modules import texts_in
-from shapechanger.transfer.body_map.envs import check_size
+from shapechanger.policy import kind_of
 from shapechanger.transfer.identities import ENV, known, single_body
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import load_references
@@ -46,7 +46,7 @@ class Show:
 
     def run(self) -> None:
         """Print the card."""
-        from shapechanger.transfer.learners.policy_file import TrainedPolicy
+        from shapechanger.transfer.learners.policy_file import TrainedPolicy  # PyTorch.
 
         policy: Any = load_any_policy(self.file, self.learner)
         card = policy.card
@@ -246,22 +246,20 @@ class ExportPolicy:
 
     def run(self) -> None:
         """Write the file."""
-        from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.transfer.learners.policy_file import TrainedPolicy
-
         policy = load_any_policy(self.file, self.learner)
-        if isinstance(policy, CameraPolicy):
+        kind = kind_of(self.file)
+        if kind.endswith("onnx"):
+            raise StudyError(f"{self.file} has been exported already.")
+        if kind == "clone":
             body, control_hz = _learned_with(policy.card)
             export_clone(policy, self.out, body=body, control_hz=control_hz)
-        elif isinstance(policy, TrainedPolicy):
-            self._export(policy)
         else:
-            raise StudyError(f"{self.file} has been exported already.")
+            self._export(policy)
         say(f"wrote {self.out}")
 
     def _export(self, policy: TrainedPolicy) -> None:
         """Write a policy that is no clone."""
-        from shapechanger.transfer.export import export_limbs, export_onnx
+        from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
 
         if "many bodies" in policy.card.settings.takes:
             ref = _env_of(self.file, self.env, self.body)
@@ -302,35 +300,15 @@ class Convert:
 
     def run(self) -> None:
         """Convert the policy."""
-        import shapechanger
-        from shapechanger.transfer.learners.convert import load_zip, settings_of_model
-        from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
-        from shapechanger.transfer.transplant.model import check_supported
+        from shapechanger.transfer.learners.convert import convert_zip  # PyTorch.
 
         if not self.trust:
             raise StudyError(
                 f"{self.file} may run code when it is loaded, because Stable-Baselines3 pickles: "
                 "give --trust if you trust its author."
             )
-        model = load_zip(self.file)
-        check_supported(model)
         env = env_ref(self.env, self.body)
         with opened(env) as made:
-            observation, action = layouts_of(made)
-            identity = known({ENV: identify_env(made, env.id).identity})
-        check_size("observation of the policy", model.observation_space, observation)
-        check_size("action of the policy", model.action_space, action)
-        card = PolicyCard(
-            env,
-            observation,
-            action,
-            "converted",
-            settings_of_model(model),
-            int(model.num_timesteps),
-            int(model.seed or 0),
-            shapechanger.__version__,
-            identity,
-            command_line(),
-        )
-        TrainedPolicy(model, None, card).save(self.out)
+            layouts, identity = layouts_of(made), known({ENV: identify_env(made, env.id).identity})
+        convert_zip(self.file, env, layouts, identity, command_line()).save(self.out)
         say(f"wrote {self.out}")

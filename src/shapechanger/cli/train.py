@@ -133,7 +133,7 @@ class Train:
 
     def _by_teacher(self, env: EnvRef, out: Path, teacher: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training of a student of another policy."""
-        from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student
+        from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student  # PyTorch.
 
         if self.learner is not None or self.set or self.tensorboard is not None:
             raise StudyError("A student has no learner: give --teacher without one.")

@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.demos.cloning.evaluation import Bin, EvaluationResult, named, outlook
-from shapechanger.demos.cloning.learn import Training
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.files import write_json
 from shapechanger.reports.charts import BLUE, GREEN, GREY, ORANGE, PINK, SQUARE, WIDE, svg_chart
 from shapechanger.reports.page import png_uri, render, svg_uri
@@ -19,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from shapechanger.demos.cloning.learn import Training
+    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.dataset import Dataset
 
 _MAX_SCATTERS: Final = 4

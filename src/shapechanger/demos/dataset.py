@@ -18,6 +18,7 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.demos.episodes.files import is_episode
+from shapechanger.demos.exchange import import_episodes
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.demos.statistics import is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, UnknownName
@@ -187,7 +188,6 @@ def _episodes(
             kept = ((step, episode.jpeg(step)) for step in episode.kept)
             yield str(path), episode.header, kept
         return
-    from shapechanger.demos.exchange import import_episodes
 
     for number, (header, steps) in enumerate(import_episodes(data)):
         yield f"{data}, episode {number}", header, iter(steps)

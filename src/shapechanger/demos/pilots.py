@@ -22,6 +22,7 @@ from shapechanger.demos.drivers import (
     PolicyPilot,
     TaskExpert,
 )
+from shapechanger.demos.recording import QUALITY, ObservationEncoder
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from shapechanger.policy import kind_of, load_policy
@@ -119,8 +120,7 @@ class _Dangers:
 
 def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
     """Load a clone, and check that it fits the env's frames, state and actions."""
-    from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.demos.recording import QUALITY, ObservationEncoder
+    from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
 
     clone = CameraPolicy.load(path)
     encoder = ObservationEncoder(env, QUALITY)

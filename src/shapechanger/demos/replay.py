@@ -15,6 +15,7 @@ from shapechanger.demos.jpeg import blank, decode_picture, overlay
 from shapechanger.demos.recording import EncodedObservation, ObservationEncoder
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
+from shapechanger.reports.films import require_film, write_film
 
 
 def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
@@ -132,8 +133,6 @@ _WITHOUT_CAMERA: Final = (480, 40)
 
 def write_episode_film(episode: Episode, path: Path) -> str:
     """Write the kept steps of an episode as a video, and return a sentence on it."""
-    from shapechanger.reports.films import require_film, write_film
-
     require_film(path)
     layout = Layout.from_json(episode.header.action_layout)
     frames: list[NDArray[Any]] = []

@@ -126,7 +126,7 @@ def make_vec(
             raise VectorEnvError("backend='warp' has no threads, and always copies observations.")
         if pool is not None and (bodies is not None or not len(pool)):
             raise VectorEnvError("Give either `bodies`, one per world, or a `pool` of some bodies.")
-        from shapechanger.envs.warp import make_warp
+        from shapechanger.envs.warp import make_warp  # Warp.
 
         envs = make_warp(
             made_from,

@@ -335,8 +335,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             MissingExtra: If `mujoco.sysid` is not installed.
         """
         # An optimiser, which an env that only steps does not need.
-        from shapechanger.finger.identify.log import record_babble
-        from shapechanger.finger.identify.result import identify
+        from shapechanger.finger.identify import identify, record_babble
 
         found = identify(record_babble(self, _BABBLE_S, seed, self._actions)).parameters
         if found.path is None:

@@ -11,11 +11,13 @@ import numpy as np
 from shapechanger.contract.world import RESTING_V, World
 from shapechanger.errors import RobotError
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
+from shapechanger.finger.gap import resolve_gap
 from shapechanger.finger.model import FINGERTIP, build_finger
-from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import drive_of
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.simulation import Rig
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.start import Place
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
@@ -25,6 +27,29 @@ _CABLE_KG: Final = 0.010
 _MAX_STEP_S: Final = 0.001
 # Distance of starts from the rest posture, rad, as in simulation.
 _START_SPREAD: Final = 0.1
+
+
+def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place | None:
+    """Return the place of a rig with the tendons of a finger; None for other robots.
+
+    Args:
+        profile: The robot.
+        gap: Name of the reality gap that the finger is drawn from; "" for the nominal finger.
+        seed: Seed of the draw; 0 if not given.
+
+    Raises:
+        RobotError: If a gap is given for another robot.
+    """
+    tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
+    if tendons == set(TENDONS):
+        drawn = resolve_gap(gap).draw(np.random.default_rng(seed or 0)) if gap else NOMINAL
+        return finger_place(drawn)
+    if gap:
+        raise RobotError(
+            f"A --gap is between fingers, and {profile.name} has no servos for the tendons "
+            f"{', '.join(TENDONS)}."
+        )
+    return None
 
 
 def finger_place(parameters: FingerParameters) -> Place:

@@ -140,7 +140,7 @@ class Hardware:
         if self._pin_factory is None:
             # Of gpiozero or lgpio, or one of them is missing.
             with translate_errors(Exception, to=_no_pins):
-                from shapechanger.robot.lgpio_pins import LowAtOnceFactory
+                from shapechanger.robot.lgpio_pins import LowAtOnceFactory  # lgpio, an extra.
 
                 self._pin_factory = LowAtOnceFactory()
         return self._pin_factory
@@ -153,7 +153,7 @@ class Hardware:
 
     def servo_pins(self) -> ServoPins:
         """Open the pins that send servo pulses, with lgpio."""
-        from shapechanger.robot.lgpio_pins import LgpioServoPins
+        from shapechanger.robot.lgpio_pins import LgpioServoPins  # lgpio.
 
         return LgpioServoPins()
 

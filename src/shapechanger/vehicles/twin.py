@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
 
 from shapechanger.contract.world import World
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, ProfileError, UnknownName
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.start import Place
+from shapechanger.vehicles.cameras.corruptions import find_corruption
+from shapechanger.vehicles.courses import WORLDS
+from shapechanger.vehicles.courses.course import HOME, require_element
 
-if TYPE_CHECKING:
+try:
+    from shapechanger.vehicles.bodies import VEHICLES, require_fit
     from shapechanger.vehicles.envs.drive import SimulatedRobot
+    from shapechanger.vehicles.world import MujocoWorld
+except ModuleNotFoundError as error:
+    raise MissingExtra(error.name or "mujoco", "sim") from error
+
+ROOM = "room"
+"""Name of the plain room, which takes any robot, among the worlds."""
 
 
 def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
     """Read the numbers of a robot that its simulation needs."""
-    from shapechanger.vehicles.envs.drive import SimulatedRobot
-
     profile = load_profile(find_profile(robot))
     camera = profile.camera
     return SimulatedRobot(
@@ -35,6 +43,40 @@ def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
         camera_pitch_deg=None if camera is None else camera.pitch_deg,
         camera_fovy_deg=None if camera is None else camera.fovy_deg,
     )
+
+
+def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> Place:
+    """Return the place of a robot's twin: a course, or the plain room.
+
+    Args:
+        profile: The robot.
+        world: Kind of course; "" for the vehicle's default, or the room without such a vehicle.
+        lenses: Disturbances of the camera.
+
+    Raises:
+        UnknownName: If there is no such world or disturbance.
+        ProfileError: If the robot is not one of the vehicles, or has other parts.
+        WorldError: If the vehicle cannot drive there.
+    """
+    for lens in lenses:
+        find_corruption(lens)
+    parts = {output.part for output in profile.outputs if output.part}
+    if not world:
+        try:
+            require_fit(profile.body, parts)
+        except (ProfileError, UnknownName):
+            return Place()
+        return course_place(HOME[profile.body], profile.body, lenses)
+    if world not in WORLDS:
+        raise UnknownName("world", world, (ROOM, *WORLDS))
+    if profile.body not in VEHICLES:
+        raise ProfileError(
+            f"{profile.path}: there is no {profile.body} in MuJoCo, only {', '.join(VEHICLES)}; "
+            f"--world {ROOM} takes any robot."
+        )
+    require_fit(profile.body, parts)
+    require_element(profile.body, floats=VEHICLES[profile.body].floats, world=world)
+    return course_place(world, profile.body, lenses)
 
 
 def course_place(world: str, vehicle: str, lenses: Sequence[str] = ()) -> Place:
@@ -58,14 +100,7 @@ def open_course(
         UnknownName: If there is no such course, vehicle or corruption.
         ProfileError: If the vehicle has other parts.
         WorldError: If the vehicle cannot drive there.
-        MissingExtra: If MuJoCo is not installed.
     """
-    try:
-        from shapechanger.vehicles.bodies import require_fit
-        from shapechanger.vehicles.world import MujocoWorld
-    except ModuleNotFoundError as error:
-        raise MissingExtra(error.name or "mujoco", "sim") from error
-
     require_fit(vehicle, parts)
     return MujocoWorld(
         vehicle,

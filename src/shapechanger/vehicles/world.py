@@ -113,7 +113,7 @@ class MujocoWorld:
         self.lenses = tuple(lenses)
         self._distortions: list[Corruption] = []
         if lenses:
-            from shapechanger.vehicles.cameras.corruptions import find_corruption
+            from shapechanger.vehicles.cameras.corruptions import find_corruption  # SciPy.
 
             self._distortions = [find_corruption(name) for name in lenses]
         self.resting_v = RESTING_V
@@ -339,7 +339,7 @@ class MujocoWorld:
             RenderError: If the size is out of range, or nothing can be drawn here.
         """
         if self._outside is None or self._outside.size != (width, height):
-            from shapechanger.vehicles.cameras.camera import OutsideCamera
+            from shapechanger.vehicles.cameras.camera import OutsideCamera  # OpenGL.
 
             camera = OutsideCamera((width, height))
             if self._outside is not None:
@@ -448,6 +448,6 @@ def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
 @lru_cache(maxsize=_KEPT_COURSES)
 def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
     """Return a path around a course for a vehicle."""
-    from shapechanger.vehicles.expert.driver import plan_path_for, traits_of
+    from shapechanger.vehicles.expert.driver import plan_path_for, traits_of  # SciPy.
 
     return plan_path_for(lay_out(world, seed), traits_of(vehicle))

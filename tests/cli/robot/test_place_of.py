@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shapechanger.cli.robot import serve as serving
-from shapechanger.cli.robot.serve import finger_of, place_of
+from shapechanger.cli.robot.serve import place_of
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL
@@ -46,10 +47,10 @@ def test_the_default_place(name: str, place: Place) -> None:
 
 def test_a_finger_of_a_gap() -> None:
     """The finger is the one that `Finger-v1` draws for the seed."""
-    drawn = finger_of(_shipped("finger"), "real-like", 3)
-    assert drawn is not None
+    drawn = place_of(_shipped("finger"), "", (), "real-like", 3)
     assert drawn == finger_place(GAPS["real-like"].draw(np.random.default_rng(3)))
-    assert finger_of(_shipped("lab-car"), "", None) is None
+    with pytest.raises(RobotError, match="lab-car has no servos for the tendons FDP"):
+        place_of(_shipped("lab-car"), "", (), "real-like")
 
 
 def test_lenses_apply_to_the_default_world() -> None:
@@ -80,7 +81,8 @@ def test_without_mujoco_the_default_is_the_room(monkeypatch: pytest.MonkeyPatch)
         serving, "find_spec", lambda name: found(name) if name != "mujoco" else None
     )
     assert place_of(_shipped("lab-car"), "", ()) == Place()
-    monkeypatch.setitem(__import__("sys").modules, "shapechanger.vehicles.bodies", None)
+    monkeypatch.delitem(sys.modules, "shapechanger.vehicles.twin")
+    monkeypatch.setitem(sys.modules, "shapechanger.vehicles.bodies", None)
     with pytest.raises(MissingExtra, match=r"shapechanger\[sim\]"):
         place_of(_shipped("lab-car"), "corridor", ())
 

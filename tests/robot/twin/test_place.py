@@ -39,10 +39,9 @@ def test_the_room_does_not_import_mujoco() -> None:
         "sys.modules['mujoco'] = None\n"
         "from shapechanger.errors import MissingExtra\n"
         "from shapechanger.robot.twin.start import Place, open_world\n"
-        "from shapechanger.vehicles.twin import course_place\n"
         "open_world(Place(), {'wheels'}, None, 1)\n"
         "try:\n"
-        "    open_world(course_place('corridor', 'car'), {'wheels', 'steering'}, None, 1)\n"
+        "    open_world(Place('shapechanger.vehicles.twin:open_course'), {'wheels'}, None, 1)\n"
         "except MissingExtra as error:\n"
         "    print(error)"
     )

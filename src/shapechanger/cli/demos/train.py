@@ -13,7 +13,10 @@ import tyro
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import require_seed
+from shapechanger.demos.clone_report import clone_html, write_numbers
+from shapechanger.demos.cloning.evaluation import duration_s, evaluate, outlook
 from shapechanger.demos.cloning.settings import settings_for
+from shapechanger.demos.cloning.shrinking import ShrunkFrames
 from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import require_file, write_atomic
@@ -68,11 +71,8 @@ class TrainClone:
         self._require_files()
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.demos.clone_report")
-        from shapechanger.demos.clone_report import clone_html, write_numbers
-        from shapechanger.demos.cloning.evaluation import duration_s, evaluate, outlook
-        from shapechanger.demos.cloning.examples import evaluated_steps
-        from shapechanger.demos.cloning.learn import learn
-        from shapechanger.demos.cloning.shrinking import ShrunkFrames
+        from shapechanger.demos.cloning.examples import evaluated_steps  # PyTorch.
+        from shapechanger.demos.cloning.learn import learn  # PyTorch.
 
         view = self._view()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
@@ -162,7 +162,7 @@ class TrainClone:
         written: list[Path] = []
         if self.sac is None and self.ppo is None:
             return written
-        from shapechanger.demos.cloning.sb3 import as_ppo, as_sac
+        from shapechanger.demos.cloning.sb3 import as_ppo, as_sac  # PyTorch.
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
             if path is not None:
@@ -242,9 +242,7 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate and print."""
-        from shapechanger.demos.cloning.evaluation import evaluate
-        from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.demos.cloning.shrinking import ShrunkFrames
+        from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
 
         policy = CameraPolicy.load(self.policy)
         layout = policy.card.action_layout
@@ -267,8 +265,6 @@ class Evaluate:
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:
-            from shapechanger.demos.clone_report import clone_html, write_numbers
-
             require_file(self.report)
             page = clone_html(self.policy.name, policy, data, evaluation, None, note)
             write_atomic(self.report, page.encode())

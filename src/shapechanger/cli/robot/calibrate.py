@@ -33,6 +33,7 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     widest_pulses,
 )
+from shapechanger.robot.twin.robot import run_robot
 
 if TYPE_CHECKING:
     from shapechanger.robot.client.client import RobotClient
@@ -260,8 +261,6 @@ class Calibration:
     @contextmanager
     def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
         """Serve the robot with other settings, armed for a person."""
-        from shapechanger.robot.twin.robot import run_robot
-
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
             path = Path(folder, "profile.toml")
             path.write_bytes(self._profile.path.read_bytes())

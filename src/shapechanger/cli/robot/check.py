@@ -20,6 +20,7 @@ from shapechanger.robot.check.report import MARKS, facts, write_report
 from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.twin.check.trial import Bench, check_robot, require_level
 
 if TYPE_CHECKING:  # Starts a tenth of a second sooner.
     from shapechanger.robot.twin.check.trial import CheckLevel
@@ -84,7 +85,6 @@ class CheckRobot:
             f"{'twin' if on_twin else 'hardware'}, Python {platform.python_version()}, "
             f"{platform.platform()}"
         )
-        from shapechanger.robot.twin.check.trial import Bench, check_robot, require_level
 
         asks = sys.stdin.isatty() and not (self.yes or on_twin)
         bench = Bench(

@@ -322,7 +322,7 @@ def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
         policy = exported = OnnxClone(path)
         body, hz = exported.body, exported.control_hz
     else:
-        from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
 
         policy = CameraPolicy.load(path)
     with RobotClient.connect(robot, frames=False) as there:

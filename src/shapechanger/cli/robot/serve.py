@@ -19,10 +19,8 @@ from shapechanger.demos.cloning.onnx_policy import OnnxClone
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.errors import (
     MissingExtra,
-    ProfileError,
     RobotError,
     RobotRefused,
-    UnknownName,
     check_seed,
     no_policy_file,
 )
@@ -34,7 +32,6 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
 from shapechanger.robot.twin.start import Place
-from shapechanger.vehicles.courses.course import HOME, require_element
 from shapechanger.vehicles.remote.pilot import require_fit as require_policy
 
 _ROOM: Final = "room"
@@ -78,8 +75,7 @@ class Serve(Service):
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
 
     def _place(self, profile: Profile) -> Place:
-        finger = finger_of(profile, self.gap, self.finger_seed) if self.gap else None
-        return finger or place_of(profile, self.world, self.lens)
+        return place_of(profile, self.world, self.lens, self.gap, self.finger_seed)
 
     def _refuse_contradictions(self) -> None:
         """Refuse options that only apply to a twin."""
@@ -131,81 +127,31 @@ class Serve(Service):
                 raise PolicyError(f"{file} cannot drive {plan.card.robot}: {error}") from error
 
 
-def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
-    """Return the simulated finger for a rig with a finger's tendons.
+def place_of(
+    profile: Profile, world: str, lenses: Sequence[str], gap: str = "", seed: int | None = None
+) -> Place:
+    """Return the world of a twin.
 
     Args:
         profile: The robot.
-        gap: Name of the reality gap to draw from; "" for the nominal finger.
-        seed: Seed of the draw.
-
-    Returns:
-        The place, or None for other robots.
-    """
-    tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
-    if find_spec("mujoco") is None:
-        if gap:
-            raise MissingExtra("mujoco", "sim")
-        return None
-    from shapechanger.finger.anatomy import TENDONS
-    from shapechanger.finger.parameters import NOMINAL
-    from shapechanger.finger.twin import finger_place
-
-    if tendons != set(TENDONS):
-        if gap:
-            raise RobotError(
-                f"A --gap is between fingers, and {profile.name} has no servos for the tendons "
-                f"{', '.join(TENDONS)}."
-            )
-        return None
-    if not gap:
-        return finger_place(NOMINAL)
-    import numpy as np
-
-    from shapechanger.finger.gap import resolve_gap
-
-    return finger_place(resolve_gap(gap).draw(np.random.default_rng(seed or 0)))
-
-
-def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
-    """Return the world of a twin's vehicle.
-
-    Args:
-        profile: The robot.
-        world: Kind of course; "room" for the plain room, "" for the vehicle's default, or the room
-            without such a vehicle or without MuJoCo.
+        world: Kind of course; "room" for the plain room, "" for the robot's default, or the room
+            without such a default or without MuJoCo.
         lenses: Disturbances of the camera.
+        gap: Name of the reality gap that a finger is drawn from.
+        seed: Seed of that draw.
     """
-    if world == _ROOM or (not world and find_spec("mujoco") is None):
+    if world == _ROOM or not (world or gap or find_spec("mujoco")):
         if lenses:
             raise RobotError("The plain room has a plain camera: choose a --world for a --lens.")
         return Place()
-    try:
-        from shapechanger.vehicles.bodies import VEHICLES, require_fit
-        from shapechanger.vehicles.cameras.corruptions import find_corruption
-        from shapechanger.vehicles.courses import WORLDS
-        from shapechanger.vehicles.twin import course_place
-    except ModuleNotFoundError as error:
-        raise MissingExtra(error.name or "mujoco", "sim") from error
+    if gap and not find_spec("mujoco"):
+        raise MissingExtra("mujoco", "sim")
+    if gap or not (world or lenses):
+        # Without MuJoCo, products cannot be imported.
+        from shapechanger.finger.twin import rig_place  # MuJoCo, an extra.
 
-    for lens in lenses:
-        find_corruption(lens)
-    if not world and not lenses and (finger := finger_of(profile, "", None)) is not None:
-        return finger
-    if world and world not in WORLDS:
-        raise UnknownName("world", world, (_ROOM, *WORLDS))
-    parts = {output.part for output in profile.outputs if output.part}
-    if not world:
-        try:
-            require_fit(profile.body, parts)
-        except (ProfileError, UnknownName):
-            return Place()
-        return course_place(HOME[profile.body], profile.body, lenses)
-    if profile.body not in VEHICLES:
-        raise ProfileError(
-            f"{profile.path}: there is no {profile.body} in MuJoCo, only {', '.join(VEHICLES)}; "
-            "--world room takes any robot."
-        )
-    require_fit(profile.body, parts)
-    require_element(profile.body, floats=VEHICLES[profile.body].floats, world=world)
-    return course_place(world, profile.body, lenses)
+        if (rig := rig_place(profile, gap, seed)) is not None:
+            return rig
+    from shapechanger.vehicles.twin import place_of as course_of  # MuJoCo.
+
+    return course_of(profile, world, lenses)

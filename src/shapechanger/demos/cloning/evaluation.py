@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard, Head, class_numbers
 from shapechanger.demos.cloning.pictures import CloningError
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.layout import Layout
 
 if TYPE_CHECKING:
+    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.dataset import Dataset
 
 AskedHead = Literal["auto", "class", "regression"]

@@ -47,7 +47,7 @@ def export_clone(
     """
     import torch
 
-    from shapechanger.demos.cloning.examples import scaled
+    from shapechanger.demos.cloning.examples import scaled  # PyTorch.
 
     card = policy.card
     inputs: dict[str, Any] = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shapechanger.finger.identify.log import FingerLog, load_log, save_log
+from shapechanger.finger.identify.log import FingerLog, load_log, record_babble, save_log
 from shapechanger.finger.identify.result import IdentifiedFinger, ParameterEstimate, identify
 
 __all__ = [
@@ -11,5 +11,6 @@ __all__ = [
     "ParameterEstimate",
     "identify",
     "load_log",
+    "record_babble",
     "save_log",
 ]

@@ -31,6 +31,7 @@ from shapechanger.robot.check.report import (
     run_checks,
 )
 from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
+from shapechanger.robot.drivers.as5600 import As5600
 from shapechanger.robot.drivers.chip import SENSORS, device_errors
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
@@ -444,8 +445,6 @@ def _servo_bus(robot: StandingRobot) -> Results:
 
 def _encoder(robot: StandingRobot, plan: SensorPlan, joint: str) -> Results:
     """Check the magnet of the encoder at a joint."""
-    from shapechanger.robot.drivers.as5600 import As5600
-
     with closing(As5600(plan, robot.pins)) as sensor:
         _, magnet = sensor.measure(joint)
     if magnet == "gone":

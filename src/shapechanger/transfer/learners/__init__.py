@@ -16,6 +16,7 @@ from shapechanger.contract.env_ref import EnvRef, EnvTraits
 from shapechanger.errors import StudyError
 from shapechanger.identity import Identity
 from shapechanger.registry import LEARNERS
+from shapechanger.transfer.learners.evaluation import evaluation_envs
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -205,8 +206,6 @@ class Learner(Generic[_Settings]):
         Returns:
             One env for each episode; a single env if only one instance can exist.
         """
-        from shapechanger.transfer.learners.evaluation import evaluation_envs
-
         return evaluation_envs(env, self.settings.eval_episodes, self.settings.episode_limit)
 
     def evaluate(self, env: EnvRef, policy: Any, body_map: BodyMap) -> Evaluation:

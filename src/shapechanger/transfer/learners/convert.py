@@ -5,6 +5,7 @@ Reading one can run code in it.
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,52 @@ from stable_baselines3.common.save_util import load_from_zip_file
 from stable_baselines3.common.vec_env import DummyVecEnv
 from torch import nn
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import CorruptStudy, StudyError, no_policy_file
+from shapechanger.layout import Layout
+from shapechanger.transfer.body_map.envs import check_size
+from shapechanger.transfer.identities import Identities
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
+from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
 from shapechanger.transfer.learners.settings import OffPolicySettings, PpoSettings, Sb3Settings
+from shapechanger.transfer.transplant.model import check_supported
+
+
+def convert_zip(
+    path: Path, env: EnvRef, layouts: tuple[Layout, Layout], identity: Identities, command: str
+) -> TrainedPolicy:
+    """Convert a zip of PPO, SAC or TQC; loading it can run code in it.
+
+    Args:
+        path: A zip that the model's `save` wrote.
+        env: The env that it was trained in.
+        layouts: Layouts of the env's observations and actions.
+        identity: Version of the env.
+        command: The command that converts it.
+
+    Raises:
+        CorruptStudy: If the file is missing or no such zip.
+        StudyError: If it is of another algorithm or policy class.
+        SpaceMismatch: If the layouts do not fit the policy's spaces.
+    """
+    model = load_zip(path)
+    check_supported(model)
+    observation, action = layouts
+    check_size("observation of the policy", model.observation_space, observation)
+    check_size("action of the policy", model.action_space, action)
+    card = PolicyCard(
+        env,
+        observation,
+        action,
+        "converted",
+        settings_of_model(model),
+        int(model.num_timesteps),
+        int(model.seed or 0),
+        version("shapechanger"),
+        identity,
+        command,
+    )
+    return TrainedPolicy(model, None, card)
 
 
 def load_zip(path: Path) -> Any:

@@ -47,7 +47,7 @@ def study_html(
     found: Findings | None = None,
 ) -> str:
     """Render the report of a study."""
-    from shapechanger.transfer.report.curves import learning_curves
+    from shapechanger.transfer.report.curves import learning_curves  # Matplotlib.
 
     plan = study.plan
     found = findings(study) if found is None else found

@@ -67,7 +67,7 @@ def suite_html(
     """Render the page of a suite."""
     if not studies:
         raise StudyError(f"The suite {name} has no finished study to make a page of.")
-    from shapechanger.transfer.report.curves import learning_curves, sweep_chart
+    from shapechanger.transfer.report.curves import learning_curves, sweep_chart  # Matplotlib.
 
     first = next(iter(studies.values()))
     arm, plan = first.headline_arm, first.plan

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
+from shapechanger.vehicles.courses.channel import open_course
 from shapechanger.vehicles.courses.corridor import corridor
 from shapechanger.vehicles.courses.course import FLOODED, Course
 from shapechanger.vehicles.courses.geometry import distances_from_obstacle, turn_angles
@@ -39,8 +40,6 @@ def lay_out(world: str, seed: int) -> Course:
     rng = np.random.default_rng([zlib.crc32(world.encode()), seed])
     make: Callable[[np.random.Generator, int], Course | None] = corridor
     if world != "corridor":
-        from shapechanger.vehicles.courses.channel import open_course
-
         make = partial(open_course, world)
     for _ in range(_ATTEMPTS):
         course = make(rng, seed)

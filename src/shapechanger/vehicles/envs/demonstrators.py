@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import ProfileError, WorldError, check_seed
 from shapechanger.vehicles.courses.course import Course
 from shapechanger.vehicles.expert import PERIOD_S
-from shapechanger.vehicles.expert.driver import CourseExpert
+from shapechanger.vehicles.expert.driver import CourseExpert, traits_of
 from shapechanger.vehicles.waypoints import AHEAD_M, WIDEST_RAD
 from shapechanger.vehicles.world import MujocoWorld
 
@@ -62,6 +62,13 @@ class Demonstrator:
         kind = "The seed of a driver must be"
         self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
         self.begin()
+
+    @classmethod
+    def of(
+        cls, world: MujocoWorld, begin: Callable[[], Callable[[], NDArray[np.float32]]], seed: int
+    ) -> Self:
+        """Return one whose mistakes suit the vehicle of a world; arguments as for the class."""
+        return cls(begin, seed, traits_of(world.vehicle.name).sway)
 
     def begin(self) -> None:
         """Begin an episode."""

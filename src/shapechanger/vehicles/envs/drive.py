@@ -318,12 +318,10 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         Raises:
             ProfileError: If the robot has another control rate than the expert.
         """
-        from shapechanger.vehicles.envs.demonstrators import Demonstrator
-        from shapechanger.vehicles.expert.driver import traits_of
+        from shapechanger.vehicles.envs.demonstrators import Demonstrator  # SciPy.
 
         self.expert()  # Checks the control rate.
-        sway = traits_of(self.world.vehicle.name).sway
-        return Demonstrator(lambda: partial(self.expert(), None), seed, sway)
+        return Demonstrator.of(self.world, lambda: partial(self.expert(), None), seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's frame, shape (height, width, 3); None without a render mode.

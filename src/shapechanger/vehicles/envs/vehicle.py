@@ -181,8 +181,7 @@ class VehicleEnv(DriveEnv):
         Raises:
             ProfileError: If the robot has another control rate than the teacher.
         """
-        from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate
-        from shapechanger.vehicles.expert.driver import traits_of
+        from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate  # SciPy.
 
         require_rate(self.metadata["render_fps"])
 
@@ -190,7 +189,7 @@ class VehicleEnv(DriveEnv):
             action = act(observe_ranges(self.world)[np.newaxis])[0].astype(np.float32)
             return leave_rest(action, self.world.inputs().stands)
 
-        return Demonstrator(lambda: teach, seed, traits_of(self.world.vehicle.name).sway)
+        return Demonstrator.of(self.world, lambda: teach, seed)
 
     def _observe(self) -> tuple[Any, dict[str, Any]]:
         vehicle, world = self._vehicle, self.world
@@ -319,7 +318,10 @@ class WaypointEnv(WaypointView, DriveEnv):
         Raises:
             ProfileError: If the robot has another control rate than the expert.
         """
-        from shapechanger.vehicles.envs.demonstrators import require_rate, waypoint_demonstrator
+        from shapechanger.vehicles.envs.demonstrators import (
+            require_rate,
+            waypoint_demonstrator,
+        )  # SciPy.
 
         require_rate(self.metadata["render_fps"])
         return waypoint_demonstrator(self.world, seed)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from shapechanger.demos.cloning.onnx_policy import OnnxClone
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.statistics import is_same_rate
 from shapechanger.errors import RobotRefused, ShapechangerError
@@ -235,8 +236,6 @@ def main() -> int:
     robot = KnownRobot(**task["robot"])
     file = Path(task["policy"])
     try:
-        from shapechanger.demos.cloning.onnx_policy import OnnxClone
-
         policy = OnnxClone(file)
         with RobotClient.connect(robot, frames=False) as there:
             card = there.welcome
