@@ -26,7 +26,7 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.study_films import film_study, median_index, view_distance
 from shapechanger.files import read_json
 from shapechanger.finger.controller import FingerController
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.reports.films import write_film
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED

@@ -10,7 +10,7 @@ import numpy as np
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.finger.controller import FingerController
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 

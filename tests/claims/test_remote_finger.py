@@ -17,7 +17,7 @@ from shapechanger.finger.gap import GAPS, resolve_gap
 from shapechanger.finger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.paths import as_path
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot

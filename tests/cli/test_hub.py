@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import drop
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.demos.exchange.small import all_of, content_of, drive
 from tests.hub_server import OWNER, READER, FakeHub, Repository, serve_hub

@@ -117,7 +117,7 @@ def test_other_policies_are_exported_for_their_own_body(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A body with a policy that fits only one is refused."""
-    from shapechanger.finger.policies import POLICIES
+    from shapechanger.finger.task import POLICIES
 
     out = str(tmp_path / "finger.onnx")
     with pytest.raises(SystemExit):

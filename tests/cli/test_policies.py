@@ -16,7 +16,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from shapechanger.cli import main
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.settings import OffPolicySettings
 from shapechanger.vehicles.envs.demonstrators import CLONES

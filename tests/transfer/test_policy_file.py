@@ -18,7 +18,7 @@ from safetensors import numpy as safetensors
 import shapechanger
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy, save_policy, tensor_bytes
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -23,6 +24,11 @@ from shapechanger.finger.anatomy import (
     TENDONS,
 )
 from shapechanger.layout import Element, Feature
+
+POLICIES: Final = {
+    task: Path(__file__).parent / "policies" / f"{task}.safetensors" for task in ("reach", "track")
+}
+"""File of the policy of each task: "reach" for `Finger-v1`, "track" for `FingerTrack-v1`."""
 
 
 def fingertip(angles: ArrayLike) -> NDArray[np.float64]:

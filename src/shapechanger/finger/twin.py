@@ -32,18 +32,16 @@ _START_SPREAD: Final = 0.1
 def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place | None:
     """Return the place of a rig with the tendons of a finger; None for other robots.
 
-    Args:
-        profile: The robot.
-        gap: Name of the reality gap that the finger is drawn from; "" for the nominal finger.
-        seed: Seed of the draw; 0 if not given.
+    The finger is drawn from the named reality gap, with seed 0 if none is given; without a gap it
+    is the nominal finger.
 
     Raises:
         RobotError: If a gap is given for another robot.
     """
     tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
     if tendons == set(TENDONS):
-        drawn = resolve_gap(gap).draw(np.random.default_rng(seed or 0)) if gap else NOMINAL
-        return finger_place(drawn)
+        rng = np.random.default_rng(seed or 0)
+        return finger_place(resolve_gap(gap).draw(rng) if gap else NOMINAL)
     if gap:
         raise RobotError(
             f"A --gap is between fingers, and {profile.name} has no servos for the tendons "
@@ -94,18 +92,13 @@ class FingerWorld(World):
         self._model: mujoco.MjModel = spec.compile()
         self._data = mujoco.MjData(self._model)
         self._arms = parameters.arms
-        self._stiffness = parameters.tendon_stiffness or _CABLE_STIFFNESS
+        self.cable_stiffness = parameters.tendon_stiffness or _CABLE_STIFFNESS  # N/m
         self._tip = self._data.site_xpos[self._model.site(FINGERTIP).id]
         self._joint_noise = parameters.joint_noise
         self._order = np.arange(len(TENDONS))
         self._rig: Rig | None = None
         self.resting_v = RESTING_V
         self.place(seed)
-
-    @property
-    def cable_stiffness(self) -> float:
-        """Stiffness of the tendons, N/m."""
-        return self._stiffness
 
     def connect(self, tendons: Sequence[str], rig: Rig) -> None:
         """Attach the tendons of a rig; see `TendonWorld.connect`."""

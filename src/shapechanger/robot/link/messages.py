@@ -480,16 +480,13 @@ class PolicyState(RobotMessage, frozen=True):
 encode: Final = msgspec.msgpack.Encoder().encode
 """Encode a message."""
 
+_INVALID: Final = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
+
 
 def _decoded(decoder: msgspec.msgpack.Decoder[_M], limit: int, data: bytes) -> _M:
     if len(data) > limit:
         raise LinkError(f"A message of {len(data)} bytes is larger than the {limit} allowed.")
-    with translate_errors(
-        msgspec.MsgspecError,
-        UnicodeDecodeError,
-        RecursionError,
-        to=lambda error: LinkError(f"Not a valid message: {error}."),
-    ):
+    with translate_errors(*_INVALID, to=lambda error: LinkError(f"Not a valid message: {error}.")):
         return decoder.decode(data)
 
 
