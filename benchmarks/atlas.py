@@ -1,7 +1,7 @@
 """Transfer between bodies: suites of studies with intervals.
 
 The studies take hours and resume from `results/`. `SEEDS` sets the number of runs per arm, and
-`ONLY` names the studies to run, separated by spaces. The values of every run and the pictures of
+`ONLY` names the studies to run, separated by spaces. The values of every run and the images of
 the README are written next to the rows.
 """
 

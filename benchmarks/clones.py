@@ -21,11 +21,11 @@ def find_clone(vehicle: str) -> CameraPolicy | None:
 
 
 def sighted(policy: CameraPolicy) -> Callable[[Any], NDArray[np.float32]]:
-    """Return a driver that acts on the pictures of the env."""
+    """Return a driver that acts on the images of the env."""
     return policy.predict
 
 
 def blind(policy: CameraPolicy) -> Callable[[Any], NDArray[np.float32]]:
-    """Return a driver that acts on black pictures, regardless of the env's."""
+    """Return a driver that acts on black images, regardless of the env's."""
     always = policy.predict(np.zeros(_SIZE, np.uint8))  # The policy has no memory.
     return lambda _: always

@@ -13,11 +13,11 @@ optimistic. They were chosen by accuracy, with one to three seeds each:
   rows), histograms of edges, and the features of the shipped clones of car and tank. Edges were
   best for all cells and directions tried (9 variants): 0.73 to 0.78, against at most 0.70 for
   pixels and 0.72 for the clones' features.
-- Mirroring half of the pictures: 0.72 instead of 0.76, because this drive turns left only. The
+- Mirroring half of the images: 0.72 instead of 0.76, because this drive turns left only. The
   clone therefore mirrors in proportion to how far its driver steered to both sides.
 - Networks: four convolutions on colours with augmentation, label smoothing and averaged weights
   (0.62), five on edges (0.74 to 0.77), one to four networks averaged (0.75 and 0.76).
-- The plain network: pictures of 32, 64 and 128 pixels, with and without normalising each, with and
+- The plain network: images of 32, 64 and 128 pixels, with and without normalising each, with and
   without a hidden layer (nine variants): 0.60 to 0.65.
 
 **The held-out fifth.** `cloning-held-out` compares ways to use the last fifth of the frames before
@@ -141,12 +141,12 @@ def plain(
 
     Args:
         pictures: Shape (n, height, width, 3).
-        targets: Class of each picture, shape (n,).
+        targets: Class of each image, shape (n,).
         seed: Seed of weights and order.
         epochs: Passes over the data.
 
     Returns:
-        Function that predicts the classes of pictures.
+        Function that predicts the classes of images.
     """
     torch.manual_seed(seed)
     seen = _tensor(pictures)

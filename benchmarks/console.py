@@ -1,6 +1,6 @@
-"""Age of the console's pictures on its canvas, and its effect on the robot's control loop.
+"""Age of the console's images on its canvas, and its effect on the robot's control loop.
 
-The camera of the twin draws the capture time into the first rows of each picture. A script in the
+The camera of the twin draws the capture time into the first rows of each image. A script in the
 page reads it back from the canvas at each animation frame. The page's clock is compared with the
 robot's by pings on loopback; the fastest round trip counts, so the error is at most half of it.
 """
@@ -80,7 +80,7 @@ _HANG: Final = """setInterval(() => {
 
 
 def console(seconds: float = SECONDS) -> list[Row]:
-    """Measure the age of pictures on the page, and the control loop next to a slow page."""
+    """Measure the age of images on the page, and the control loop next to a slow page."""
     with _robot() as robot, _browser() as browser:
         ages, error_ms = _ages_ms(browser, robot, seconds)
         alone = _commands_ms(robot, seconds / 2)
@@ -160,7 +160,7 @@ def _page(browser: Browser, robot: RunningRobot) -> Generator[Page]:
 
 
 def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[list[float], float]:
-    """Return the age of each picture on the canvas, and the error of the clocks, ms."""
+    """Return the age of each image on the canvas, and the error of the clocks, ms."""
     with _page(browser, robot) as page:
         page_ms, robot_ns, error_ms = page.evaluate(_CALIBRATE, [robot.known.key, 50])
         page.evaluate(_WATCH)

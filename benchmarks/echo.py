@@ -1,6 +1,6 @@
 """Daemon with a fake guard and camera of negligible cost, to measure the link alone.
 
-A new picture is always available, so each command is answered at once with an observation that
+A new image is always available, so each command is answered at once with an observation that
 carries one, like on a robot whose camera is faster than its client.
 """
 
@@ -106,7 +106,7 @@ class EchoRobot:
         self._folder.cleanup()
 
     def round_trips(self, count: int) -> NDArray[np.float64]:
-        """Return the seconds from sending a command to receiving the picture that answers it."""
+        """Return the seconds from sending a command to receiving the image that answers it."""
         times: list[float] = []
         with RobotClient.connect(self._known) as client:
             client.take()
@@ -122,7 +122,7 @@ class EchoRobot:
 
 
 def main(guard_fd: int, fifo: Path) -> None:
-    """Run guard and camera: a state and a picture every 2 ms and after each order."""
+    """Run guard and camera: a state and an image every 2 ms and after each order."""
     rng = np.random.default_rng(0)
     small = rng.integers(0, 256, (15, 20, 3), dtype=np.uint8)
     pictures = [

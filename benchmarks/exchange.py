@@ -1,4 +1,4 @@
-"""What the video of a LeRobot export changes in the pictures of the vehicles' cameras."""
+"""What the video of a LeRobot export changes in the images of the vehicles' cameras."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MB = 1e6
 
 
 def video() -> list[Row]:
-    """Export a minute of the expert's drive in each world, import it, and compare the pictures."""
+    """Export a minute of the expert's drive in each world, import it, and compare the images."""
     return [_row(vehicle) for vehicle in asked("vehicle", _VEHICLES)]
 
 

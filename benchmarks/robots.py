@@ -36,7 +36,7 @@ _PROCESSES: Final[dict[Literal["guard", "daemon"], int]] = {"guard": 25, "daemon
 
 
 def link(round_trips: int = ROUND_TRIPS) -> list[Row]:
-    """Measure the round trip of command and picture, and the resources used at 20 Hz."""
+    """Measure the round trip of command and image, and the resources used at 20 Hz."""
     with EchoRobot() as echo:
         times = np.sort(echo.round_trips(round_trips)) * 1e3
     p50, p99 = np.percentile(times, [50, 99])

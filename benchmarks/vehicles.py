@@ -45,7 +45,7 @@ def layouts(usual: int) -> range:
 
 
 def frames() -> list[Row]:
-    """Measure steps per second of each vehicle, with a picture each."""
+    """Measure steps per second of each vehicle, with an image each."""
     return [_frames_row(vehicle) for vehicle in ("car", *sorted(set(VEHICLES) - {"car"}))]
 
 
@@ -162,7 +162,7 @@ def expert() -> list[Row]:
 
 
 def clone() -> list[Row]:
-    """Score the shipped policies, which see only pictures; `ONLY` names vehicles."""
+    """Score the shipped policies, which see only images; `ONLY` names vehicles."""
     rows: list[Row] = []
     for vehicle in asked("vehicle", VEHICLES):
         policy = find_clone(vehicle)
@@ -173,7 +173,7 @@ def clone() -> list[Row]:
         knows = _expert_score(vehicle, courses)
         with closing(_env(vehicle, image=True)) as env:
             score = _score(env, sighted(policy), courses)
-        with closing(_env(vehicle, image=False)) as env:  # No rendering needed for black pictures.
+        with closing(_env(vehicle, image=False)) as env:  # No rendering needed for black images.
             dark = _score(env, blind(policy), courses, BLIND_S)
         share = score.speed / knows.speed
         rows += [
@@ -199,7 +199,7 @@ def clone() -> list[Row]:
 
 
 def students() -> list[Row]:
-    """Score cars trained by RL on distances, and their students, which see only pictures.
+    """Score cars trained by RL on distances, and their students, which see only images.
 
     `SEEDS` of each are trained from scratch by the command line.
     """

@@ -82,7 +82,7 @@ SOURCES: Final = {
 OWN: Final = tuple(list(SOURCES)[:4])  # Each is named as its vehicle.
 # Those that see other worlds than their targets.
 ACROSS: Final = tuple(list(SOURCES)[4:])
-# Two clones of the same pictures, whose labels differ.
+# Two clones of the same images, whose labels differ.
 BY_STEERING: Final = {
     "car-by-its-steering": Source("car", labels="steering"),
     "car-by-the-path": Source("car", labels="path nearby"),
@@ -151,7 +151,7 @@ def worlds() -> list[Row]:
 
 
 def labels() -> list[Row]:
-    """Compare clones of a driver's own steering with clones of the path, on equal pictures.
+    """Compare clones of a driver's own steering with clones of the path, on equal images.
 
     The driver is the expert at the whole robot of a car, by steering and throttle.
     """
@@ -244,7 +244,7 @@ def whole_robot() -> list[Row]:
 def cameras() -> list[Row]:
     """Compare drives of the car's clone behind other cameras with those behind its training's.
 
-    The pictures are rectified by the profile of each camera, along the same courses from the same
+    The images are rectified by the profile of each camera, along the same courses from the same
     starts. `SEEDS` are one by default.
     """
     OUT.mkdir(parents=True, exist_ok=True)

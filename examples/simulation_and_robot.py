@@ -18,7 +18,7 @@ import shapechanger  # noqa: F401  # Registers the ids.
 
 
 def drive(picture: np.ndarray) -> np.ndarray:
-    """Return steering and throttle from a picture: go where the floor reaches furthest.
+    """Return steering and throttle from an image: go where the floor reaches furthest.
 
     Args:
         picture: RGB, (height, width, 3). -1 steers left.

@@ -1,4 +1,4 @@
-"""Draw the pictures and clips of README, gallery and docs: `make gallery`.
+"""Draw the images and clips of README, gallery and docs: `make gallery`.
 
 `python scripts/draw_pictures.py --only vehicles` draws one of them, and `--out FOLDER` writes
 elsewhere than to docs/pictures. The clip from one ant to another trains for some minutes first, in
@@ -172,7 +172,7 @@ _LEANING: Final = {"reset_noise_scale": 0.08}
 
 
 def _clip(stem: Path, panels: list[list[Picture]]) -> None:
-    """Write films side by side, and a frame of them as the picture that stands for the clip."""
+    """Write films side by side, and a frame of them as the image that stands for the clip."""
     frames = [np.concatenate(row, axis=1) for row in zip(*panels, strict=True)]
     write_film(cast("list[NDArray[Any]]", frames), stem.with_suffix(".webm"), _FPS)
     iio.imwrite(stem.with_suffix(".jpg"), frames[len(frames) // 3], quality=80)

@@ -37,7 +37,7 @@ _FENCE: Final = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
 # Words for the site alone: they link to pages that no code host has.
 _ONLY_HERE: Final = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
 _MERMAID: Final = re.compile(r"^```mermaid\n(.*?)^```", re.DOTALL | re.MULTILINE)
-# A picture that leads to a clip: code hosts show no clips inside a page.
+# An image that leads to a clip: code hosts show no clips inside a page.
 _CLIP: Final = re.compile(r"\[!\[([^\]]*)\]\(([^)\s]+)\)\]\(([^)\s]+\.webm)\)")
 _SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
 _SCHEME: Final = re.compile(r"[a-z]+:")
@@ -108,7 +108,7 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def _player(match: re.Match[str]) -> str:
-    """Return a player for a picture that leads to a clip."""
+    """Return a player for an image that leads to a clip."""
     words, picture, clip = (html.escape(part) for part in match.groups())
     return (
         f'<video controls loop muted playsinline preload="none" poster="{picture}" '

@@ -101,13 +101,13 @@ def _odrl_page() -> SitePage:
 
 
 def _thumbnail(page: SitePage) -> str:
-    """Return a small picture that leads to a page; "" for a page without one."""
+    """Return a small image that leads to a page; "" for a page without one."""
     shape = "{ width=96 height=72 loading=lazy }"
     return f"[![{page.title}]({page.title}.jpg){shape}]({page.title}.md)" if page.pictures else ""
 
 
 def environment_page(env_id: str) -> SitePage:
-    """Return the page of an env: registry, docstring, layouts, certificate and picture.
+    """Return the page of an env: registry, docstring, layouts, certificate and image.
 
     Raises:
         RenderError: If nothing renders on CI, where nothing may be missing.
@@ -190,7 +190,7 @@ def _facts(env_id: str, spec: Any, entry_point: str) -> list[tuple[str, str]]:
 
 
 def _missing(what: str, error: RenderError) -> str:
-    """Return a note of undrawable pictures; on CI, where nothing may be missing, raise."""
+    """Return a note of undrawable images; on CI, where nothing may be missing, raise."""
     if os.environ.get("CI") == "true":
         raise error
     return f"{what}: {error}"

@@ -408,7 +408,7 @@ _COLOURS: Final = (
 
 @dataclass
 class _Drawing:
-    """Elements of a picture, and how far down they reach."""
+    """Elements of an image, and how far down they reach."""
 
     elements: list[str] = field(default_factory=list[str])
     colours: dict[int, str] = field(default_factory=dict[int, str])
@@ -466,7 +466,7 @@ def draw_wiring(profile: Profile, name: str) -> str:
 
     Args:
         profile: The profile.
-        name: What the picture is called.
+        name: What the image is called.
     """
     drawing = _Drawing()
     devices = devices_of(profile)

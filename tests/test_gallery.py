@@ -1,4 +1,4 @@
-"""The gallery: its pictures, its clips, and the command that draws them."""
+"""The gallery: its images, its clips, and the command that draws them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_the_command_draws_one_picture(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_bodies_are_filmed(tmp_path: Path) -> None:
-    """A clip has a frame for each twentieth of a second, and a picture that stands for it."""
+    """A clip has a frame for each twentieth of a second, and an image that stands for it."""
     require_film(tmp_path / "one.webm")  # The check of commands that take a film's name.
     film_bodies((("InvertedPendulum",),), 0.5, rows=160)(tmp_path / "one")
     assert count_frames_and_secs(str(tmp_path / "one.webm")) == (10, 0.5)
@@ -50,19 +50,19 @@ def test_bodies_are_filmed(tmp_path: Path) -> None:
 
 
 def test_pictures_are_small() -> None:
-    """All pictures together stay below 6 MB."""
+    """All images together stay below 6 MB."""
     assert sum(path.stat().st_size for path in PICTURES.iterdir()) < 6e6
 
 
 def test_the_gallery_shows_what_the_command_draws() -> None:
-    """Each picture and each clip is on the page."""
+    """Each image and each clip is on the page."""
     page = GALLERY.read_text()
     for name in (*STILLS, *CLIPS):
         assert f"pictures/{name}." in page
 
 
 def test_clips_have_players_on_the_site() -> None:
-    """A picture that leads to a clip is a link on code hosts, and a player on the site."""
+    """An image that leads to a clip is a link on code hosts, and a player on the site."""
     page = cast("Any", SimpleNamespace(file=SimpleNamespace(src_uri="gallery.md")))
     shown = on_page_markdown(GALLERY.read_text(), page)
     clips = list(PICTURES.glob("*.webm"))

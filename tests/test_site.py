@@ -185,7 +185,7 @@ def test_every_exported_name_is_in_the_reference() -> None:
 
 
 def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nothing renders, the page comes without picture, with a note; on CI it fails."""
+    """Where nothing renders, the page comes without image, with a note; on CI it fails."""
     _require("griffe")
 
     def fail(*_: object) -> bytes:

@@ -1,4 +1,4 @@
-"""Frames and pictures of the MuJoCo envs."""
+"""Frames and images of the MuJoCo envs."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_depth_frames() -> None:
 
 
 def test_envs_render_in_turn(ant: Any) -> None:
-    """Switching between envs and pictures gives no black frames."""
+    """Switching between envs and images gives no black frames."""
     frame = ant.render()
     with gym.make("shapechanger/BigAnt-v1", render_mode="rgb_array", **_SIZE) as other:
         other.reset(seed=0)
@@ -251,12 +251,12 @@ def test_the_old_renderer_is_freed(ant: Any) -> None:
     assert len(ant.unwrapped.mujoco_renderer._viewers) == 1
 
 
-# Pictures.
+# Images.
 
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_a_picture_shows_the_whole_body(env_id: str) -> None:
-    """At its own reach, the body fills the picture without being cropped."""
+    """At its own reach, the body fills the image without being cropped."""
     with gym.make(env_id) as made:
         env: Any = made.unwrapped
         _without_shadows(env)
@@ -355,7 +355,7 @@ print("closed")
 
 
 def test_a_window_opens(display: str) -> None:
-    """Human rendering works through steps, pictures and a new body."""
+    """Human rendering works through steps, images and a new body."""
     run = run_python(_WINDOW, DISPLAY=display)
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines() == ["(80, 60)", "True", "True", "True", "closed"]

@@ -1,4 +1,4 @@
-"""Frames and pictures of a finger."""
+"""Frames and images of a finger."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def test_demonstrations_pair_images_with_intended_actions() -> None:
-    """Recorded actions are the intended ones for the picture before them."""
+    """Recorded actions are the intended ones for the image before them."""
     shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
     assert shown.pictures.shape == (150, 12, 20, 3)
     assert shown.episodes == (20,) * 7 + (10,)

@@ -15,7 +15,7 @@ from shapechanger.robot.client.known_robots import known_names, recall
 from shapechanger.robot.client.observations import RobotSpaces
 from shapechanger.robot.link.messages import Welcome
 
-_NO_CAMERA: Final = (160, 120)  # Size of the pictures that a robot without a camera never sends.
+_NO_CAMERA: Final = (160, 120)  # Size of the images that a robot without a camera never sends.
 
 
 class Link:

@@ -19,7 +19,7 @@ from shapechanger.robot.client.operator import Takeover, interruption
 from shapechanger.robot.link.messages import Observation
 
 CAMERA: Final = "camera"
-"""Name of the picture in an observation."""
+"""Name of the image in an observation."""
 
 _TELL_AFTER_S: Final = 2.0  # Shorter waits are not logged.
 
@@ -52,7 +52,7 @@ class Shapechanger(Robot):
 
     @property
     def observation_features(self) -> dict[str, Any]:
-        """Names of the robot's state, and the shape of its camera's picture."""
+        """Names of the robot's state, and the shape of its camera's image."""
         return dict.fromkeys(_state_names(self._link.spaces), float) | self.cameras
 
     @property
@@ -62,7 +62,7 @@ class Shapechanger(Robot):
 
     @property
     def cameras(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each camera's picture; LeRobot counts them for its threads."""
+        """Shape of each camera's image; LeRobot counts them for its threads."""
         spaces = self._link.spaces
         return {CAMERA: spaces.observation_layout[IMAGE].shape} if spaces.has_image else {}
 
@@ -86,7 +86,7 @@ class Shapechanger(Robot):
 
         Raises:
             UnknownName: If there is no known robot of this name.
-            LinkError: If it cannot be reached, or sends no picture.
+            LinkError: If it cannot be reached, or sends no image.
             RobotRefused: If it refuses the client, or nobody lets it move within `wait_s`.
         """
         client = self._link.open()
@@ -111,7 +111,7 @@ class Shapechanger(Robot):
         one NaN would spoil the statistics of a dataset.
 
         Returns:
-            Numbers of the state by name, and the picture, RGB, `uint8`, shape (height, width, 3).
+            Numbers of the state by name, and the image, RGB, `uint8`, shape (height, width, 3).
 
         Raises:
             LinkError: If the link is lost, or no observation arrives in time.
@@ -150,7 +150,7 @@ class Shapechanger(Robot):
         self._link.close()
 
     def _await_driver(self, client: RobotClient) -> Received:
-        """Wait for an armed robot that we or a person drive, and its first picture.
+        """Wait for an armed robot that we or a person drive, and its first image.
 
         Raises:
             RobotRefused: If none arrives in time.

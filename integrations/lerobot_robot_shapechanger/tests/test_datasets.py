@@ -24,13 +24,13 @@ NUMBERS = ("action", "observation.state", "next.reward")
 
 
 def smooth(number: int, width: int = 64, height: int = 48) -> np.ndarray:
-    """Return a picture that video keeps well: a gradient, brighter by 5 with each number."""
+    """Return an image that video keeps well: a gradient, brighter by 5 with each number."""
     ramp = np.linspace(0, 60, width)[None, :, None]
     return np.broadcast_to(ramp + 5.0 * number, (height, width, 3)).astype(np.uint8)
 
 
 def smooth_drive(data: Path, count: int, hz: float, *, rewarded: bool = True) -> None:
-    """Record an episode with such pictures."""
+    """Record an episode with such images."""
     rng = np.random.default_rng(count)
     steps = [
         (
@@ -72,7 +72,7 @@ def test_lerobot_reads_an_export(tmp_path: Path, images: bool, hz: float) -> Non
             assert item["task"] == "Drive."
             seen = item[CAMERA].numpy().transpose(1, 2, 0) * 255
             pixels = decode_picture(episode.jpeg(step) or b"", "")
-            # The next picture is brighter by 5. Decoders of JPEG differ by rounding.
+            # The next image is brighter by 5. Decoders of JPEG differ by rounding.
             assert np.abs(seen - pixels).mean() < (0.2 if images else 2.0)
             number += 1
     windows = LeRobotDataset(
@@ -87,7 +87,7 @@ def test_lerobot_reads_an_export(tmp_path: Path, images: bool, hz: float) -> Non
 
 
 def test_statistics_are_those_of_lerobot(tmp_path: Path) -> None:
-    """Ours, and what LeRobot computes from the same numbers and pictures."""
+    """Ours, and what LeRobot computes from the same numbers and images."""
     for count in (30, 12):
         smooth_drive(tmp_path / "data", count, 20.0)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", images=True)

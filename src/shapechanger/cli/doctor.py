@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _PACKAGE: Final = "shapechanger"
 # Extras that combine others, or are for developers of Shapechanger.
 _NOT_LISTED: Final = ("all", "dev")
-# Longer than any driver needs for one picture, s.
+# Longer than any driver needs for one image, s.
 _PATIENCE_S: Final = 120
 # Drawn in a separate process, because a broken driver ends the process.
 _DRAW: Final = """
@@ -128,7 +128,7 @@ def _extras_of(requirement: Requirement) -> list[str]:
 
 
 def _drawing() -> Results:
-    """Yield whether MuJoCo draws a picture, and with which library."""
+    """Yield whether MuJoCo draws an image, and with which library."""
     done = subprocess.run(
         [sys.executable, "-c", _DRAW],
         capture_output=True,

@@ -132,13 +132,13 @@ class Render:
     env: EnvId
     """Id of the env."""
     out: Path
-    """The picture to write, a PNG file."""
+    """The image to write, a PNG file."""
     body: Body = ""
     options: EnvOptions = ""
     width: int = 640
-    """Width of the picture in pixels."""
+    """Width of the image in pixels."""
     height: int = 480
-    """Height of the picture in pixels."""
+    """Height of the image in pixels."""
 
     def run(self) -> None:
         """Write the image."""

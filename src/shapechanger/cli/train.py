@@ -51,7 +51,7 @@ class Train:
     """Seed of everything random."""
     teacher: Path | None = None
     """Policy of the same vehicle on distances, such as one of CarRanges: trains a student of it,
-    which sees pictures alone, instead of learning by trial."""
+    which sees images alone, instead of learning by trial."""
     tensorboard: Path | None = None
     """Folder for TensorBoard's logs; none are written if not given."""
 

@@ -79,7 +79,7 @@ def names_every_number(make: MakeEnv) -> None:
         ("observation", observation, env.observation_space),
         ("action", action, env.action_space),
     ):
-        # A picture is one block of a layout, and so is each part of a Dict.
+        # An image is one block of a layout, and so is each part of a Dict.
         kinds = (gym.spaces.Box, gym.spaces.Dict)[: 2 if side == "observation" else 1]
         _require(
             isinstance(space, kinds) and gym.spaces.flatdim(space) == layout.size,

@@ -27,7 +27,7 @@ from shapechanger.layout import Layout
 _NS_PER_S: Final = 1e9
 
 Shrink = Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]]
-"""Function that reduces a picture of an episode, shape (H, W, 3), to save memory."""
+"""Function that reduces an image of an episode, shape (H, W, 3), to save memory."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Dataset:
     """Observations and actions of one or more episodes, step by step.
 
     Attributes:
-        pictures: Red, green and blue, shape (n, H, W, 3); None without pictures.
+        pictures: Red, green and blue, shape (n, H, W, 3); None without images.
         states: Shape (n, k), NaN where nothing measured a value; None without states.
         actions: Decided actions, shape (n, m), in the order of the layout.
         episodes: Number of steps of each episode, in order; each positive.
@@ -84,7 +84,7 @@ def load_dataset(
         data: A recording, one episode of it, or anything that `shapechanger demos import` reads.
             It is not changed.
         drivers: Drivers whose steps to load.
-        shrink: Function that reduces each picture, to save memory; None to keep it as it is.
+        shrink: Function that reduces each image, to save memory; None to keep it as it is.
 
     Raises:
         DemosError: If there are no such steps, or the episodes do not match each other.
@@ -122,7 +122,7 @@ def load_dataset(
 
 
 def count_steps(data: Path, *, drivers: Collection[str] = ("person", "expert")) -> int:
-    """Count the steps that `load_dataset` would load, without decoding any picture.
+    """Count the steps that `load_dataset` would load, without decoding any image.
 
     Args:
         data: As in `load_dataset`.
@@ -132,7 +132,7 @@ def count_steps(data: Path, *, drivers: Collection[str] = ("person", "expert")) 
 
 
 class _Part(NamedTuple):
-    """The chosen steps of one episode, each with its picture if there are any."""
+    """The chosen steps of one episode, each with its image if there are any."""
 
     name: str
     header: EpisodeHeader
@@ -180,7 +180,7 @@ def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Itera
 def _episodes(
     data: Path,
 ) -> Iterator[tuple[str, EpisodeHeader, Iterator[tuple[Step, bytes | None]]]]:
-    """Yield the name, the header, and the kept steps with their pictures, of each episode."""
+    """Yield the name, the header, and the kept steps with their images, of each episode."""
     is_recording = data.is_dir() and any(map(is_episode, (data, *data.iterdir())))
     if is_recording or not data.exists():
         for path in episodes_of(data):
@@ -194,7 +194,7 @@ def _episodes(
 
 
 def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDArray[np.uint8]:
-    """Decode a picture, and reduce it."""
+    """Decode an image, and reduce it."""
     pixels = decode_picture(jpeg, where)
     size = pixels.shape[1], pixels.shape[0]
     if part.header.image_size not in {None, size}:
@@ -206,7 +206,7 @@ def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDAr
 
 
 def _require_same(parts: list[_Part]) -> None:
-    """Refuse episodes that differ in layout, picture size or rate."""
+    """Refuse episodes that differ in layout, image size or rate."""
     first = parts[0]
     for part in parts[1:]:
         same = {

@@ -1,6 +1,6 @@
 """Pictures: JPEGs of unknown origin, checked before they are decoded, and actions drawn below.
 
-simplejpeg is imported on first use, because recordings without pictures need no decoder.
+simplejpeg is imported on first use, because recordings without images need no decoder.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ def decode_picture(jpeg: bytes, name: str, *, grey: bool = False) -> NDArray[np.
 
     Args:
         jpeg: Its bytes.
-        name: How to name the picture in errors.
+        name: How to name the image in errors.
         grey: Whether to decode the brightness only.
 
     Returns:
         Red, green and blue, shape (height, width, 3); shape (height, width) with `grey`.
 
     Raises:
-        DemosError: If the picture is damaged, or larger than `MAX_PIXELS`.
+        DemosError: If the image is damaged, or larger than `MAX_PIXELS`.
         MissingExtra: If simplejpeg is not installed.
     """
     picture_size(jpeg, name)
     try:
-        # Strict by default: a truncated picture is an error, not filled up with grey.
+        # Strict by default: a truncated image is an error, not filled up with grey.
         pixels = _simplejpeg().decode_jpeg(jpeg, colorspace="GRAY" if grey else "RGB")
     except ValueError as error:
         raise DemosError(f"The picture {name} is damaged ({error}): {_REMEDY}.") from error
@@ -69,7 +69,7 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
 
     Args:
         jpeg: Its bytes.
-        name: How to name the picture in errors.
+        name: How to name the image in errors.
     """
     if jpeg.count(_SCAN) > _MAX_SCANS:
         raise DemosError(
@@ -90,7 +90,7 @@ def is_grey(jpeg: bytes, name: str) -> bool:
 
     Args:
         jpeg: Its bytes.
-        name: How to name the picture in errors.
+        name: How to name the image in errors.
     """
     return _header(jpeg, name)[2] == _GREY
 
@@ -129,7 +129,7 @@ _WANTED: Final = (255, 255, 255)
 
 
 def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[np.uint8]:
-    """Return a picture with the action of its step below it, one bar per value.
+    """Return an image with the action of its step below it, one bar per value.
 
     A bar starts at 0, or at the bound nearest to 0: steering to the left is a bar to the left. Its
     colour shows the driver; a white line shows what a policy wanted while somebody else drove.
@@ -164,7 +164,7 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
 
 
 def blank(size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return an empty picture, for episodes without a camera.
+    """Return an empty image, for episodes without a camera.
 
     Args:
         size: Width and height in pixels.

@@ -3,7 +3,7 @@
 Besides observations and actions, a step keeps what the env provides: in `info`, `captured_ns`,
 `decided_ns`, `action_applied`, `intervene_action`, `absent` (names of missing state values),
 `reward_terms`, `stop_reason`, `truncated_because` and `is_success`; on the unwrapped env,
-`newest_jpeg` (bytes of the picture as received), `record_clock` and `welcome`.
+`newest_jpeg` (bytes of the image as received), `record_clock` and `welcome`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class EncodedObservation:
     """An observation in the form in which it is recorded.
 
     Attributes:
-        jpeg: The picture; None without one.
+        jpeg: The image; None without one.
         state: The state; NaN where nothing measured a value.
         captured_ns: Capture time on the robot's clock; None if unknown.
     """
@@ -50,14 +50,14 @@ class ObservationEncoder:
     """Splits the observations of an env into a JPEG and a state.
 
     Args:
-        env: Its observations are a picture, a state, or a Dict of `image` and `state`.
-        quality: JPEG quality in percent for pictures that the env returns as arrays; colours keep
+        env: Its observations are an image, a state, or a Dict of `image` and `state`.
+        quality: JPEG quality in percent for images that the env returns as arrays; colours keep
             full resolution.
 
     Attributes:
         action_layout: Meaning of the values of an action.
         state_layout: Meaning of the values of a state; None without a state.
-        has_picture: Whether observations contain pictures.
+        has_picture: Whether observations contain images.
 
     Raises:
         DemosError: If the spaces are of another kind, or the env has no layouts.
@@ -155,7 +155,7 @@ def _layout(env: gym.Env[Any, Any], name: str, side: str) -> Layout:
 
 
 QUALITY: Final = 95
-"""JPEG quality in percent for pictures that an env returns as arrays."""
+"""JPEG quality in percent for images that an env returns as arrays."""
 
 _COLLISION: Final = "reward_collision"
 _SECRET: Final = frozenset({"key"})
@@ -181,12 +181,12 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
     `step` raises the error; everything written before is complete.
 
     Args:
-        env: Its observations are a picture, a state, or a Dict of `image` and `state`; it has
+        env: Its observations are an image, a state, or a Dict of `image` and `state`; it has
             layouts.
         recording: Folder of the recording; created if missing.
         driver: Who decides the actions passed to `step`.
         about: Further fields of the header, such as `robot`, `body`, `source` and `notes`.
-        quality: JPEG quality in percent for pictures that the env returns as arrays.
+        quality: JPEG quality in percent for images that the env returns as arrays.
         spare_bytes: Disk space to leave free.
 
     Attributes:

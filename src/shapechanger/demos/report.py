@@ -1,4 +1,4 @@
-"""The report of recorded demonstrations: one HTML file with pictures and charts."""
+"""The report of recorded demonstrations: one HTML file with images and charts."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
 from shapechanger.reports.page import jpeg_uri, render
 
-# Pictures on a page, so that the page of a hundred episodes still opens.
+# Images on a page, so that the page of a hundred episodes still opens.
 _MAX_PICTURES: Final = 600
 _MIN_PER_EPISODE, _MAX_PER_EPISODE = 6, 24
 _MAX_MARKED: Final = 12
 _MAX_OPEN_EPISODES: Final = 3
-_MAX_WIDTH: Final = 200  # Pixels; wider pictures are downsampled.
+_MAX_WIDTH: Final = 200  # Pixels; wider images are downsampled.
 
 _DROPPED: Final = "#d5d9de"
 # Colours of the numbers of an action, by Okabe and Ito, as those of the drivers.
@@ -231,7 +231,7 @@ def _reach(*bounds: float) -> float:
 
 
 def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
-    """Up to `most` evenly spaced pictures of an episode, and those at its marks."""
+    """Up to `most` evenly spaced images of an episode, and those at its marks."""
     seen = [step for step in episode.steps if step.frame]
     if not seen:
         return []
@@ -268,7 +268,7 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
 
 
 def _thumbnail(episode: Episode, step: Step) -> str:
-    """A picture as a data URI; empty if it is damaged."""
+    """An image as a data URI; empty if it is damaged."""
     try:
         jpeg = episode.jpeg(step)
         if jpeg is None:

@@ -46,7 +46,7 @@ RANGES_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         for env_id, (vehicle, _) in VEHICLE_ENVS.items()
     }
 )
-"""Vehicle and summary by id, for the same task on distances instead of pictures."""
+"""Vehicle and summary by id, for the same task on distances instead of images."""
 
 WAYPOINT_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {

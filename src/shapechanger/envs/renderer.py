@@ -92,7 +92,7 @@ class Renderer(MujocoRenderer):
     def _floors_below(self) -> Generator[None]:
         """Draw floors below the body that the camera follows, which may walk off them.
 
-        Contacts take floors as infinite, and pictures do not. They move by whole tiles, so that
+        Contacts take floors as infinite, and images do not. They move by whole tiles, so that
         they seem to stay.
         """
         if self._follow is None:

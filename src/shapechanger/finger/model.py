@@ -52,7 +52,7 @@ FINGERTIP: Final = "fingertip"
 HOOD: Final = "extensor_hood"
 """Name of the tendon that couples the end joint with the middle one."""
 TARGET: Final = "target"
-"""Name of the body that marks the target of the fingertip, for pictures."""
+"""Name of the body that marks the target of the fingertip, for images."""
 
 # Damping ratio of a stretched tendon: cords and tissue oscillate only briefly.
 _CABLE_DAMPING_RATIO: Final = 0.3
@@ -61,7 +61,7 @@ _HAND: Final = (0.75, 0.57, 0.48, 1.0)
 # As large as the tolerance of a reached target.
 _MARK: Final = (0.10, 0.55, 0.25, 0.45)
 _MARK_RADIUS_M: Final = 0.005
-# Length of the metacarpal, two thirds of a palm, for pictures only.
+# Length of the metacarpal, two thirds of a palm, for images only.
 _METACARPAL_M: Final = 0.060
 _FLEX: Final = (0.0, 1.0, 0.0)
 _ABDUCT: Final = (0.0, 0.0, 1.0)
@@ -86,7 +86,7 @@ def build_finger(
     Args:
         parameters: Parameters of the finger.
         drive: Drive of its tendons.
-        anatomy: Whether to add bones and tendon routes for pictures; the motion is the same.
+        anatomy: Whether to add bones and tendon routes for images; the motion is the same.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "finger"

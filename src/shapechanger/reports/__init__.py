@@ -1,1 +1,1 @@
-"""Parts of report pages: template, pictures, charts and formatted numbers."""
+"""Parts of report pages: template, images, charts and formatted numbers."""

@@ -1,4 +1,4 @@
-"""Self-contained HTML pages: templates, and pictures as data URIs."""
+"""Self-contained HTML pages: templates, and images as data URIs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _environment(folder: Path) -> Environment:
 
 
 def png_uri(picture: NDArray[np.uint8]) -> str:
-    """Lossless data URI of a picture, shape (height, width, 3)."""
+    """Lossless data URI of an image, shape (height, width, 3)."""
     from PIL import Image
 
     file = io.BytesIO()

@@ -3,8 +3,8 @@
 `CloneLearner` records an env's demonstrator, and evaluates a clone at each budget. `train_student`
 learns from a teacher with privileged observations: distances, speed and rate of turn, from which
 reinforcement learning takes two minutes. First the teacher drives, and the student clones it from
-pictures alone (D. Chen et al., "Learning by Cheating", CoRL 2019). Then the student drives, and its
-pictures are labelled with the teacher's actions (S. Ross et al., "A Reduction of Imitation Learning
+images alone (D. Chen et al., "Learning by Cheating", CoRL 2019). Then the student drives, and its
+images are labelled with the teacher's actions (S. Ross et al., "A Reduction of Imitation Learning
 and Structured Prediction to No-Regret Online Learning", AISTATS 2011).
 """
 
@@ -131,7 +131,7 @@ class Demonstrations(NamedTuple):
 
     Attributes:
         pictures: (n, h, w, 3) as a policy sees them.
-        actions: (n, 2) intended action of the demonstrator at each picture.
+        actions: (n, 2) intended action of the demonstrator at each image.
         episodes: Number of steps of each episode, in order.
     """
 
@@ -444,7 +444,7 @@ def train_student(
 def _moving(action: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return steering and throttle, (..., 2), with at least the least throttle.
 
-    Pictures do not show the speed. If the teacher brakes or starts depending on it, a clone takes
+    Images do not show the speed. If the teacher brakes or starts depending on it, a clone takes
     the mean of both actions; one stood still on one course of 17. So it never drives with less.
     """
     return np.maximum(action, np.array((-np.inf, LEAST_THROTTLE), np.float32))

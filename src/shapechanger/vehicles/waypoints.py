@@ -402,11 +402,11 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     Steps that do not say where the way is are left out; see `waypoints_of`.
 
     Args:
-        data: The demonstrations, with rectified pictures.
+        data: The demonstrations, with rectified images.
         response: How the vehicle turns; None to fit it to the recorded motion.
 
     Raises:
-        DemosError: If the actions are others, there are no pictures, the response or the speed is
+        DemosError: If the actions are others, there are no images, the response or the speed is
             unknown, or no step is left.
     """
     names = data.action_layout.names

@@ -29,7 +29,7 @@ from shapechanger.demos.cloning import learn  # noqa: F401
 from shapechanger.demos.exchange import import_recording  # noqa: F401
 
 MEMORY = 384 << 20
-"""Bytes that a command may allocate. A picture of the largest allowed size needs 48 MiB."""
+"""Bytes that a command may allocate. An image of the largest allowed size needs 48 MiB."""
 
 CPU_S = 10
 """Processor time that a command may take, s."""

@@ -182,7 +182,7 @@ def one_sentence(text: str) -> bool:
 
 
 def test_a_picture_of_many_scans_is_refused() -> None:
-    """Each scan takes the time of a picture, and a few bytes of header claim thousands."""
+    """Each scan takes the time of an image, and a few bytes of header claim thousands."""
     jpeg = picture(0)
     start = jpeg.index(b"\xff\xda")
     with pytest.raises(DemosError, match="more than 64 scans"):
@@ -198,7 +198,7 @@ def refuse(answer: tuple[int, str]) -> str:
 
 
 def framed(jpeg: bytes) -> Callable[[Path], None]:
-    """Return a change of all pictures of an episode, with the right size and checksum."""
+    """Return a change of all images of an episode, with the right size and checksum."""
 
     def change(episode: Path) -> None:
         (episode / "frames/000000.jpg").write_bytes(jpeg)
@@ -322,7 +322,7 @@ def test_a_hostile_tub_is_refused(tmp_path: Path, jail: Jail, name: str) -> None
 
 
 def test_a_csv_that_returns_to_a_picture_is_refused(tmp_path: Path, jail: Jail) -> None:
-    """A line of a few bytes would otherwise write a picture once more."""
+    """A line of a few bytes would otherwise write an image once more."""
     drive(tmp_path / "data")
     export_recording(tmp_path / "data", tmp_path / "csv", "csv")
     edit(tmp_path / "csv/steps.csv", "000002.jpg", "000000.jpg")
@@ -357,7 +357,7 @@ def many_rows(folder: Path) -> None:
 
 
 def two_pictures(count: int) -> list[dict[str, object]]:
-    """Return two large pictures that alternate, so that each row is a new one."""
+    """Return two large images that alternate, so that each row is a new one."""
     jpegs = [picture(n, 40, 32) + bytes(15 << 20) for n in (0, 1)]
     return [{"bytes": jpegs[n % 2], "path": ""} for n in range(count)]
 

@@ -145,7 +145,7 @@ def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path)
     view = CanonicalView()
     data = _loaded(tmp_path, view)
     assert data.pictures is not None
-    # Both episodes have equal pictures in their cameras.
+    # Both episodes have equal images in their cameras.
     assert (data.pictures[0] != data.pictures[60]).any()
     assert "looks 0 degrees down" in view.note()
     assert "and looks 8 degrees down with a vertical field of view of 60" in view.note()

@@ -1,4 +1,4 @@
-"""Small episodes for tests, with pictures of a few bytes."""
+"""Small episodes for tests, with images of a few bytes."""
 
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ def picture(number: int = 0) -> bytes:
 
 
 def recorded(recording: Path, steps: int = 5, *, close: bool = True) -> Path:
-    """Record an episode with one picture per step; leave it unclosed on request."""
+    """Record an episode with one image per step; leave it unclosed on request."""
     with EpisodeWriter.create(recording, header(), spare_bytes=0) as writer:
         begun = (writer.path / "episode.json").read_bytes()
         for number in range(steps):

@@ -22,18 +22,18 @@ CAMERA = "observation.images.front"
 VIDEO = f"videos/{CAMERA}/chunk-000/file-000.mp4"
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
-_LEVELS = 6  # Of brightness between two pictures.
+_LEVELS = 6  # Of brightness between two images.
 
 Change = Callable[[list[dict[str, Any]]], list[dict[str, Any]] | None]
 
 
 def shown_in(jpeg: bytes) -> int:
-    """Return the number of a picture, from its brightness."""
+    """Return the number of an image, from its brightness."""
     return round(float(decode_picture(jpeg, "").mean()) / _LEVELS)
 
 
 def write_video(path: Path, numbers: Sequence[int], fps: float, *options: str) -> None:
-    """Encode pictures whose brightness is their number."""
+    """Encode images whose brightness is their number."""
     path.parent.mkdir(parents=True, exist_ok=True)
     raw = b"".join(np.full((SIZE, SIZE, 3), _LEVELS * n, np.uint8).tobytes() for n in numbers)
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{SIZE}x{SIZE}", "-r", f"{fps}"]
@@ -57,14 +57,14 @@ def write_set(
     info: Mapping[str, Any] | None = None,
     video: bool = True,
 ) -> Path:
-    """Write a dataset whose first action is the number of the step, as is its picture.
+    """Write a dataset whose first action is the number of the step, as is its image.
 
     Args:
         folder: The folder to create.
         lengths: Steps of each episode.
         fps: Steps per second.
-        video_fps: Pictures per second, if that is another number.
-        pictures: Numbers of the pictures; None for one for each step.
+        video_fps: Images per second, if that is another number.
+        pictures: Numbers of the images; None for one for each step.
         options: Further options of FFmpeg.
         rows: Changes the rows of the data.
         places: Changes the rows of `meta/episodes`.
@@ -136,9 +136,9 @@ def write_set(
 
 
 def pairs_of(folder: Path, camera: str = "") -> tuple[list[list[tuple[int, int]]], ImportContext]:
-    """Return the number of each step with that of its picture, and the findings.
+    """Return the number of each step with that of its image, and the findings.
 
-    One list for each episode; -1 for no picture.
+    One list for each episode; -1 for no image.
     """
     context = ImportContext(camera=camera)
     found: list[list[tuple[int, int]]] = []

@@ -65,7 +65,7 @@ def record(
 
 
 def drive(data: Path, count: int = 5, **changes: Any) -> Path:
-    """Record an episode of a person, with pictures and a state."""
+    """Record an episode of a person, with images and a state."""
     steps = [
         (
             Step(
@@ -83,7 +83,7 @@ def drive(data: Path, count: int = 5, **changes: Any) -> Path:
 
 
 def keys_folder(folder: Path) -> Path:
-    """Create a table of others: the key that was held at each of three pictures."""
+    """Create a table of others: the key that was held at each of three images."""
     folder.mkdir(parents=True)
     held = ["1.0,0.0,0.0,0.0", "0.0,0.0,0.0,1.0", "0.0,0.0,0.0,0.0"]
     lines = ["file,forward,backward,right,left,timestamp"]
@@ -101,7 +101,7 @@ def tub_folder(
     inputs: dict[str, str] | None = None,
     per_catalog: int = 2,
 ) -> Path:
-    """Create a tub of version 2; each record without a picture gets one, unless it has None."""
+    """Create a tub of version 2; each record without an image gets one, unless it has None."""
     (folder / "images").mkdir(parents=True)
     kinds = {"cam/image_array": "image_array", "user/angle": "float"} | (inputs or {})
     lines: list[dict[str, Any]] = []

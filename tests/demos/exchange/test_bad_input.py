@@ -343,7 +343,7 @@ def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, expected: s
 
 
 def test_nothing_to_export(tmp_path: Path) -> None:
-    """A recording without steps, and one with neither pictures nor states, are refused."""
+    """A recording without steps, and one with neither images nor states, are refused."""
     record(tmp_path / "data", header(), [])
     with pytest.raises(DemosError, match="nothing to export"):
         export_recording(tmp_path / "data", tmp_path / "csv", "csv")

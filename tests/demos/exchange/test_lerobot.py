@@ -24,14 +24,14 @@ DATA = "data/chunk-000/file-000.parquet"
 
 
 def smooth(number: int, width: int = 64, height: int = 48) -> bytes:
-    """Return a picture that video keeps well: a gradient, brighter with each number."""
+    """Return an image that video keeps well: a gradient, brighter with each number."""
     ramp = np.linspace(0, 60, width)[None, :, None]
     pixels = np.broadcast_to(ramp + 5.0 * number, (height, width, 3))
     return encode_picture(pixels.astype(np.uint8))
 
 
 def smooth_drive(data: Path, count: int = 30, **changes: Any) -> Path:
-    """Record an episode with such pictures, two drivers, rewards and an end."""
+    """Record an episode with such images, two drivers, rewards and an end."""
     steps = [
         (
             Step(
@@ -67,13 +67,13 @@ def in_32_bits(values: tuple[float, ...]) -> list[float]:
 
 
 def pictures_of(episode: Episode) -> list[np.ndarray]:
-    """Decode the pictures of an episode."""
+    """Decode the images of an episode."""
     return [decode_picture(episode.jpeg(step) or b"", "") for step in episode.steps]
 
 
 @pytest.mark.parametrize("images", [False, True])
 def test_a_round_trip(tmp_path: Path, images: bool) -> None:
-    """Numbers come back in 32 bits, pictures exactly or nearly, the rest as it was."""
+    """Numbers come back in 32 bits, images exactly or nearly, the rest as it was."""
     smooth_drive(tmp_path / "data", 30, seed=7, env="shapechanger/Car-v1")
     smooth_drive(tmp_path / "data", 4)
     done = export_recording(tmp_path / "data", tmp_path / "out", "lerobot", images=images)
@@ -97,7 +97,7 @@ def test_a_round_trip(tmp_path: Path, images: bool) -> None:
         jpegs = [[e.jpeg(step) for step in e.steps] for e in (before, after)]
         assert not images or jpegs[0] == jpegs[1]
         for one, two in zip(pictures_of(before), pictures_of(after), strict=True):
-            # The next picture is brighter by 5, so that none is taken for another.
+            # The next image is brighter by 5, so that none is taken for another.
             assert np.abs(one.astype(float) - two).mean() < 2.0
 
 
@@ -116,7 +116,7 @@ def test_long_episodes_and_many_files(tmp_path: Path, monkeypatch: pytest.Monkey
     expected = [in_32_bits(tuple(s.action[0] for s in e.steps)) for e in before]
     assert actions == expected
     first, second = pictures_of(before[2])[0], pictures_of(after[2])[0]
-    assert np.abs(first.astype(float) - second).mean() < 40.0  # Noise; other pictures: 85.
+    assert np.abs(first.astype(float) - second).mean() < 40.0  # Noise; other images: 85.
 
 
 def test_the_metadata(tmp_path: Path) -> None:

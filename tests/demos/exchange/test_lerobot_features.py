@@ -32,7 +32,7 @@ def png(pixels: np.ndarray | Image.Image, kind: str = "PNG") -> bytes:
 
 
 def plain(number: int, channels: int = 3) -> np.ndarray:
-    """Return a picture whose brightness is its number."""
+    """Return an image whose brightness is its number."""
     return np.full((SIZE, SIZE, channels), 6 * number, np.uint8).squeeze()
 
 

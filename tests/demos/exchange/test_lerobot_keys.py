@@ -1,4 +1,4 @@
-"""Steps and pictures of LeRobot datasets are found by index and time, never by counting."""
+"""Steps and images of LeRobot datasets are found by index and time, never by counting."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def without(*steps: int) -> list[list[tuple[int, int]]]:
     [
         ({}, BOTH),
         ({"options": ["-bf", "3", "-g", "12"]}, BOTH),
-        # A picture is lost, and its time with it.
+        # An image is lost, and its time with it.
         ({"options": ["-vf", "select=not(eq(n\\,5))", "-fps_mode", "vfr"]}, without(5)),
         ({"options": ["-vf", "select=not(eq(n\\,8))", "-fps_mode", "vfr"]}, without(8)),
-        # More pictures than steps.
+        # More images than steps.
         ({"fps": 10, "video_fps": 30, "pictures": [n // 3 for n in range(48)]}, BOTH),
         # A video that begins later, as its entries say.
         (
@@ -59,7 +59,7 @@ def without(*steps: int) -> list[list[tuple[int, int]]]:
             },
             BOTH,
         ),
-        # One picture.
+        # One image.
         ({"lengths": (1,)}, [[(0, 0)]]),
         # Times in milliseconds.
         ({"fps": 30, "options": ["-video_track_timescale", "1000"]}, BOTH),
@@ -127,7 +127,7 @@ def every(change: Any) -> Any:
         # The video.
         ({"options": ["-use_editlist", "0", "-bf", "2"]}, [], r"begins 0\.1 s later"),
         ({"options": ["-output_ts_offset", "0.5"]}, [], r"begins 0\.5 s later"),
-        # Pictures after a lost one moved up, and nothing says which one is lost.
+        # Images after a lost one moved up, and nothing says which one is lost.
         ({"pictures": [*range(5), *range(6, 16)]}, [], r"ends 0\.05 s before its last step"),
         ({"places": place(0, to_timestamp=0.35)}, [1], "fewer pictures than steps"),
         ({"places": place(1, from_timestamp=0.35)}, [], r"overlaps.*0 \(0\.05 s\), 1"),
@@ -230,7 +230,7 @@ def test_a_missing_row_is_a_missing_step(tmp_path: Path) -> None:
 
 
 def test_irregular_times_are_kept(tmp_path: Path) -> None:
-    """A pause in the times is reported; steps and pictures stay together."""
+    """A pause in the times is reported; steps and images stay together."""
 
     def paused(rows: list[dict[str, Any]]) -> None:
         for entry in rows:

@@ -35,7 +35,7 @@ _TIMES = st.none() | st.integers(0, 2**62)
 
 @st.composite
 def _steps(draw: st.DrawFn) -> list[tuple[Step, bytes | None, list[str]]]:
-    """Steps with repeated pictures, and their marks."""
+    """Steps with repeated images, and their marks."""
     steps = []
     clock = 0
     for number in range(draw(st.integers(1, 4))):
@@ -192,7 +192,7 @@ def with_a_pause(data: Path) -> Path:
         Step(action=(n / 10, 0.0), driver="person", state=(0.0, 0.0), captured_ns=0, decided_ns=at)
         for n, at in enumerate(times_ns)
     ]
-    # All steps share a picture.
+    # All steps share an image.
     jpegs = [picture(0), *[None] * 7]
     return record(data, header(), list(zip(steps, jpegs, strict=True)), "time")
 

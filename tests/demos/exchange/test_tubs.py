@@ -205,7 +205,7 @@ def test_catalogs_in_another_order(tmp_path: Path) -> None:
 
 
 def test_pictures_of_other_records(tmp_path: Path) -> None:
-    """The number in the name of a picture is compared with the record's."""
+    """The number in the name of an image is compared with the record's."""
     made = records(6)
     for record in made:
         record["cam/image_array"] = f"{record['_index'] + 2}_cam_image_array_.jpg"

@@ -209,5 +209,5 @@ def test_the_capture_time_is_read_from_the_comment() -> None:
     assert captured_ns_of(_with_comment(_jpeg(), b"x" * 100)) is None
     assert captured_ns_of(_jpeg()) is None
     stream = JpegSplitter()
-    stream.feed(_with_comment(_jpeg(), b"\xff\xd9"))  # The end of a picture inside a comment.
+    stream.feed(_with_comment(_jpeg(), b"\xff\xd9"))  # The end of an image inside a comment.
     assert stream.next() == _with_comment(_jpeg(), b"\xff\xd9")

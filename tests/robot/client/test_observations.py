@@ -86,7 +86,7 @@ def test_a_frame_is_upright_rgb() -> None:
 
 
 def _oversized() -> bytes:
-    """A few bytes that claim a picture of 1.2 GB."""
+    """A few bytes that claim an image of 1.2 GB."""
     whole = bytearray(picture((16, 16), 1))
     frame = whole.index(b"\xff\xc0")
     whole[frame + 5 : frame + 9] = (20_000).to_bytes(2, "big") * 2

@@ -146,7 +146,7 @@ def test_a_frozen_camera_keeps_its_capture_time(monkeypatch: pytest.MonkeyPatch)
             while seen.frame_seq != 1:
                 seen = await client.observe()
             robot.pictures = 0
-            robot.show()  # The same picture with a new time.
+            robot.show()  # The same image with a new time.
             for seq in range(1, 6):
                 after = await client.drive(seq, 0.0, 0.5)
                 assert (after.frame, after.captured_ns) == (None, seen.captured_ns)

@@ -302,7 +302,7 @@ def test_times_increase_and_no_frame_repeats(
     for now_ns, (looks, who, back) in enumerate(events):
         if looks:
             newest[who] += 1
-            picture = pictures_seen[1 + now_ns // 3]  # Each picture is seen a few times.
+            picture = pictures_seen[1 + now_ns // 3]  # Each image is seen a few times.
             sent = seen(newest[who], picture.captured_ns)
             built.builder.observed(who, sent, picture)
         else:

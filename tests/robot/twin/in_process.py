@@ -165,7 +165,7 @@ class InProcessRobot:
         card = card_of(profile, arming="anyone", clock="twin", pictures=pictures)
         self.welcome = Welcome.of(card, _SESSION)
         self._guard: Guard | None = None
-        # Numbers pictures through all starts.
+        # Numbers images through all starts.
         self._hub = SessionHub(DaemonPlan(card=card), lambda: self.now_ns, self._send)
         self._client = Client(_SESSION)
         self._hub.lease.take(self._client)
@@ -268,7 +268,7 @@ class InProcessRobot:
         self._advance(self._period_ns)
 
     def _send(self, order: Order) -> None:
-        # A robot in this process sees, with a picture or without.
+        # A robot in this process sees, with an image or without.
         self._orders.waiting.append(msgspec.structs.replace(order, frame_ns=self.now_ns))
 
     def _advance(self, ns: int) -> None:

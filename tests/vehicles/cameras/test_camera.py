@@ -31,7 +31,7 @@ def _model(colour: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_cameras_render_their_models_in_turn() -> None:
-    """The picture shows the geom ahead of the camera, in a new array; models may change."""
+    """The image shows the geom ahead of the camera, in a new array; models may change."""
     cameras = [OnboardCamera((32, 16), "eye"), OnboardCamera((16, 16), "eye")]
     for colours, brightest in ((("1 0 0", "0 0 1"), (0, 2)), (("0 1 0", "1 0 0"), (1, 0))):
         models = [_model(colour) for colour in colours]
@@ -47,7 +47,7 @@ def test_cameras_render_their_models_in_turn() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_an_unclosed_camera_frees_its_context() -> None:
-    """Garbage collection frees it, and `close` can be called twice and before a picture."""
+    """Garbage collection frees it, and `close` can be called twice and before an image."""
     model, data = _model("1 0 0")
     for _ in range(3):
         camera = OnboardCamera((32, 16), "eye")

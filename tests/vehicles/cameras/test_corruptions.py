@@ -21,7 +21,7 @@ _ALL = pytest.mark.parametrize("change", CORRUPTIONS.values(), ids=CORRUPTIONS)
 
 
 def _picture(height: int = 120, width: int = 160) -> Picture:
-    """Return a picture with edges and all levels."""
+    """Return an image with edges and all levels."""
     rng = np.random.default_rng(0)
     rough = rng.integers(0, 256, (height // 8 + 1, width // 8 + 1, 3), np.uint8)
     return np.kron(rough, np.ones((8, 8, 1), np.uint8))[:height, :width].copy()
@@ -46,7 +46,7 @@ def test_lenses_keep_size_and_type(change: Corruption, size: tuple[int, int]) ->
 
 @_ALL
 def test_lenses_are_deterministic(change: Corruption) -> None:
-    """A lens is a function of picture and seed, and does not change its input."""
+    """A lens is a function of image and seed, and does not change its input."""
     np.testing.assert_array_equal(change(_picture(), 5), change(_picture(), 5))
 
 
@@ -85,7 +85,7 @@ def test_blur_keeps_the_sum() -> None:
 
 
 def test_dirt_does_not_move() -> None:
-    """Spots do not move between pictures, and most pixels stay clean."""
+    """Spots do not move between images, and most pixels stay clean."""
     white = np.full((120, 160, 3), 255, np.uint8)
     grey = np.full((120, 160, 3), 200, np.uint8)
     spots = dirt(white, 2)[..., 0] < 230

@@ -73,7 +73,7 @@ def test_the_shadow_is_dark_and_soft(vehicle: str) -> None:
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_the_own_camera_does_not_see_it(vehicle: str) -> None:
-    """What is drawn for views from outside leaves the camera's picture as it is."""
+    """What is drawn for views from outside leaves the camera's image as it is."""
     world = MujocoWorld(vehicle, size=(160, 120))
     before = world.picture()
     world.outside(160, 120)
@@ -99,7 +99,7 @@ def test_the_view_turns_with_the_vehicle() -> None:
 
 
 def test_it_follows_a_new_course() -> None:
-    """After another course is laid out, it is shown; a picture of an env is the same view."""
+    """After another course is laid out, it is shown; an image of an env is the same view."""
     env = VehicleEnv("boat", image=False, courses=(0, 1))
     first = env.picture(64, 48)
     env.reset(seed=0, options={"course": 1, "start": 0})

@@ -27,7 +27,7 @@ _SIZE = (160, 120)
 
 
 def _horizon(pitch_deg: float, fovy_deg: float) -> NDArray[np.uint8]:
-    """Return a picture that is white above the horizon and black below."""
+    """Return an image that is white above the horizon and black below."""
     wide, high = _SIZE
     focal = 0.5 * high / math.tan(math.radians(fovy_deg) / 2.0)
     row = 0.5 * high - focal * math.tan(math.radians(pitch_deg))
@@ -50,7 +50,7 @@ def test_the_horizon_is_level(pitch_deg: float, fovy_deg: float) -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_rectified_pictures_of_vehicles_agree() -> None:
-    """Rectified pictures of tank and truck are close to the car's."""
+    """Rectified images of tank and truck are close to the car's."""
     raw: dict[str, NDArray[np.float64]] = {}
     rectified: dict[str, NDArray[np.float64]] = {}
     for vehicle in ("car", "tank", "truck"):

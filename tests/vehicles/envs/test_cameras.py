@@ -76,7 +76,7 @@ def _twin(place: Place) -> Callable[[Path, CameraPlan], NDArray[np.uint8]]:
 def _agree(seen: Callable[[Path, CameraPlan], NDArray[np.uint8]], folder: Path) -> None:
     """Check that other cameras, warped as their profiles state, show what lab-car's shows."""
     expected = seen(folder, _LAB).astype(np.float64)
-    # The same picture a pixel aside, which coarse pixels and edges come to.
+    # The same image a pixel aside, which coarse pixels and edges come to.
     aside = np.abs(expected[:, 1:] - expected[:, :-1]).mean()
     for camera in _OTHERS:
         gap = np.abs(seen(folder, camera) - expected).mean()

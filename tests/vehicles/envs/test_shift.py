@@ -14,7 +14,7 @@ from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 
 @pytest.fixture
 def blind() -> dict[str, bool]:
-    """Arguments of vehicles without pictures."""
+    """Arguments of vehicles without images."""
     return {"image": False, "put_back": True}
 
 

@@ -138,7 +138,7 @@ class TrainClone:
         _print_evaluation(evaluation)
 
     def _view(self) -> CanonicalView | None:
-        """Return how pictures are warped; None without waypoints."""
+        """Return how images are warped; None without waypoints."""
         if not self.waypoints:
             if self.camera is not None or self.response is not None:
                 raise DemosError("--camera and --response belong to --waypoints: give it, too.")
@@ -174,7 +174,7 @@ class TrainClone:
 
 
 def _view(camera: tuple[float, float] | None) -> CanonicalView:
-    """Return how pictures are warped to the virtual camera, from pitch and field of view given."""
+    """Return how images are warped to the virtual camera, from pitch and field of view given."""
     return CanonicalView(None if camera is None else CameraGeometry(*camera))
 
 

@@ -50,7 +50,7 @@ class CameraView:
     board: str = ""
     """Inner corners of a checkerboard that stands upright before the robot, such as 9x6."""
     horizon: float | None = None
-    """Row of the horizon in the picture, pixels from the top: of a mark at the lens's height."""
+    """Row of the horizon in the image, pixels from the top: of a mark at the lens's height."""
     fovy: float | None = None
     """Vertical field of view, degrees, where the data sheet says it."""
     out: Path = Path("camera.jpg")
@@ -127,7 +127,7 @@ class CameraView:
 
 
 def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
-    """Read a picture from a file, or take one, shape (height, width, 3)."""
+    """Read an image from a file, or take one, shape (height, width, 3)."""
     if path is None:
         camera = open_camera(plan)
         try:
@@ -161,7 +161,7 @@ def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
 
 
 def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
-    """Return the picture with the virtual camera's view drawn in, and the view next to it."""
+    """Return the image with the virtual camera's view drawn in, and the view next to it."""
     height, width = (int(n) for n in picture.shape[:2])
     seen = Rectifier(geometry, (width, height))(picture)
     drawn = draw_view(picture, geometry)

@@ -1,4 +1,4 @@
-"""Behaviour cloning: driving policies learned from pictures, states and the actions of a driver.
+"""Behaviour cloning: driving policies learned from images, states and the actions of a driver.
 
 ```
 learn.clone          learn steering and throttle from arrays of pictures

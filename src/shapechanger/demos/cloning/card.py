@@ -28,16 +28,16 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     """Architecture and origin of a policy.
 
     Attributes:
-        framing: Part of the picture that the policy sees.
+        framing: Part of the image that the policy sees.
         channels: Filters of each convolution.
-        features: Number of features between picture and actions.
+        features: Number of features between image and actions.
         seeds: Seeds of the trainings, last one last.
         steps: Step of the last training at which the policy was best.
         settings: Settings of the last training.
         data: Origin of the demonstrations, as given by the caller.
         command: Command that trained the policy.
         version: Version of Shapechanger.
-        eyes: Input of the first layer: "colours" or "edges" of a picture; "none" without pictures.
+        eyes: Input of the first layer: "colours" or "edges" of an image; "none" without images.
         nerves: Widths of the layers for the state; () without a state.
         members: Number of networks whose outputs are averaged.
         head: Kind of output.
@@ -143,7 +143,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     def prepared(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None
     ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None]:
-        """Return pictures and states as the network takes them; None for an input it lacks.
+        """Return images and states as the network takes them; None for an input it lacks.
 
         Args:
             pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared.
@@ -200,7 +200,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ActingClone(ABC):
-    """A policy for pictures, states or both.
+    """A policy for images, states or both.
 
     Attributes:
         card: Its architecture and origin.
@@ -225,7 +225,7 @@ class ActingClone(ABC):
     def predict(
         self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return the action for one picture and state, as `predict_many` does for several.
+        """Return the action for one image and state, as `predict_many` does for several.
 
         Args:
             picture: Red, green and blue, shape (H, W, 3).
@@ -242,11 +242,11 @@ class ActingClone(ABC):
     def predict_many(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
-        """Return an action for each picture and state.
+        """Return an action for each image and state.
 
         Args:
             pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared; None for a policy
-                without pictures.
+                without images.
             states: Shape (n, k), NaN for unknown values; None for a policy without a state.
 
         Returns:
@@ -261,8 +261,8 @@ class ActingClone(ABC):
         """Return an action for each observation of an env, shape (n, m).
 
         Args:
-            observations: Pictures, shape (n, H, W, 3); states, shape (n, k), for a policy without
-                pictures; a mapping with `image` and `state` for one with both.
+            observations: Images, shape (n, H, W, 3); states, shape (n, k), for a policy without
+                images; a mapping with `image` and `state` for one with both.
 
         Raises:
             CloningError: If an input is missing or has another shape.

@@ -96,7 +96,7 @@ def output_fields(
         actions: Actions of the driver, shape (n, m).
         layout: Meaning of the values.
         asked: Requested kind of output.
-        mirrored: The mirrored actions, if pictures are mirrored; None if not.
+        mirrored: The mirrored actions, if images are mirrored; None if not.
 
     Raises:
         CloningError: If there are too many different actions for classes, or all are equal.
@@ -374,7 +374,7 @@ def outlook(card: CloneCard) -> Outlook | None:
     """Return the collisions to expect of a cloned driver, from its card.
 
     Returns:
-        None if the policy does not steer by pictures, or its card has no `learned_s`. The rates are
+        None if the policy does not steer by images, or its card has no `learned_s`. The rates are
         those of a car in corridors; no other clones were measured in this way.
     """
     learned_s = card.data.get("learned_s", 0.0)

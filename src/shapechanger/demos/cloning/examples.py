@@ -91,7 +91,7 @@ class Examples:
     """Training examples, with their mirror images.
 
     Attributes:
-        pictures: Prepared pictures, shape (n, height, width, 3); None for none.
+        pictures: Prepared images, shape (n, height, width, 3); None for none.
         states: Shape (n, k); None for none.
         targets: Target outputs: actions, shape (n, m), or class indices, shape (n,).
         mirrored_states: The mirrored states.
@@ -119,7 +119,7 @@ class Examples:
 def steering_examples(
     pictures: NDArray[np.uint8], actions: NDArray[np.floating], framing: Framing
 ) -> Examples:
-    """Return examples of steering and throttle from pictures.
+    """Return examples of steering and throttle from images.
 
     Args:
         pictures: Shape (n, H, W, 3), raw or prepared.
@@ -151,8 +151,8 @@ def steering_examples(
 def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]:
     """Return a mask of the examples to hold out: the last ones of each episode.
 
-    The last ones are taken because neighbours in time look the same: a picture between two training
-    pictures would test nothing.
+    The last ones are taken because neighbours in time look the same: an image between two training
+    images would test nothing.
 
     Args:
         n: Number of examples.
@@ -236,36 +236,36 @@ _BRIGHTEST: Final = 255.0
 
 
 def plain(pictures: Tensor, index: Tensor) -> Tensor:
-    """Return pictures without augmentation.
+    """Return images without augmentation.
 
     Args:
         pictures: uint8, shape (n, height, width, 3).
-        index: Indices of the pictures, shape (batch,).
+        index: Indices of the images, shape (batch,).
 
     Returns:
-        Pictures in [0, 1], shape (batch, 3, height, width).
+        Images in [0, 1], shape (batch, 3, height, width).
     """
     return scaled(pictures[index])
 
 
 def scaled(pictures: Tensor) -> Tensor:
-    """Return pictures in [0, 1], shape (n, 3, height, width), of uint8 as in `plain`."""
+    """Return images in [0, 1], shape (n, 3, height, width), of uint8 as in `plain`."""
     return pictures.permute(0, 3, 1, 2).float() / _BRIGHTEST
 
 
 def augmented(
     pictures: Tensor, index: Tensor, augmentation: Augmentation, generator: torch.Generator
 ) -> tuple[Tensor, Tensor]:
-    """Return pictures with random changes of light, colour, noise and position.
+    """Return images with random changes of light, colour, noise and position.
 
     Args:
         pictures: uint8, shape (n, height, width, 3).
-        index: Indices of the pictures, shape (batch,).
+        index: Indices of the images, shape (batch,).
         augmentation: Kind and extent of the changes.
         generator: Source of randomness.
 
     Returns:
-        Pictures in [0, 1], shape (batch, 3, height, width), and a mask of the mirrored ones, whose
+        Images in [0, 1], shape (batch, 3, height, width), and a mask of the mirrored ones, whose
         actions must be mirrored too, shape (batch,).
     """
     mirrored = torch.rand(len(index), generator=generator) < augmentation.mirror
@@ -307,13 +307,13 @@ def _factors(shape: tuple[int, ...], largest: float, generator: torch.Generator)
 
 
 def _blur(seen: Tensor, share: float, generator: torch.Generator) -> None:
-    """Blur the first few pictures; a batch is in random order."""
+    """Blur the first few images; a batch is in random order."""
     if count := _random_count(len(seen), share, generator):
         seen[:count] = functional.avg_pool2d(seen[:count], 3, 1, 1, count_include_pad=False)
 
 
 def _add_noise(seen: Tensor, augmentation: Augmentation, generator: torch.Generator) -> None:
-    """Add noise as of a camera in the dark to the last few pictures; some are blurred and noisy."""
+    """Add noise as of a camera in the dark to the last few images; some are blurred and noisy."""
     if count := _random_count(len(seen), augmentation.noisy, generator):
         strength = augmentation.noise * torch.rand((count, 1, 1, 1), generator=generator)
         last = seen[-count:]
@@ -321,7 +321,7 @@ def _add_noise(seen: Tensor, augmentation: Augmentation, generator: torch.Genera
 
 
 def _random_count(n: int, share: float, generator: torch.Generator) -> int:
-    """Return a number of pictures that is right on average even for small batches."""
+    """Return a number of images that is right on average even for small batches."""
     return math.floor(n * share + float(torch.rand((), generator=generator)) * (share > 0.0))
 
 

@@ -1,4 +1,4 @@
-"""Behaviour cloning: steering from pictures, or any actions from any demonstrations."""
+"""Behaviour cloning: steering from images, or any actions from any demonstrations."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
 Inputs = Literal["auto", "picture", "state", "both"]
-"""Inputs of a policy; "auto" takes pictures if there are any, and states otherwise."""
+"""Inputs of a policy; "auto" takes images if there are any, and states otherwise."""
 
 # Error at which the loss changes from quadratic to linear. An error of a tenth of the steering's
 # range is a mistake, and one mistake of the driver should not outweigh ten small errors.
@@ -109,7 +109,7 @@ def clone(
     rehearsal: tuple[NDArray[np.uint8], NDArray[np.floating]] | None = None,
     on_check: Callable[[MemberCheck], None] = lambda check: None,
 ) -> tuple[CameraPolicy, Training]:
-    """Learn the steering and throttle of a driver from pictures, with one network.
+    """Learn the steering and throttle of a driver from images, with one network.
 
     Equal arguments give an equal policy on the same machine with the same number of threads.
 
@@ -119,15 +119,15 @@ def clone(
         settings: Hyperparameters; None for the defaults. `members`, `dropout` and `smoothing` are
             ignored.
         seed: Seed of all randomness.
-        episodes: Number of pictures of each episode, in order; () for a single episode. The end of
+        episodes: Number of images of each episode, in order; () for a single episode. The end of
             each one is used for early stopping, by the sum of the mean absolute errors.
         start: Policy to train further, which is not changed; None to start from scratch.
-        rehearsal: Pictures and actions that `start` was trained on, mixed in so that they are not
+        rehearsal: Images and actions that `start` was trained on, mixed in so that they are not
             forgotten.
         on_check: Called after each validation.
 
     Returns:
-        The policy that was best on the held-out pictures, or the last one without them, and the
+        The policy that was best on the held-out images, or the last one without them, and the
         course of the training.
 
     Raises:
@@ -268,7 +268,7 @@ def learn(
 
 
 def _inputs_of(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
-    """Return whether the policy uses pictures, and whether it uses states."""
+    """Return whether the policy uses images, and whether it uses states."""
     if inputs == "auto":
         inputs = "picture" if data.pictures is not None else "state"
     with_pictures, with_states = inputs in {"picture", "both"}, inputs in {"state", "both"}

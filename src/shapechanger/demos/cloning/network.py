@@ -1,4 +1,4 @@
-"""Networks of cloned policies: encoders for pictures and states, and a linear output layer.
+"""Networks of cloned policies: encoders for images and states, and a linear output layer.
 
 The names of the attributes (`eyes`, `nerves`, `hands`, ...) name the weights in the file of
 a policy, and must not change.
@@ -23,9 +23,9 @@ DIRECTIONS: Final = 6
 _CELL: Final = 4  # Side of a cell, pixels.
 # Added before the logarithm, as a share of full brightness: about a camera's noise in the dark.
 _DARK: Final = 8.0 / 255.0
-# Mean strength of an edge that is only noise; keeps uniform pictures from being amplified.
+# Mean strength of an edge that is only noise; keeps uniform images from being amplified.
 _MIN_EDGE: Final = 1e-4
-# About the noise of a camera, as a share of full brightness; keeps a uniform picture, such as that
+# About the noise of a camera, as a share of full brightness; keeps a uniform image, such as that
 # of a covered lens, from being amplified into noise.
 _MIN_SPREAD: Final = 0.02
 _MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more information.
@@ -53,10 +53,10 @@ def _convolutions(
 
 
 class EdgeEyes(nn.Module):
-    """Encoder of a picture by its edges.
+    """Encoder of an image by its edges.
 
     Args:
-        framing: Size of the pictures.
+        framing: Size of the images.
         channels: Filters of each convolution after the edges.
         features: Number of features.
     """
@@ -101,13 +101,13 @@ def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
 
 
 class Eyes(nn.Module):
-    """Encoder of a picture by its colours.
+    """Encoder of an image by its colours.
 
-    Each picture is normalised by its own mean and standard deviation, so that neither daylight nor
+    Each image is normalised by its own mean and standard deviation, so that neither daylight nor
     exposure matters.
 
     Args:
-        framing: Size of the pictures.
+        framing: Size of the images.
         channels: Filters of each convolution.
         features: Number of features.
     """
@@ -121,7 +121,7 @@ class Eyes(nn.Module):
 
     def forward(self, pictures: Tensor) -> Tensor:
         """Return the features, with the shapes of `EdgeEyes`."""
-        # Colours are last in memory, so that each picture is one row: several times faster than
+        # Colours are last in memory, so that each image is one row: several times faster than
         # over three dimensions.
         rows = pictures.permute(0, 2, 3, 1).flatten(1)
         spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
@@ -188,14 +188,14 @@ class CameraNetwork(nn.Module):
         self.nerves: nn.Module | None = _one_or_several(nerves)
         features = len(eyes) * card.features + (len(nerves) * card.nerves[-1] if nerves else 0)
         self.hands = nn.Linear(features, card.outputs)
-        # With colours last in memory, convolutions of a single picture are a third faster.
+        # With colours last in memory, convolutions of a single image are a third faster.
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def perceive(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
-        """Return the features of pictures and states, shape (n, features).
+        """Return the features of images and states, shape (n, features).
 
         Args:
-            pictures: In [0, 1], shape (n, 3, height, width); None for a policy without pictures.
+            pictures: In [0, 1], shape (n, 3, height, width); None for a policy without images.
             states: Shape (n, state size); None for a policy without a state.
         """
         found: list[Tensor] = []

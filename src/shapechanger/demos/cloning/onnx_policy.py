@@ -1,6 +1,6 @@
 """Cloned policies as ONNX files, which a robot runs without PyTorch.
 
-The file holds the network from a prepared picture, a state or both to its outputs. Its metadata has
+The file holds the network from a prepared image, a state or both to its outputs. Its metadata has
 the card of the policy and what else a robot compares before it arms. Reading one runs no code.
 """
 
@@ -57,7 +57,7 @@ def export_clone(
         inputs[_STATE] = torch.zeros((2, card.state_size))
 
     class Whole(torch.nn.Module):
-        """The network with the scaling of pictures and outputs."""
+        """The network with the scaling of images and outputs."""
 
         def __init__(self) -> None:
             super().__init__()

@@ -12,7 +12,7 @@ from shapechanger.errors import ShapechangerError
 
 
 class CloningError(ShapechangerError, ValueError):
-    """Invalid pictures, actions or settings."""
+    """Invalid images, actions or settings."""
 
 
 class PolicyError(ShapechangerError, ValueError):
@@ -22,21 +22,21 @@ class PolicyError(ShapechangerError, ValueError):
 CHANNELS: Final = 3
 """Red, green and blue."""
 
-_CHUNK: Final = 256  # Pictures at a time, to bound the memory of the sums.
+_CHUNK: Final = 256  # Images at a time, to bound the memory of the sums.
 # A mean in single precision may miss a half by a rounding error, and is still rounded up.
 HALF: Final = 0.5 + 1e-4
 
 
 class Framing(msgspec.Struct, frozen=True, kw_only=True):
-    """Crop and resolution of the pictures of a policy.
+    """Crop and resolution of the images of a policy.
 
     Attributes:
-        height: Rows of the reduced picture.
-        width: Columns of the reduced picture.
+        height: Rows of the reduced image.
+        width: Columns of the reduced image.
         top: Share of the rows that is cut off at the top, in [0, 1).
     """
 
-    # A quarter of the pixels of a 160 x 120 picture, less the fifth in which a camera a few
+    # A quarter of the pixels of a 160 x 120 image, less the fifth in which a camera a few
     # centimetres above the floor sees ceiling or sky.
     height: int = 48
     width: int = 80
@@ -52,15 +52,15 @@ class Framing(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Rows, columns and colours of the reduced picture."""
+        """Rows, columns and colours of the reduced image."""
         return self.height, self.width, CHANNELS
 
 
 def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Crop and reduce pictures.
+    """Crop and reduce images.
 
     Each pixel is the mean of the area that it covers, rounded half up: of a block of pixels where
-    the size divides evenly, and weighted by the covered shares elsewhere. Pictures that already
+    the size divides evenly, and weighted by the covered shares elsewhere. Images that already
     have the target size are returned unchanged.
 
     Args:
@@ -71,7 +71,7 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
         Shape (n, height, width, 3).
 
     Raises:
-        CloningError: If the pictures have another type or shape.
+        CloningError: If the images have another type or shape.
     """
     if pictures.ndim != 4 or pictures.shape[3] != CHANNELS or pictures.dtype != np.uint8:
         raise CloningError(
@@ -101,7 +101,7 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
 
 
 def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
-    """Reduce pictures whose size does not divide evenly: rows first, then columns."""
+    """Reduce images whose size does not divide evenly: rows first, then columns."""
     n, height, width, _ = pictures.shape
     of_rows = area_shares(height, framing.height)
     of_columns = area_shares(width, framing.width)

@@ -1,4 +1,4 @@
-"""A policy that acts on a picture, a state or both, and the file that it is stored in.
+"""A policy that acts on an image, a state or both, and the file that it is stored in.
 
 The file holds the weights as safetensors, with a card in JSON that describes the policy.
 """
@@ -37,7 +37,7 @@ _CHUNK: Final = 256  # Examples at a time, to bound the memory.
 
 
 class CameraPolicy(ActingClone):
-    """A policy for pictures, states or both.
+    """A policy for images, states or both.
 
     Attributes:
         network: The network.
@@ -50,7 +50,7 @@ class CameraPolicy(ActingClone):
 
     @classmethod
     def fresh(cls, settings: CloneSettings, seed: int) -> CameraPolicy:
-        """Return an untrained policy for steering and throttle from a picture.
+        """Return an untrained policy for steering and throttle from an image.
 
         Args:
             settings: Architecture of the network.

@@ -1,7 +1,7 @@
 """Cloned policies as starting points for reinforcement learning with Stable-Baselines3.
 
 The encoders of the clone are frozen, and the learner works on their features: this is many times
-faster than on pictures, and untrained critics cannot destroy what cloning has learned.
+faster than on images, and untrained critics cannot destroy what cloning has learned.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _STATE: Final = "state"
 # drown the actions of the clone in noise.
 _LOG_STD: Final = -2.0
 _BRIGHTEST: Final = 255.0
-# Raw pictures are large: SAC's default of a million would take 50 GB and more.
+# Raw images are large: SAC's default of a million would take 50 GB and more.
 _BUFFER: Final = 10_000
 
 
@@ -63,7 +63,7 @@ class ClonedPerception(BaseFeaturesExtractor):
     """Frozen encoders of a clone, from raw observations to features.
 
     Args:
-        observation_space: Pictures, states, or a Dict of both under "image" and "state".
+        observation_space: Images, states, or a Dict of both under "image" and "state".
         card: Card of the clone, as JSON.
     """
 
@@ -101,7 +101,7 @@ class ClonedPerception(BaseFeaturesExtractor):
         return self.network.perceive(None if pictures is None else self._small(pictures), states)
 
     def _small(self, pictures: Tensor) -> Tensor:
-        """Reduce raw pictures in the same way as `pictures.prepare`."""
+        """Reduce raw images in the same way as `pictures.prepare`."""
         rows, columns = cast("Tensor", self.rows), cast("Tensor", self.columns)
         seen = rows @ pictures[:, :, self._first :] @ columns.T
         return torch.floor(seen + HALF) / _BRIGHTEST
@@ -159,7 +159,7 @@ def as_sac(
 
     Args:
         policy: The policy.
-        size: Rows and columns of the raw pictures; None for a policy without pictures.
+        size: Rows and columns of the raw images; None for a policy without images.
         seed: Seed of the learner.
         **settings: Arguments of `stable_baselines3.SAC`, except the shape of the actor.
 
@@ -196,7 +196,7 @@ def as_ppo(
 
     Args:
         policy: The policy.
-        size: Rows and columns of the raw pictures; None for a policy without pictures.
+        size: Rows and columns of the raw images; None for a policy without images.
         seed: Seed of the learner.
         **settings: Arguments of `stable_baselines3.PPO`, except the shape of the actor.
     """

@@ -10,17 +10,17 @@ from shapechanger.demos.cloning.pictures import CloningError, Framing
 
 
 class Augmentation(msgspec.Struct, frozen=True, kw_only=True):
-    """Random changes of each picture each time it is learned from.
+    """Random changes of each image each time it is learned from.
 
     Attributes:
-        mirror: Share of pictures that are mirrored, with their actions.
+        mirror: Share of images that are mirrored, with their actions.
         shift: Maximum shift to each side, and up and down, pixels.
         gain: Maximum brightness factor, >= 1; its inverse is the minimum.
         colour: Maximum further factor of a single colour, >= 1; its inverse is the minimum.
         offset: Maximum offset of all pixels in either direction, as a share of full brightness.
         noise: Maximum standard deviation of the noise, as a share of full brightness.
-        noisy: Share of pictures with noise.
-        blurred: Share of pictures that are blurred over 3 x 3 pixels.
+        noisy: Share of images with noise.
+        blurred: Share of images that are blurred over 3 x 3 pixels.
     """
 
     mirror: float = 0.5
@@ -49,7 +49,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         framing: Crop and resolution; those of `start` where training starts from another policy.
         channels: Filters of each convolution; each one halves rows and columns.
-        features: Number of features between picture and actions.
+        features: Number of features between image and actions.
         batch: Examples per step.
         passes: Number of passes over the data, within the two bounds below.
         fewest_steps: Minimum number of steps.
@@ -64,7 +64,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         checks: Number of validations during training.
         patience: Number of validations without improvement after which training stops.
         rehearsal: Share of each batch that comes from the rehearsal data, if there are any.
-        augmentation: Random changes of the pictures.
+        augmentation: Random changes of the images.
         eyes: Input of the first layer: "colours", or "edges": strength of the edges of each
             direction in each cell, independent of light and colour.
         nerves: Widths of the layers for the state.
@@ -125,7 +125,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
             raise CloningError("dropout, smoothing and averaging must be in [0, 1).")
 
     def steps(self, pictures: int) -> int:
-        """Return the number of training steps for this many pictures."""
+        """Return the number of training steps for this many images."""
         wanted = round(self.passes * pictures / self.batch)
         return min(max(wanted, self.fewest_steps), self.most_steps)
 
@@ -155,7 +155,7 @@ DEMOS: Final = CloneSettings(
 """Settings for few demonstrations."""
 
 # Steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network on colours
-# and finer pictures learns from them; with fewer it would learn irrelevant details.
+# and finer images learns from them; with fewer it would learn irrelevant details.
 _MANY: Final = 3000
 
 

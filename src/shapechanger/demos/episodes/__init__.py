@@ -1,4 +1,4 @@
-"""Episodes on disk: observations, actions and pictures, step by step, safe against crashes.
+"""Episodes on disk: observations, actions and images, step by step, safe against crashes.
 
 A recording is a folder of episodes; the folder of a single episode is a recording too:
 

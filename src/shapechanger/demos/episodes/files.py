@@ -27,7 +27,7 @@ FULL_BYTES: Final = MAX_TEXT_BYTES * 3 // 4
 come later, have the rest."""
 
 MAX_PICTURE_BYTES: Final = 16 << 20
-"""Largest picture to write or read, bytes."""
+"""Largest image to write or read, bytes."""
 
 _MOST_OF_A_NAME: Final = 9999
 

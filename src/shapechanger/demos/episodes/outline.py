@@ -88,7 +88,7 @@ def read_outline(path: Path) -> Outline:
 
 
 def frame_of(line: str, where: str) -> str:
-    """Return the name of the picture in a line of `steps.jsonl`; "" for none.
+    """Return the name of the image in a line of `steps.jsonl`; "" for none.
 
     Args:
         line: The line.

@@ -61,7 +61,7 @@ class StepLine(NamedTuple):
 
 
 def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
-    """Check every line of an episode, and the picture that it names."""
+    """Check every line of an episode, and the image that it names."""
     try:
         content = read_file(path / STEPS, MAX_TEXT_BYTES)
     except OSError as error:
@@ -92,7 +92,7 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
 
 
 def _wrong_with(frames: Path, picture: StepPicture, *, thorough: bool) -> str:
-    """Return what is wrong with the picture of a step, as part of a sentence; "" for nothing."""
+    """Return what is wrong with the image of a step, as part of a sentence; "" for nothing."""
     name, size = picture.name, picture.size
     if not _FRAME_NAME.fullmatch(name):
         return f"its picture has the invalid name {name!r}"
@@ -187,7 +187,7 @@ class Episode:
         return math.fsum(seconds for step, seconds in lasted if step.index in kept)
 
     def jpeg(self, step: Step) -> bytes | None:
-        """Return the picture of a step as it was received; None for none.
+        """Return the image of a step as it was received; None for none.
 
         Raises:
             BrokenEpisode: If the file is missing or was modified.
@@ -204,11 +204,11 @@ class Episode:
 
 
 def read_episode(path: Path) -> Episode:
-    """Read an episode; pictures are read on demand.
+    """Read an episode; images are read on demand.
 
     Raises:
         DemosError: If the folder is not an episode, or has another version of the format.
-        BrokenEpisode: If a line or a picture is damaged or missing.
+        BrokenEpisode: If a line or an image is damaged or missing.
     """
     header, closed = read_header(path)
     lines = _scan(path, header, thorough=False)
@@ -322,7 +322,7 @@ class Repair(NamedTuple):
     Attributes:
         kept: Number of valid steps.
         lost: Why each removed line was invalid, as parts of sentences.
-        pictures: Number of pictures that belong to no step.
+        pictures: Number of images that belong to no step.
         was_closed: Whether the episode had been closed before.
     """
 
@@ -340,7 +340,7 @@ class Repair(NamedTuple):
 def repair(path: Path) -> Repair:
     """Keep every complete step of an episode, and close the episode.
 
-    Invalid lines and unused pictures are moved to the folder `lost`, not deleted.
+    Invalid lines and unused images are moved to the folder `lost`, not deleted.
 
     Args:
         path: Folder of the episode.

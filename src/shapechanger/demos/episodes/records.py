@@ -24,7 +24,7 @@ _CLOCKS: Final = ("real", "twin", "none")
 _IMAGE_SIZE: Final = 2
 _SLOWEST_HZ: Final = 1e-3
 _FASTEST_HZ: Final = 1e6
-# A stack of four grey pictures of 84 x 84, as state, is 28 224 values.
+# A stack of four grey images of 84 x 84, as state, is 28 224 values.
 _MAX_VALUES: Final = 1 << 17
 _MAX_INTEGER: Final = 1 << 62  # Sums of two fit into the 64 bits of NumPy and of other formats.
 
@@ -36,7 +36,7 @@ class EpisodeHeader:
     Attributes:
         action_layout: JSON of the `Layout` of the actions.
         state_layout: JSON of the `Layout` of the states; "" without states.
-        image_size: Width and height of the pictures in pixels; None without pictures.
+        image_size: Width and height of the images in pixels; None without images.
         control_hz: Steps per second.
         robot: Name of the robot.
         body: Kind of robot, such as "car".
@@ -158,7 +158,7 @@ _NS: Final = ("captured_ns", "decided_ns", "wall_ns")
 
 
 class StepPicture(msgspec.Struct, frozen=True, array_like=True):
-    """The picture of a step: file name, size in bytes, and CRC-32 as eight hexadecimal digits."""
+    """The image of a step: file name, size in bytes, and CRC-32 as eight hexadecimal digits."""
 
     name: str
     size: int
@@ -166,11 +166,11 @@ class StepPicture(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def of(cls, name: str, jpeg: bytes) -> StepPicture:
-        """Return the record of a picture."""
+        """Return the record of an image."""
         return cls(name, len(jpeg), f"{binascii.crc32(jpeg):08x}")
 
     def fits(self, jpeg: bytes) -> bool:
-        """Return whether a picture is the recorded one."""
+        """Return whether an image is the recorded one."""
         return self == StepPicture.of(self.name, jpeg)
 
 
@@ -187,7 +187,7 @@ class Step(
         applied: What the outputs did, after caps, slew limits and reflexes; None if unknown.
         wanted: What a policy would have done while somebody else drove; None without a policy.
         state: Values of the state layout; NaN where nothing measured one.
-        captured_ns: When the picture was taken or the state was read; monotonic clock of the robot.
+        captured_ns: When the image was taken or the state was read; monotonic clock of the robot.
         decided_ns: When the action reached the robot; same clock.
         wall_ns: When the step was recorded; Unix time of the recorder.
         reward: Reward of the step; None without a reward.
@@ -195,7 +195,7 @@ class Step(
         terminated: Whether the task ended with this step.
         truncated: Whether the episode was cut short at this step.
         stop_reason: Why the robot overrode the action; "" if it did not.
-        picture: Its picture on disk; None for none.
+        picture: Its image on disk; None for none.
     """
 
     index: int = msgspec.field(default=-1, name="step")
@@ -216,7 +216,7 @@ class Step(
 
     @property
     def frame(self) -> str:
-        """File name of the picture; "" for none."""
+        """File name of the image; "" for none."""
         return "" if self.picture is None else self.picture.name
 
     @property

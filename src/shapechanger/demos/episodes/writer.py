@@ -186,7 +186,7 @@ class EpisodeWriter:
         return self._bytes >= FULL_BYTES
 
     def continued(self) -> EpisodeWriter:
-        """Close the episode, and return the writer of the next one, with the newest picture.
+        """Close the episode, and return the writer of the next one, with the newest image.
 
         Raises:
             OutputError: If the next one cannot be created; this one is closed then.
@@ -210,7 +210,7 @@ class EpisodeWriter:
 
         Args:
             step: The step; its index and frame fields are filled in here.
-            jpeg: Its picture; None to reuse the previous step's picture, or without a camera.
+            jpeg: Its image; None to reuse the previous step's image, or without a camera.
 
         Returns:
             Index of the step.
@@ -313,7 +313,7 @@ class EpisodeWriter:
         self._bytes += len(line)
 
     def _frame(self, jpeg: bytes | None) -> StepPicture | None:
-        """Write a picture, and return its record; without a new one, keep that before."""
+        """Write an image, and return its record; without a new one, keep that before."""
         before = self._before
         jpeg = self._jpeg if jpeg is None and before is None else jpeg
         if jpeg is None:

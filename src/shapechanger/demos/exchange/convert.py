@@ -87,7 +87,7 @@ class Imported:
         format: Name of the format.
         episodes: Number of episodes.
         steps: Number of steps.
-        pictures: Number of pictures.
+        pictures: Number of images.
         left_out: What is not imported, a line for each reason.
         warnings: Contradictions in the source, as sentences.
         notes: Further facts, as sentences.
@@ -119,7 +119,7 @@ def export_recording(
         format: Name of one of the `formats`.
         dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
         task: What the robot does, in words, for policies that follow language; lerobot only.
-        images: Whether to store pictures as they were recorded, instead of video; lerobot only.
+        images: Whether to store images as they were recorded, instead of video; lerobot only.
 
     Raises:
         DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies
@@ -183,7 +183,7 @@ def import_episodes(
 
     Yields:
         For each episode its header, and an iterator over its steps, each with the JPEG of its
-        picture (None without pictures). Steps that share a picture share the object. The iterator
+        image (None without images). Steps that share an image share the object. The iterator
         can be used once, at any time.
 
     Raises:
@@ -328,7 +328,7 @@ def _formats_of(path: Path) -> list[str]:
 def _write(
     episode: ExchangeEpisode, folder: Path, named_after: datetime, context: ImportContext
 ) -> tuple[int, int]:
-    """Write one episode of a recording; return its numbers of steps and pictures."""
+    """Write one episode of a recording; return its numbers of steps and images."""
     pictures = 0
     excluded: list[tuple[int, str]] = []
     # The folders of all episodes begin with the same time, so that their order is kept.

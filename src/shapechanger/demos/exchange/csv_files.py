@@ -5,7 +5,7 @@ value that nothing measured. Texts are written as JSON with its quotes, so that 
 one for a formula, and line ends and other special characters survive.
 
 Without a header, `steps.csv` is a table of others: its columns are known by their names or aliases
-in `COLUMNS`, and its pictures lie in the same folder.
+in `COLUMNS`, and its images lie in the same folder.
 """
 
 from __future__ import annotations
@@ -252,7 +252,7 @@ class _Table:
         self._context = context
 
     def records(self, frames: Path) -> list[SourceRecord]:
-        """Return the lines that can be read, with their pictures; the others are left out."""
+        """Return the lines that can be read, with their images; the others are left out."""
         found: list[SourceRecord] = []
         before, shown, known = -1, "", set[str]()
         for position, (line, cells) in enumerate(self._lines):

@@ -1,7 +1,7 @@
 """Export: the steps of a dataset from episodes, for all formats.
 
 Episodes are split where steps do not follow each other, episodes of one dataset are compared, and
-pictures are decoded once for each step that has a new one.
+images are decoded once for each step that has a new one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NS_PER_S: Final = 1e9
 
 
 def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | None]]:
-    """Yield the steps that are not excluded, each with its picture, even where it is shared."""
+    """Yield the steps that are not excluded, each with its image, even where it is shared."""
     picture: bytes | None = None
     for row in rows:
         picture = picture if row.jpeg is None else row.jpeg
@@ -35,7 +35,7 @@ def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | Non
 
 
 def exchange_episode(episode: Episode, steps: Sequence[Step]) -> ExchangeEpisode:
-    """Return some steps of an episode for export; pictures are read step by step."""
+    """Return some steps of an episode for export; images are read step by step."""
     return ExchangeEpisode(
         header=episode.header,
         rows=_rows(episode, steps),
@@ -126,16 +126,16 @@ def value_names(layout: Layout) -> list[str]:
 def decoded_steps(
     rows: Iterable[ExchangeStep], size: tuple[int, int] | None, name: str, title: str
 ) -> Iterator[tuple[ExchangeStep, bytes, NDArray[np.uint8] | None]]:
-    """Yield steps for a dataset with a picture at every step, each with its picture.
+    """Yield steps for a dataset with an image at every step, each with its image.
 
     Args:
         rows: The steps.
-        size: Width and height of all pictures; None without pictures.
+        size: Width and height of all images; None without images.
         name: How to name the episode in errors.
         title: How to name the format in errors.
 
     Yields:
-        The step; its picture, also if it is shared; and its pixels if it is new, shape
+        The step; its image, also if it is shared; and its pixels if it is new, shape
         (height, width, 3).
     """
     jpeg = b""

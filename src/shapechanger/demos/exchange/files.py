@@ -1,6 +1,6 @@
 """Files of datasets: sources stay unchanged, targets appear whole, and one budget limits all reads.
 
-The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of a picture,
+The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of an image,
 `MAX_UNPACKED` of anything compressed, and regular files inside the folder only. All functions raise
 `DemosError` for what they refuse, and `MissingExtra` for a package that is not installed.
 """
@@ -30,7 +30,7 @@ from shapechanger.errors import DemosError, MissingExtra, OutputError
 from shapechanger.files import cannot_write
 
 MAX_UNPACKED: Final = 64 << 20
-"""Bytes in memory at once, and allowed for any file. A picture of `MAX_PIXELS` has 48 MiB."""
+"""Bytes in memory at once, and allowed for any file. An image of `MAX_PIXELS` has 48 MiB."""
 
 MAX_PACKED: Final = 64
 """Largest share of unpacked bytes to those of a file."""
@@ -285,7 +285,7 @@ def _open_parquet(path: Path) -> Generator[Any]:
     """Open a Parquet file as a `pyarrow.parquet.ParquetFile`."""
     arrow = library("pyarrow", "lerobot")
     try:
-        # Without `buffer_size` a whole row group is in memory, which may be an episode of pictures.
+        # Without `buffer_size` a whole row group is in memory, which may be an episode of images.
         opened = library("pyarrow.parquet", "lerobot").ParquetFile
         with opened(path, pre_buffer=False, buffer_size=1 << 20) as file:
             size = path.stat().st_size
@@ -367,7 +367,7 @@ def number_columns(
 def rows_at(
     path: Path, rows: NDArray[np.int64], sizes: Mapping[str, int], stored: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
-    """Yield some rows of a Parquet file, in its order: vectors, and pictures as stored."""
+    """Yield some rows of a Parquet file, in its order: vectors, and images as stored."""
     with _open_parquet(path) as file:
         wanted = [*sizes, *stored]
         if missing := [key for key in wanted if key not in file.schema_arrow.names]:
@@ -380,7 +380,7 @@ def rows_at(
         for batch in _batches(file, wanted, groups):
             here = np.flatnonzero(np.isin(places[done : done + batch.num_rows], rows))
             done += batch.num_rows
-            # Not of the pictures: a copy of them may not fit into memory.
+            # Not of the images: a copy of them may not fit into memory.
             part = batch.select(list(sizes)).take(library("pyarrow", "lerobot").array(here))
             numbers = {
                 key: _vectors(part.column(key), size, f"{path}: {key!r}")

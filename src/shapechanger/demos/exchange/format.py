@@ -109,7 +109,7 @@ class ExchangeStep:
 
     Attributes:
         step: The step; its index and the name of its frame are ignored.
-        jpeg: Its picture; None for that of the step before, or without a camera.
+        jpeg: Its image; None for that of the step before, or without a camera.
         marks: Texts of its marks.
         dropped: Why the step is excluded; None if it is not.
     """
@@ -178,7 +178,7 @@ class ImportContext:
             self.notes.append(sentence)
 
     def left_out_lines(self) -> list[str]:
-        """Return a line for each reason, such as "9 records with an empty picture: 31, 32, ...".
+        """Return a line for each reason, such as "9 records with an empty image: 31, 32, ...".
 
         The reason with most parts is first.
         """
@@ -206,7 +206,7 @@ class ExportContext:
     Attributes:
         out: The folder that the user asked for; a writer gets another one, which is moved there.
         task: What the robot does, in words; "" if not given.
-        images: Whether to store pictures as they were recorded, instead of video.
+        images: Whether to store images as they were recorded, instead of video.
         rewarded: Whether all steps have a reward.
     """
 

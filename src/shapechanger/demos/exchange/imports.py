@@ -1,6 +1,6 @@
 """Import: episodes from the records of a file, for all formats.
 
-A reader fills `SourceRecord`s from its file. Here their actions, drivers and pictures are checked,
+A reader fills `SourceRecord`s from its file. Here their actions, drivers and images are checked,
 rates are measured, and sessions are split where time jumps.
 
 Times may be rounded, and records may be missing, so a median of periods is not the rate: at times
@@ -62,8 +62,8 @@ class SourceRecord:
         name: Its name in reports.
         step: Its step, with its time as `captured_ns`.
         number: Its number in the source; gaps are missing records.
-        picture: Its picture: a file, a JPEG, PNG or BMP, or pixels; None without one.
-        frame: Equal for successive records that share a picture; None to take `picture`.
+        picture: Its image: a file, a JPEG, PNG or BMP, or pixels; None without one.
+        frame: Equal for successive records that share an image; None to take `picture`.
         fault: Why it cannot be imported, after a noun; "" if it can.
         marks: Texts of its marks.
         dropped: Why the step is excluded; None if it is not.
@@ -93,7 +93,7 @@ def episode_of(
 
     Args:
         records: The records in order; they are read with the episode.
-        header: Its metadata, with the layouts, the rate and the size of the pictures.
+        header: Its metadata, with the layouts, the rate and the size of the images.
         context: Collects what is left out.
         name: How to name the episode in errors.
         what: A record, as a noun for reports.
@@ -162,9 +162,9 @@ def _fault(step: Step) -> str:
 def with_pictures(
     records: Sequence[SourceRecord], what: str, context: ImportContext
 ) -> tuple[list[SourceRecord], tuple[int, int] | None]:
-    """Return the records with a whole picture, or with none, and the most frequent size.
+    """Return the records with a whole image, or with none, and the most frequent size.
 
-    All pictures are decoded, so that rates and jumps follow from the records that remain.
+    All images are decoded, so that rates and jumps follow from the records that remain.
     """
     sizes: dict[int, tuple[int, int]] = {}
     encoded = 0

@@ -1,8 +1,8 @@
 """LeRobot datasets, version 3: our own with their layouts, and those of others.
 
 Of a dataset of others, `action` becomes the action, the numbers of `observation.*` become the
-state, and one camera the picture. Units are unknown and written "?", unless the feature states
-them, and the driver is taken to be a person, who teleoperated the robot. Pictures that are stored
+state, and one camera the image. Units are unknown and written "?", unless the feature states
+them, and the driver is taken to be a person, who teleoperated the robot. Images that are stored
 as JPEG are kept; videos and PNGs are encoded as JPEG of quality 100, which changes them slightly.
 """
 
@@ -87,11 +87,11 @@ class _Feature:
 
     @property
     def is_picture(self) -> bool:
-        """Whether it is a camera's whose pictures can be imported."""
+        """Whether it is a camera's whose images can be imported."""
         return self.kind in {"video", "image"} and not self.is_depth
 
     def picture_size(self, path: Path) -> tuple[int, int]:
-        """Return the width and height of its pictures, pixels, which are compared with it.
+        """Return the width and height of its images, pixels, which are compared with it.
 
         Axes are found by their names if those fit, or else by the number of colours.
         """
@@ -295,7 +295,7 @@ def _records(
     drivers: Sequence[Driver],
     unpacked: dict[Path, int],
 ) -> Iterator[SourceRecord]:
-    """Yield the records of an episode; `unpacked` counts the bytes of pictures of each file."""
+    """Yield the records of an episode; `unpacked` counts the bytes of images of each file."""
     stored = kept.camera.key if kept.camera is not None and kept.camera.kind == "image" else ""
     times = located.times
     videos: Iterator[NDArray[np.uint8] | None] = repeat(None, len(located.steps))
@@ -329,7 +329,7 @@ def _records(
         if stored:
             record.picture = data = _bytes(row[stored])
             unpacked[first] = unpacked.get(first, 0) + (len(data) if data != read else 0)
-            if unpacked[first] > most:  # One picture can stand in any number of rows.
+            if unpacked[first] > most:  # One image can stand in any number of rows.
                 raise UnpacksToTooMuch(f"{first} unpacks to more than {most} bytes of pictures.")
             read = data
             record.fault = "" if data else "whose picture is not in the table"
@@ -337,7 +337,7 @@ def _records(
 
 
 def _in_order(located: Located, kept: _Kept, stored: str) -> Iterator[dict[str, Any]]:
-    """Yield the features of each step in order: vectors, and the picture as stored."""
+    """Yield the features of each step in order: vectors, and the image as stored."""
     sizes = {f.key: f.size for f in (kept.action, *kept.states)} | dict.fromkeys(kept.columns, 1)
     waiting: dict[int, dict[str, Any]] = {}  # Rows of a file that is not in order.
     due = held = 0
@@ -356,7 +356,7 @@ def _in_order(located: Located, kept: _Kept, stored: str) -> Iterator[dict[str, 
 
 
 def _bytes(value: Any) -> bytes:
-    """Return the bytes of a picture of a table; b"" if it has none."""
+    """Return the bytes of an image of a table; b"" if it has none."""
     data = cast("dict[str, Any]", value).get("bytes") if isinstance(value, dict) else None
     return data if isinstance(data, bytes) else b""
 

@@ -14,7 +14,7 @@ NaN would make all statistics of a dataset NaN.
 
 Statistics have LeRobot's keys and its way to combine episodes (`compute_stats.py` of lerobot
 0.4.4), with three differences: quantiles are exact where LeRobot's come from a histogram, all
-pictures of an episode count, not a sample, and their standard deviation is the true one, where
+images of an episode count, not a sample, and their standard deviation is the true one, where
 LeRobot's squares overflow 8 bits.
 """
 
@@ -58,14 +58,14 @@ _FILES_PER_CHUNK: Final = 1000
 _DATA_FILE_MB: Final = 100
 _VIDEO_FILE_MB: Final = 200
 _MB: Final = 1 << 20
-# LeRobot finds a picture by its time in the file, in 32 bits and to 0.1 ms: enough for 1000 s.
+# LeRobot finds an image by its time in the file, in 32 bits and to 0.1 ms: enough for 1000 s.
 _VIDEO_FILE_S: Final = 500.0
-_ROWS: Final = 256  # In memory at once, because they may hold pictures.
+_ROWS: Final = 256  # In memory at once, because they may hold images.
 _SMALLEST_FRACTION: Final = 10_000  # Denominator of a rate: 19.98 Hz is 999/50.
 _QUANTILES: Final = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 _COLOURS: Final = 3
 _LEVELS: Final = 256
-# LeRobot thins out large pictures for its statistics.
+# LeRobot thins out large images for its statistics.
 _LARGE_PICTURE: Final = 300
 _THINNED_PICTURE: Final = 150
 
@@ -174,7 +174,7 @@ class _Dataset:
         self.steps += len(steps)
 
     def close_files(self) -> None:
-        """Close the files of the numbers and the pictures."""
+        """Close the files of the numbers and the images."""
         for file in (self._table, self._video):
             if file is not None:
                 file.close()
@@ -294,7 +294,7 @@ class _Dataset:
     def _write_rows(
         self, steps: Sequence[Step], stored: list[dict[str, Any]], task: str, name: str
     ) -> dict[str, NDArray[Any]]:
-        """Append the newest steps, those with the `stored` pictures, and return their columns."""
+        """Append the newest steps, those with the `stored` images, and return their columns."""
         count, end = len(stored), len(steps)
         newest, frames = steps[end - count :], np.arange(end - count, end)
         if task not in self._tasks:

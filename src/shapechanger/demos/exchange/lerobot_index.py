@@ -1,7 +1,7 @@
-"""Index of a LeRobot dataset: which rows and which pictures belong to which step.
+"""Index of a LeRobot dataset: which rows and which images belong to which step.
 
 Steps are found by their keys. `episode_index` and `frame_index` say which step a row is, and
-`timestamp`, added to the start of the episode in its video, which picture it has. An episode whose
+`timestamp`, added to the start of the episode in its video, which image it has. An episode whose
 keys contradict each other, or its entry in `meta/episodes`, is left out: one of them is wrong, and
 nothing says which.
 """
@@ -32,7 +32,7 @@ from shapechanger.demos.exchange.pictures import VideoTimes, read_times
 from shapechanger.errors import DemosError
 
 TOLERANCE_S: Final = 1e-4
-"""Largest difference between the time of a step and that of its picture, s: `tolerance_s` of
+"""Largest difference between the time of a step and that of its image, s: `tolerance_s` of
 lerobot 0.4.4. Rounding to 32 bits and to the ticks of the video is allowed in addition."""
 
 _EPISODE, _FRAME, _TIME, _INDEX = "episode_index", "frame_index", "timestamp", "index"
@@ -54,7 +54,7 @@ class Located:
     Attributes:
         number: Its `episode_index`.
         steps: Its steps in order, a structured array: `frame_index`, time since the start in ns,
-            number of the file in `paths`, row in it, and time of the picture in ticks.
+            number of the file in `paths`, row in it, and time of the image in ticks.
         paths: All data files.
         video: The video; None without one.
         times: Its times; None without one.
@@ -84,13 +84,13 @@ class _Contradiction(Exception):
 
 
 class Index:
-    """The entries of `meta/episodes`, and the keys of all rows and pictures.
+    """The entries of `meta/episodes`, and the keys of all rows and images.
 
     Args:
         folder: The dataset.
         info: Its `info.json`.
         camera: Key of the video that is imported; "" without one.
-        size: Width and height of its pictures, pixels.
+        size: Width and height of its images, pixels.
         context: Collects what is left out.
 
     Attributes:
@@ -310,7 +310,7 @@ class Index:
         return place[f"{self._video}/from_timestamp"], place[f"{self._video}/to_timestamp"]
 
     def _period_s(self, times: VideoTimes) -> float:
-        """Return the time from one picture to the next, s; that of the steps for a single one."""
+        """Return the time from one image to the next, s; that of the steps for a single one."""
         steps_s = np.diff(times.seconds)
         return float(np.median(steps_s)) if len(steps_s) else 1.0 / self._rate_hz
 
@@ -352,7 +352,7 @@ class Index:
         return times
 
     def _with_pictures(self, located: Located, place: _Place) -> Located:
-        """Return an episode with the picture of each step, without steps that have none."""
+        """Return an episode with the image of each step, without steps that have none."""
         number, steps = located.number, located.steps
         path = self._path("video", place)
         if path not in self._videos:
@@ -367,7 +367,7 @@ class Index:
         period_s = self._period_s(times)
         newest_s = float(times.seconds[-1])
         if at_s[-1] > min(end_s - 2.0 * most_s[-1], newest_s + 0.5 * period_s):
-            # If a picture is lost, the ones after it moved up; which one is unknown.
+            # If an image is lost, the ones after it moved up; which one is unknown.
             have_s = max(0.0, min(end_s, newest_s + period_s) - first_s)
             raise _Contradiction(
                 "with fewer pictures than steps",

@@ -10,7 +10,7 @@
 ```
 
 Messages are JSON, and their schemas state the units. Log times are on the robot's clock, ns:
-of the capture for pictures and states, of the decision for actions, and never moved. Where a time
+of the capture for images and states, of the decision for actions, and never moved. Where a time
 is unknown, the step follows the one before at the rate of the episode, or precedes the first one
 with a time. The header of the episode is the metadata
 `shapechanger`. Format: mcap.dev/spec.
@@ -33,7 +33,7 @@ _NS_PER_S: Final = 10**9
 _TEXT: Final = {"type": "string"}
 _WHOLE: Final = {"type": "integer"}
 _NUMBER: Final = {"type": "number"}
-# Foxglove's own, by which its panels know a picture: github.com/foxglove/foxglove-sdk.
+# Foxglove's own, by which its panels know an image: github.com/foxglove/foxglove-sdk.
 _IMAGE: Final[dict[str, Any]] = {
     "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
     "frame_id": _TEXT,

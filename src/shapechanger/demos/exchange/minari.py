@@ -1,22 +1,22 @@
 """Minari datasets: ours without a loss, and those of others as far as possible.
 
-An observation is the picture, the state, or a dictionary of both. A picture is stored as the JPEG
-that was recorded, which Minari decodes on reading; it is not encoded again. Pictures below 32
+An observation is the image, the state, or a dictionary of both. An image is stored as the JPEG
+that was recorded, which Minari decodes on reading; it is not encoded again. Images below 32
 pixels, which Minari does not store as JPEG, are stored as pixels, with the JPEG in `infos/jpeg`.
 Minari needs one observation more than there are steps, so the last one is repeated.
 
 In the infos of a step, `has_applied` and `has_wanted` say whether these actions are known, and
 `rewarded` whether the reward is, which is NaN if not; an unknown time is -2^63; `frame` is the
-index of the picture in the episode, the same for steps that share one; `more` is JSON of the
+index of the image in the episode, the same for steps that share one; `more` is JSON of the
 rest. `cut_off` says whether an end was added. The headers of the episodes, the layouts and the rate
 are in `metadata.json`.
 
-Of a dataset of others, at most one part of an observation may be a picture; all other values become
-the state, in order. Pictures that are not JPEG are encoded with quality 100. The driver is unknown
+Of a dataset of others, at most one part of an observation may be an image; all other values become
+the state, in order. Images that are not JPEG are encoded with quality 100. The driver is unknown
 and taken to be an "expert". The rate is the key `control_hz`, `--hz`, or 20 Hz.
 
 Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
-encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
+encodes each image again at JPEG quality 75, and needs the whole episode in memory.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ _INFOS: Final = (
     *("infos/applied", "infos/wanted", _DRIVER, _STOP, _MORE),
 )
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
-_CHUNK: Final = 64  # Steps in memory at once; pictures may be stored as pixels.
+_CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
 _MIN_JPEG: Final = 32  # Pixels.
 _BRIGHTEST: Final = 255
 
@@ -172,7 +172,7 @@ def _require_stored(main: Path, count: int) -> None:
 class _Parts:
     """Columns of an episode, those of the action and the state with their number of values.
 
-    `picture` is "" without pictures, and `infos` empty in a dataset of others.
+    `picture` is "" without images, and `infos` empty in a dataset of others.
     """
 
     header: EpisodeHeader
@@ -231,7 +231,7 @@ def _own(file: Any, number: int, plain: dict[str, Any]) -> _Parts:
 
 
 def _observed(picture: bool, state: bool) -> tuple[str, str]:
-    """Return the columns of the state and of the picture in an own dataset."""
+    """Return the columns of the state and of the image in an own dataset."""
     return (_STATE, _PICTURE) if picture and state else (_OBSERVATIONS, _OBSERVATIONS)
 
 
@@ -443,7 +443,7 @@ def _box(layout: str) -> spaces.Box:
 def _space(
     header: EpisodeHeader, first: ExchangeStep, name: str
 ) -> tuple[spaces.Space[Any], spaces.Box | None]:
-    """Return the space of all observations by the first step, and its part of the pictures."""
+    """Return the space of all observations by the first step, and its part of the images."""
     state = _box(header.state_layout) if header.state_layout else None
     picture = None
     if first.jpeg is not None or header.image_size is not None:
@@ -486,7 +486,7 @@ def _write_episode(
     header, steps, more, frames = episode.header, list[Step](), list[str](), list[int]()
     state_at, picture_at = _observed(picture is not None, bool(header.state_layout))
     size, grey = None, False
-    observed: list[Any] = []  # The columns of the pictures; the last one is Minari's.
+    observed: list[Any] = []  # The columns of the images; the last one is Minari's.
     if picture is not None:
         size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
         as_jpeg = _stored_as_jpeg(picture)

@@ -18,7 +18,7 @@ from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Feature
 
-_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
+_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
 _CHANNELS: Final = (1, 3)
 _DEEP: Final = (np.uint16, np.int16, np.uint32)
 
@@ -105,7 +105,7 @@ def space_features(name: str, space: spaces.Space[Any], what: str) -> list[Featu
 
 
 def picture_size_of(space: spaces.Space[Any]) -> tuple[int, int] | None:
-    """Return the width and height of the pictures of a space; None if it has no pictures."""
+    """Return the width and height of the images of a space; None if it has no images."""
     shape = space.shape or ()
     if not isinstance(space, spaces.Box) or cast("Any", space).dtype != np.uint8:
         return None
@@ -128,7 +128,7 @@ def _colours_first(shape: tuple[int, ...]) -> bool:
 
 
 def pixels_of(stored: Any, size: tuple[int, int] | None) -> NDArray[np.uint8] | None:
-    """Return a picture with its three colours last; None if it has another size or type."""
+    """Return an image with its three colours last; None if it has another size or type."""
     pixels = np.asarray(stored)
     if pixels.ndim == 2:
         pixels = pixels[..., None]

@@ -35,10 +35,10 @@ _OPAQUE: Final = 255
 
 
 class PictureError(DemosError):
-    """A picture that cannot be imported.
+    """An image that cannot be imported.
 
     Attributes:
-        reason: Why, after a noun, such as "with an empty picture".
+        reason: Why, after a noun, such as "with an empty image".
     """
 
     def __init__(self, reason: str) -> None:
@@ -49,7 +49,7 @@ class PictureError(DemosError):
 def load_jpeg(
     picture: Path | bytes | NDArray[np.uint8] | None, size: tuple[int, int] | None = None
 ) -> tuple[bytes, bool]:
-    """Return an intact picture as JPEG, and whether it was encoded, with quality 100.
+    """Return an intact image as JPEG, and whether it was encoded, with quality 100.
 
     Args:
         picture: A file, or the content of one: JPEG, PNG or BMP; or pixels, shape
@@ -81,7 +81,7 @@ def load_jpeg(
 
 
 def other_size(found: Sequence[int], size: Sequence[int]) -> str:
-    """Return the reason to leave out a picture of another size, each in pixels."""
+    """Return the reason to leave out an image of another size, each in pixels."""
     return "with a picture of {} x {} pixels, and not {} x {}".format(*found, *size)
 
 
@@ -121,7 +121,7 @@ def _pixels(data: bytes) -> NDArray[np.uint8]:
 
 # Constant quality, 0 to 51; see the measured error in docs/exchange.md.
 _QUALITY: Final = 18
-_KEY_FRAMES: Final = 2  # Each second picture stands alone, so that learners can read any quickly.
+_KEY_FRAMES: Final = 2  # Each second image stands alone, so that learners can read any quickly.
 _LONGEST_LINE: Final = 256
 _FLAGS: Final = re.compile(rb"F=0x([0-9A-F]+)")
 _LEFT_OUT: Final = 0x2 | 0x4  # Flags of packets: damaged, or cut off by the list of edits.
@@ -143,10 +143,10 @@ class VideoWriter:
     Args:
         path: The file to create.
         size: Width and height in pixels; both even.
-        rate: Pictures per second.
+        rate: Images per second.
 
     Attributes:
-        frames: Number of pictures written.
+        frames: Number of images written.
     """
 
     CODEC: Final = "h264"
@@ -182,7 +182,7 @@ class VideoWriter:
         return self._path.stat().st_size if self._path.exists() else 0
 
     def add(self, pixels: NDArray[np.uint8]) -> None:
-        """Append a picture, shape (height, width, 3)."""
+        """Append an image, shape (height, width, 3)."""
         try:
             if not self.frames:
                 self._pictures.send(None)  # It starts FFmpeg.
@@ -205,12 +205,12 @@ class VideoWriter:
 
 @dataclass(frozen=True, slots=True)
 class VideoTimes:
-    """When each picture of a video is shown.
+    """When each image of a video is shown.
 
     Attributes:
         ticks: Times in ticks, ascending, shape (n,).
         tick_s: Length of a tick, s.
-        size: Width and height of the pictures, pixels.
+        size: Width and height of the images, pixels.
         is_cut_off: Whether the end of the file is missing.
     """
 
@@ -226,12 +226,12 @@ class VideoTimes:
 
 
 def read_times(path: Path) -> VideoTimes:
-    """Read the times of the pictures of an MP4 video, without decoding them."""
+    """Read the times of the images of an MP4 video, without decoding them."""
     taken = ["-map", "0:v:0", "-c", "copy", "-copyinkf", "-f", "framecrc", "pipe:1"]
     command = _ffmpeg([*_reading(path), *taken], log="info")
     ticks: list[int] = []
     about: dict[str, str] = {}
-    most = path.stat().st_size  # Each picture has at least one byte.
+    most = path.stat().st_size  # Each image has at least one byte.
     with tempfile.TemporaryFile() as log, _running(command, log) as (process, stream):
         for line in iter(lambda: stream.readline(_LONGEST_LINE), b""):
             if line.startswith(b"#"):
@@ -272,28 +272,28 @@ def read_pictures(
     *,
     from_start: bool = False,
 ) -> Generator[NDArray[np.uint8]]:
-    """Yield the pictures of an MP4 video at some times, shape (height, width, 3).
+    """Yield the images of an MP4 video at some times, shape (height, width, 3).
 
     Args:
         path: The file.
         times: Its times.
         wanted: The times to read, of those, ascending, in ticks.
-        size: Width and height that the pictures must have, pixels.
+        size: Width and height that the images must have, pixels.
         from_start: Whether to decode the video from its start, not from the key frame before.
     """
     width, height = size
     seek: list[str] = []
     if wanted[0] > times.ticks[0] and not from_start:
         # To the key frame before, by the file's own times; rounding must not miss it. An accurate
-        # seek would add the time of the first picture once more.
+        # seek would add the time of the first image once more.
         since_s = float(wanted[0] * times.tick_s) - 1e-3
         seek = ["-noaccurate_seek", "-seek_timestamp", "1", "-ss", f"{since_s:.6f}"]
     read_fd, write_fd = os.pipe()
     taken = ["-map", "0:v:0", "-fps_mode", "passthrough"]
-    # A line for each picture, just before it: its time, as in the file.
+    # A line for each image, just before it: its time, as in the file.
     timed = ["-stats_enc_pre", f"pipe:{write_fd}", "-stats_enc_pre_fmt", "{ptsi}"]
     out = ["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "pipe:1"]
-    # Without these, damaged pictures would be filled up with others.
+    # Without these, damaged images would be filled up with others.
     strict = ["-xerror", "-err_detect", "explode"]
     command = _ffmpeg([*_reading(path, [*strict, *seek]), *taken, *timed, *out])
     with (
@@ -321,11 +321,11 @@ def read_pictures(
 def _next_picture(
     path: Path, size: tuple[int, int], lines: IO[bytes], stream: IO[bytes]
 ) -> tuple[int, bytes]:
-    """Return the time of the next picture in ticks, and its pixels; b"" at the end."""
+    """Return the time of the next image in ticks, and its pixels; b"" at the end."""
     line = lines.readline(_LONGEST_LINE)
     if not line.strip():
         return 0, b""
-    # Each picture is a PPM: "P6", width and height, 255, and the pixels.
+    # Each image is a PPM: "P6", width and height, 255, and the pixels.
     head = [stream.readline(_LONGEST_LINE) for _ in range(3)]
     width, height = size
     if head[0] and head != [b"P6\n", f"{width} {height}\n".encode(), b"255\n"]:

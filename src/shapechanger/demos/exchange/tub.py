@@ -7,7 +7,7 @@ the other modes `pilot/...` drives, except that in "local_angle" the throttle is
 Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
 metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
 indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names
-the start of the car. Version 1 has a file `record_N.json` per record, its picture next to it,
+the start of the car. Version 1 has a file `record_N.json` per record, its image next to it,
 optionally `milliseconds` since the start, `meta.json`, and the deleted numbers in `exclude.json`.
 
 Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
@@ -142,7 +142,7 @@ def _kind_of(value: object) -> str:
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
-    """Return the column of the pictures; "" without pictures."""
+    """Return the column of the images; "" without images."""
     cameras = [name for name, kind in columns.items() if kind in _PICTURES]
     deep = [name for name, kind in columns.items() if kind == _DEPTH]
     if deep and not cameras and not context.camera:
@@ -204,7 +204,7 @@ def _sensed(value: Any) -> float:
 
 
 def _find_pictures(records: Sequence[SourceRecord], images: Path, context: ImportContext) -> None:
-    """Find the picture of each record by its name, the `frame`; others get a fault."""
+    """Find the image of each record by its name, the `frame`; others get a fault."""
     shown = Counter(str(record.frame) for record in records if not record.fault)
     offsets: dict[int, int] = {}
     for record in records:

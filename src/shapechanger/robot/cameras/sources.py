@@ -1,4 +1,4 @@
-"""Cameras without a driver: a stream, a folder of pictures, and a test pattern."""
+"""Cameras without a driver: a stream, a folder of images, and a test pattern."""
 
 from __future__ import annotations
 

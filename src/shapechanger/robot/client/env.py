@@ -42,7 +42,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
     is left.) One-sided actions, such as tendons, are in [0, 1].
 
     ## Observation space
-    The camera's picture, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
+    The camera's image, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
     `state=True` a Dict of `image` and `state`; the state alone for a robot without a camera.
     `observation_layout` describes the numbers of the state.
 
@@ -77,10 +77,10 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
         key: The robot's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
-        size: Width and height of the pictures, pixels, such as (128, 128) in the original release;
+        size: Width and height of the images, pixels, such as (128, 128) in the original release;
             see `resize_picture`. None for the camera's.
-        state: Whether observations have the state besides the picture.
-        image: Whether observations have a picture; None if the robot has a camera.
+        state: Whether observations have the state besides the image.
+        image: Whether observations have an image; None if the robot has a camera.
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
             for each command and answers one period later.
         reward: Weights that replace the profile's, keyed by name.
@@ -100,7 +100,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
 
     Attributes:
         action_layout: Layout of an action.
-        observation_layout: Layout of an observation; a picture is the one block `camera/image`.
+        observation_layout: Layout of an observation; an image is the one block `camera/image`.
         record_clock: Source of the times in `info`, "real" or "twin".
 
     Raises:

@@ -17,7 +17,7 @@ from shapechanger.robot.client.connection import Received
 from shapechanger.robot.link.messages import Observation, Welcome
 
 IMAGE: Final = "camera/image"
-"""Name of the picture in an observation layout."""
+"""Name of the image in an observation layout."""
 
 _ABSENT: Final = "absent"
 _BRIGHTEST: Final = 255
@@ -25,14 +25,14 @@ _NS_PER_S: Final = 1e9
 
 
 def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Resize a picture.
+    """Resize an image.
 
     If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
     Otherwise it is the pixel nearest to its middle. Nothing is cropped, so a change of proportions
-    stretches the picture.
+    stretches the image.
 
     Returns:
-        Shape (size[1], size[0], 3); the picture itself if it has this size.
+        Shape (size[1], size[0], 3); the image itself if it has this size.
     """
     height, width = picture.shape[:2]
     wide, high = size
@@ -51,7 +51,7 @@ class View(NamedTuple):
 
     Attributes:
         observation: The observation, which shares no memory.
-        fresh: Whether its picture differs from the previous one; True without pictures.
+        fresh: Whether its image differs from the previous one; True without images.
         absent: Names of the state's features that no sensor measures now.
     """
 
@@ -66,10 +66,10 @@ class RobotSpaces:
     Attributes:
         action_layout: Layout of an action.
         action_space: One number for each action of the robot.
-        observation_layout: Layout of an observation; a picture is one block.
-        observation_space: Space of the picture, the state, or both.
-        has_image: Whether observations have a picture.
-        picture: The newest picture at the camera's size; None before the first.
+        observation_layout: Layout of an observation; an image is one block.
+        observation_space: Space of the image, the state, or both.
+        has_image: Whether observations have an image.
+        picture: The newest image at the camera's size; None before the first.
     """
 
     def __init__(

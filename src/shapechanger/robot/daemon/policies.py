@@ -124,7 +124,7 @@ class PolicyRunner:
         process = await asyncio.create_subprocess_exec(
             *self._command, stdin=PIPE, stdout=PIPE, limit=_LONGEST
         )
-        # However much it computes, commands and pictures go first.
+        # However much it computes, commands and images go first.
         run_normally(process.pid)
         try:
             text = await self._listen(process, name)

@@ -38,7 +38,7 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         issued_ns: When the daemon received it. Needed for "command" and "arm", which are refused
             when they are old.
         ttl_ms: How long a command acts at most, counted from `issued_ns`.
-        frame_ns: When the newest picture was taken; None without a camera or a picture.
+        frame_ns: When the newest image was taken; None without a camera or an image.
         values: One finite number for each action; JSON has no others.
         emergency: For "arm": how many emergency stops whoever arms has seen. One that came since
             is not ended.

@@ -41,7 +41,7 @@ START_NS: Final = 1_000_000_000
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
-"""Interval of looking for a reader of the pictures while time stands still."""
+"""Interval of looking for a reader of the images while time stands still."""
 
 
 def run_board(settings: BoardSettings, owner_fd: int) -> None:
@@ -84,7 +84,7 @@ def run_board(settings: BoardSettings, owner_fd: int) -> None:
 
 
 def _advance(board: PinBoard, now_ns: int) -> None:
-    """Advance the world to a time, and take the picture that is due."""
+    """Advance the world to a time, and take the image that is due."""
     for edge in board.advance(now_ns):
         if (reader := board.reader(edge.pin)) is not None:
             reader.add_edges([edge])
@@ -93,7 +93,7 @@ def _advance(board: PinBoard, now_ns: int) -> None:
 
 
 class RealTime:
-    """CLOCK_MONOTONIC; the world advances in steps of 10 ms, and for a picture."""
+    """CLOCK_MONOTONIC; the world advances in steps of 10 ms, and for an image."""
 
     def __init__(self) -> None:
         self.functions: Sequence[Callable[..., object]] = (self.wait,)

@@ -1,4 +1,4 @@
-"""Front camera: writes pictures of the world as JPEG into a pipe."""
+"""Front camera: writes images of the world as JPEG into a pipe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.cameras.sources import draw_barcode
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
-"""Faults of a camera: no pictures, the same one again, noise, or half a picture; "" for none."""
+"""Faults of a camera: no images, the same one again, noise, or half an image; "" for none."""
 
 _START_OF_IMAGE: Final = b"\xff\xd8"
 _COMMENT: Final = b"\xff\xfe"
@@ -30,7 +30,7 @@ def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
     """Add the capture time to a JPEG, as a comment segment.
 
     Args:
-        jpeg: The picture.
+        jpeg: The image.
         captured_ns: The time, ns.
     """
     words = b"captured_ns=%d" % captured_ns
@@ -39,20 +39,20 @@ def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
 
 
 class FrontCameraPipe:
-    """Takes pictures and writes them into a FIFO, without ever waiting for its reader.
+    """Takes images and writes them into a FIFO, without ever waiting for its reader.
 
     Args:
         path: Path of the FIFO.
         plan: The camera.
-        world: World to take pictures of.
-        start_ns: Time of the first picture.
-        latest_only: Whether to drop a picture while the one before is unread. Otherwise pictures
+        world: World to take images of.
+        start_ns: Time of the first image.
+        latest_only: Whether to drop an image while the one before is unread. Otherwise images
             are dropped only if the pipe is full or has no reader.
-        barcode: Whether the first rows of a picture show its capture time.
+        barcode: Whether the first rows of an image show its capture time.
 
     Attributes:
-        next_ns: Time of the next picture.
-        newest_ns: Capture time of the newest picture that was written; None before.
+        next_ns: Time of the next image.
+        newest_ns: Capture time of the newest image that was written; None before.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class FrontCameraPipe:
         self.newest_ns: int | None = None
 
     def take(self, now_ns: int) -> None:
-        """Take the picture that is due, and skip those whose time has passed."""
+        """Take the image that is due, and skip those whose time has passed."""
         while self.next_ns <= now_ns:
             self._taken += 1
             self.next_ns = self._start_ns + round(self._taken * 1e9 / self._plan.fps)
@@ -107,7 +107,7 @@ class FrontCameraPipe:
         self._fault = fault
 
     def draw(self, now_ns: int) -> bytes:
-        """Return the current picture as JPEG, with its time in a comment and maybe a barcode."""
+        """Return the current image as JPEG, with its time in a comment and maybe a barcode."""
         picture = np.ascontiguousarray(self._world.picture())
         if self._barcode:
             draw_barcode(picture, now_ns)
@@ -134,7 +134,7 @@ class FrontCameraPipe:
         return True
 
     def _ready(self) -> bool:
-        """Return whether the reader wants a picture."""
+        """Return whether the reader wants an image."""
         if not self.find_reader():
             return False
         if self._rest:
@@ -146,13 +146,13 @@ class FrontCameraPipe:
         return self._fd is not None and any(fcntl.ioctl(self._fd, _FIONREAD, bytes(4)))
 
     def _write(self, data: bytes, captured_ns: int | None) -> None:
-        """Write what fits; the rest of a picture is written first the next time."""
+        """Write what fits; the rest of an image is written first the next time."""
         if self._fd is None:
             return
         try:
             written = os.write(self._fd, data)
         except BlockingIOError:
-            return  # A picture that does not fit at all is dropped; a rest keeps waiting.
+            return  # An image that does not fit at all is dropped; a rest keeps waiting.
         except BrokenPipeError:
             self.close()
             return

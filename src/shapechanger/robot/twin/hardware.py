@@ -81,7 +81,7 @@ class GrantedClock(SteadyClock):
         return granted
 
     async def sleep(self, seconds: float) -> int | None:
-        """Let twin time advance, and return when the newest picture was taken."""
+        """Let twin time advance, and return when the newest image was taken."""
         import asyncio  # Only the daemon sleeps; the guard stays light.
 
         loop = asyncio.get_running_loop()

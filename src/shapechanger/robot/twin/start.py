@@ -112,7 +112,7 @@ class BoardAt:
 
     @property
     def fifo_path(self) -> Path:
-        """Pipe of its pictures; it exists only with a camera."""
+        """Pipe of its images; it exists only with a camera."""
         return self.folder / "camera.mjpeg"
 
     @property
@@ -121,7 +121,7 @@ class BoardAt:
         return _HARDWARE, self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """Return the camera of a profile, reading the pictures of this board.
+        """Return the camera of a profile, reading the images of this board.
 
         Raises:
             RobotError: If the board has no camera.

@@ -82,7 +82,7 @@ class ThreadVecEnv(DummyVecEnv):
         self._envs.close()
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Render one picture per env."""
+        """Render one image per env."""
         return self._envs.render()
 
 

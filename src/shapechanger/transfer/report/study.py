@@ -98,7 +98,7 @@ def study_html(
 
 
 def write_study_report(study: Study, out: Path, found: Findings | None = None) -> Path:
-    """Write the report of a study, without pictures of the bodies if they cannot be rendered."""
+    """Write the report of a study, without images of the bodies if they cannot be rendered."""
     path = out / "report.html"
     pictures, note = None, ""
     try:

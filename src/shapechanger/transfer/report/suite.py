@@ -42,7 +42,7 @@ _LEAST_RUNS: Final = 3
 
 
 class FilmStrip(NamedTuple):
-    """One policy's behaviour as a row of pictures."""
+    """One policy's behaviour as a row of images."""
 
     caption: str
     jpeg: bytes

@@ -32,9 +32,9 @@ _LARGEST: Final = 4096  # Width and height; software renderers draw no larger im
 class _Renderer:
     """Renders views of models.
 
-    The OpenGL context is opened for the first picture, so that a process that has only built a
+    The OpenGL context is opened for the first image, so that a process that has only built a
     camera, such as the parent of an `AsyncVectorEnv`, can be forked. A model's textures are loaded
-    for its first picture after another model's.
+    for its first image after another model's.
     """
 
     def __init__(self, size: tuple[int, int], hidden: int, supersampled: int = 1) -> None:
@@ -76,7 +76,7 @@ class _Renderer:
         self._model = model
 
     def _render(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """Return the picture of a state, (height, width, 3); it is overwritten."""
+        """Return the image of a state, (height, width, 3); it is overwritten."""
         if model is not self._model:
             self._open(model)
         self._gl.make_current()
@@ -94,7 +94,7 @@ class _Renderer:
         return self._picture[::-1]
 
     def close(self) -> None:
-        """Free the OpenGL context; the next picture opens another one."""
+        """Free the OpenGL context; the next image opens another one."""
         if self._model is not None:
             self._gl.make_current()
             self._context.free()
@@ -156,7 +156,7 @@ class OutsideCamera(_Renderer):
         Args:
             model: The model.
             data: Its state.
-            middle: Point in the middle of the picture, m, (3,).
+            middle: Point in the middle of the image, m, (3,).
             distance_m: Distance from it.
             azimuth_rad: Direction of view seen from above, from the x axis, counter-clockwise.
             elevation_rad: Angle of view above the horizon; negative looks down.

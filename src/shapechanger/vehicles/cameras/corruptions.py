@@ -1,7 +1,7 @@
-"""Camera faults: pure functions on pictures, for bad light and a bad lens.
+"""Camera faults: pure functions on images, for bad light and a bad lens.
 
-They change pictures only, never the world, to test how well policies generalize to other pictures.
-All take and return pictures of shape (H, W, 3), uint8, of any size.
+They change images only, never the world, to test how well policies generalize to other images.
+All take and return images of shape (H, W, 3), uint8, of any size.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from shapechanger.errors import UnknownName
 Picture = NDArray[np.uint8]
 
 Corruption = Callable[[Picture, int], Picture]
-"""Function from a picture and a seed, >= 0 and constant within an episode, to a picture."""
+"""Function from an image and a seed, >= 0 and constant within an episode, to an image."""
 
 # Share of the brightness that is left at night in red, green and blue, after the camera has raised
 # its gain as far as it can, and a gamma that darkens shadows. A quarter of the light without any
-# gain made pictures with a mean of 13 of 255, in which a person saw nothing.
+# gain made images with a mean of 13 of 255, in which a person saw nothing.
 _NIGHT_SHARE: Final = (0.46, 0.5, 0.66)
 _NIGHT_GAMMA: Final = 1.1
 # Standard deviation of a small sensor's noise at that gain, of 255 levels.
@@ -39,14 +39,14 @@ _SPOTS: Final = (8, 14)
 _SPOT_RADIUS: Final = (0.02, 0.085)
 _SPOT_DEPTH: Final = (0.45, 0.85)
 _DIRT: Final = np.array([52.0, 46.0, 34.0], np.float32)
-# Noise is cut from one long strip, because drawing it for each picture would dominate the time. It
-# has this length, or twice the picture's.
+# Noise is cut from one long strip, because drawing it for each image would dominate the time. It
+# has this length, or twice the image's.
 _STRIP: Final = 1 << 19
 _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """Halve the brightness of a picture, bluish, with a raised gain's noise of 9 levels."""
+    """Halve the brightness of an image, bluish, with a raised gain's noise of 9 levels."""
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -55,13 +55,13 @@ def night(picture: Picture, seed: int) -> Picture:
 
 
 def glare(picture: Picture, seed: int) -> Picture:
-    """Add light shining into the lens from the upper half of a picture: up to 230 levels."""
+    """Add light shining into the lens from the upper half of an image: up to 230 levels."""
     added = _glare(seed, *picture.shape[:2])
     return _bytes(picture + added)
 
 
 def blur(picture: Picture, seed: int) -> Picture:
-    """Defocus a picture by 1.25 % of its width; the seed has no effect."""
+    """Defocus an image by 1.25 % of its width; the seed has no effect."""
     del seed
     variance = (_BLUR * picture.shape[1]) ** 2
     # Two box filters over w = 2 r + 1 pixels have the variance 2 (w^2 - 1) / 12 = 2 (r^2 + r) / 3.
@@ -109,8 +109,8 @@ def _strip(length: int) -> NDArray[np.float32]:
 
 
 def _noise(picture: Picture, seed: int) -> NDArray[np.float32]:
-    """Standard normal noise of the picture's shape, a function of the seed and the picture."""
-    # Different pictures nearly always have different sums.
+    """Standard normal noise of the image's shape, a function of the seed and the image."""
+    # Different images nearly always have different sums.
     mixed = (int(picture.sum(dtype=np.int64)) * 2_654_435_761 + seed * 40_503) & 0xFFFF_FFFF
     strip = _strip(max(_STRIP, 2 * picture.size))
     start = mixed % (strip.size - picture.size)

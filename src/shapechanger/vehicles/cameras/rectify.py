@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from shapechanger.demos.episodes import EpisodeHeader
 
 CANONICAL_SIZE: Final = (80, 48)
-"""Width and height of a rectified picture, pixels."""
+"""Width and height of a rectified image, pixels."""
 
 # Focal length of the virtual camera and row of its horizon, pixels: 31 degrees to each side, 18 up,
 # and 21 down, where the car's bonnet begins.
 _FOCAL: Final = 66.0
 _HORIZON: Final = 22.0
 HALF_WIDTH_RAD: Final = math.atan(0.5 * CANONICAL_SIZE[0] / _FOCAL)
-"""Bearing of the left and right edge of a rectified picture, rad."""
+"""Bearing of the left and right edge of a rectified image, rad."""
 
 _SAMPLES: Final = 3  # In each direction of a pixel.
 _NEAREST: Final = 1e-3  # Depth of a ray below which it points sideways or behind the camera.
@@ -36,7 +36,7 @@ _MOST_MISSING: Final = 0.15  # Share of the pixels.
 
 # Vertical fields of view from which the search for the camera's own begins, degrees.
 _FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
-# Standard deviations beyond which a picture of a board does not tell the camera's geometry.
+# Standard deviations beyond which an image of a board does not tell the camera's geometry.
 _PITCH_SD_DEG: Final = 1.0
 _FOVY_SD_DEG: Final = 2.5
 _MOST_TILT_DEG: Final = 45.0
@@ -68,7 +68,7 @@ class CameraGeometry:
 
 
 class Rectifier:
-    """Warps pictures of one camera to the virtual camera.
+    """Warps images of one camera to the virtual camera.
 
     A pixel of the virtual camera is a ray; the ray, turned by the pitch, meets a pixel of the real
     camera. Nothing is said about heights: a camera that is mounted higher sees the ground farther
@@ -76,7 +76,7 @@ class Rectifier:
 
     Args:
         geometry: The real camera.
-        size: Width and height of its pictures, pixels.
+        size: Width and height of its images, pixels.
 
     Raises:
         WorldError: If the camera does not see what the virtual camera sees.
@@ -105,7 +105,7 @@ class Rectifier:
         self._shape = (high, wide, 3)
 
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a picture as the virtual camera would have taken it.
+        """Return an image as the virtual camera would have taken it.
 
         Args:
             picture: Shape (height, width, 3).
@@ -114,7 +114,7 @@ class Rectifier:
             Shape (48, 80, 3). What the camera does not see repeats the nearest pixel.
 
         Raises:
-            WorldError: If the picture has another size.
+            WorldError: If the image has another size.
         """
         if picture.shape != self._shape:
             raise WorldError(
@@ -129,12 +129,12 @@ class Rectifier:
 
 
 class CanonicalView:
-    """Warps pictures to the virtual camera of all vehicles.
+    """Warps images to the virtual camera of all vehicles.
 
     Attributes:
         camera: Pitch and vertical field of view of the camera, degrees; None for those that each
             episode states.
-        rectifiers: Those used so far, by camera and size of its pictures.
+        rectifiers: Those used so far, by camera and size of its images.
         bodies: Bodies of the episodes.
     """
 
@@ -144,9 +144,9 @@ class CanonicalView:
         self.bodies: set[str] = set()
 
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
-        """Return a picture of an episode as the virtual camera would have taken it.
+        """Return an image of an episode as the virtual camera would have taken it.
 
-        Pictures of episodes whose actions are waypoints are so already.
+        Images of episodes whose actions are waypoints are so already.
 
         Raises:
             DemosError: If the camera is unknown, or the episodes are of several bodies.
@@ -185,7 +185,7 @@ class CanonicalView:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredCamera:
-    """A camera's geometry from a picture of a checkerboard.
+    """A camera's geometry from an image of a checkerboard.
 
     Attributes:
         geometry: The geometry.
@@ -207,11 +207,11 @@ def pitch_of_horizon(row: float, height: int, fovy_deg: float) -> float:
 
     Args:
         row: Row of the horizon, pixels from the top.
-        height: Height of the picture, pixels.
+        height: Height of the image, pixels.
         fovy_deg: Vertical field of view, degrees.
 
     Raises:
-        WorldError: If the row is not in the picture.
+        WorldError: If the row is not in the image.
     """
     if not 0.0 <= row <= height:
         raise WorldError(f"The horizon must be in a row from 0 to {height}, got {row:g}.")
@@ -222,7 +222,7 @@ def pitch_of_horizon(row: float, height: int, fovy_deg: float) -> float:
 def measure_camera(
     picture: NDArray[np.uint8], corners: tuple[int, int], fovy_deg: float | None = None
 ) -> MeasuredCamera:
-    """Measure a camera's geometry from one picture of a checkerboard that stands upright.
+    """Measure a camera's geometry from one image of a checkerboard that stands upright.
 
     OpenCV finds the corners, and fits focal length and pose of a camera without distortion, with
     square pixels and its axis in the middle.
@@ -236,7 +236,7 @@ def measure_camera(
 
     Raises:
         MissingExtra: If OpenCV is not installed.
-        WorldError: If there is no such board in the picture, or it does not tell the geometry.
+        WorldError: If there is no such board in the image, or it does not tell the geometry.
     """
     points = _find_corners(picture, corners)
     import cv2
@@ -273,7 +273,7 @@ def measure_camera(
     # d fovy / d focal = -sin(fovy) / focal.
     fovy_sd = scale * float(lens_sd[1, 0]) * math.degrees(math.sin(math.radians(fovy))) / focal
     turn, slopes = cast("tuple[NDArray[np.float64], ...]", cv2.Rodrigues(turns[0]))
-    # The side of the board that is nearer to the vertical of the picture points down.
+    # The side of the board that is nearer to the vertical of the image points down.
     side = int(np.argmax(np.abs(turn[1, :2])))
     sign = math.copysign(1.0, turn[1, side])
     sine = float(sign * turn[2, side])
@@ -328,14 +328,14 @@ def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[n
 def _seen_at(
     geometry: CameraGeometry, size: tuple[int, int], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return columns and rows of a camera's pixels at places of the virtual camera's picture.
+    """Return columns and rows of a camera's pixels at places of the virtual camera's image.
 
     What is behind the camera is at (-1, -1).
 
     Args:
         geometry: The camera.
-        size: Width and height of its pictures, pixels.
-        x: Places from the left of the virtual picture, pixels.
+        size: Width and height of its images, pixels.
+        x: Places from the left of the virtual image, pixels.
         y: Places from its top, pixels.
     """
     wide, high = size

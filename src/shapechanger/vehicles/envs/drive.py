@@ -343,7 +343,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """Return a picture of the vehicle in its world from outside; see `MujocoWorld.outside`."""
+        """Return an image of the vehicle in its world from outside; see `MujocoWorld.outside`."""
         return self.world.outside(width, height, reach)
 
     def close(self) -> None:

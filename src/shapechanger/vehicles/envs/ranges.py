@@ -1,4 +1,4 @@
-"""The driving task on distances instead of pictures, without emulating the robot."""
+"""The driving task on distances instead of images, without emulating the robot."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class RangesEnv(DriveEnv):
 
     The task, the vehicle and the courses of `shapechanger/Car-v1`, on the true state of the world:
     a teacher that sees what no camera shows learns here in two minutes, and a student that sees
-    pictures learns from it (`shapechanger train Car --teacher ...`). The robot is not emulated, but
+    images learns from it (`shapechanger train Car --teacher ...`). The robot is not emulated, but
     the arithmetic of its guard is: a step takes a sixth of the time or less, the tank's a third.
 
     ## Action space
@@ -160,8 +160,8 @@ class RangesEnv(DriveEnv):
         randomise: Whether `reset` samples light, textures and the camera's pose too.
         put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
             reflex keeps it from going forward for 0.75 s.
-        camera: Whether `world.picture()` shows the pictures of the profile's camera.
-        render_mode: "rgb_array" for `render` to return the camera's picture.
+        camera: Whether `world.picture()` shows the images of the profile's camera.
+        render_mode: "rgb_array" for `render` to return the camera's image.
 
     Raises:
         UnknownName: If there is no such vehicle, world, profile or weight.

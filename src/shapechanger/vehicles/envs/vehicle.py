@@ -233,7 +233,7 @@ class WaypointEnv(WaypointView, DriveEnv):
 
     Networks that predict steering learn the body with it: full left is another circle in each
     vehicle. A waypoint means the same in all of them, so a policy that learned in one vehicle
-    drives another one as it is: pictures are warped to one
+    drives another one as it is: images are warped to one
     virtual camera (`shapechanger.vehicles.cameras.rectify`), and the action is a waypoint, which
     the vehicle turns into steering by its own `SteeringResponse`, measured when the env is made.
 
@@ -256,11 +256,11 @@ class WaypointEnv(WaypointView, DriveEnv):
         sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
             of the true ones; its physics takes shorter steps, too.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
-        randomise: Whether `reset` samples light, textures and the camera's pose too. Pictures are
+        randomise: Whether `reset` samples light, textures and the camera's pose too. Images are
             warped as if the camera were in its place, so a policy sees the error of the pose.
         put_back: Whether to put the vehicle back on the lane after a collision. A collision then
             does not end the episode.
-        render_mode: "rgb_array" for `render` to return the camera's picture as it is.
+        render_mode: "rgb_array" for `render` to return the camera's image as it is.
 
     Attributes:
         parts: The parts that the robot's outputs move.
