@@ -27,7 +27,7 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.files import read_json
 from shapechanger.finger.env import SMOOTHNESS
 from shapechanger.finger.parameters import FingerParameters
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.reports.numbers import share_text
 from shapechanger.transfer.executor import Processes

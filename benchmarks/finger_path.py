@@ -17,7 +17,7 @@ from shapechanger.finger.identify.motion import Window
 from shapechanger.finger.identify.result import replay
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.plant import CONTROL_DT
-from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 
 _SECONDS = 10.0

@@ -85,7 +85,7 @@ _SMALL = (32, 24)
 _SEEING: dict[str, MakeEnv] = {
     **{env_id: partial(gym.make, env_id, size=_SMALL) for env_id in VEHICLE_ENVS},
     **{env_id: partial(gym.make, env_id, courses=(0, 1)) for env_id in WAYPOINT_ENVS},
-    "picture and state": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, state=True),
+    "image and state": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, state=True),
     "random light": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, randomise=True),
 }
 # They differ from the car by body and world, which the exam without images covers.

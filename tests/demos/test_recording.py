@@ -287,7 +287,7 @@ def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
 
 def test_unsuitable_envs_are_refused(tmp_path: Path) -> None:
     """Invalid observations, missing layouts and invalid quality raise errors."""
-    with pytest.raises(DemosError, match="it must be a picture"):
+    with pytest.raises(DemosError, match="it must be an image"):
         RecordEpisodes(gym.make("FrozenLake-v1"), tmp_path)
     with pytest.raises(DemosError, match="CartPole-v1 has no observation_layout"):
         RecordEpisodes(gym.make("CartPole-v1"), tmp_path)

@@ -90,7 +90,7 @@ def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Pat
 
 def test_ppo_refuses_a_clone(clone_file: Path) -> None:
     with pytest.raises(
-        StudyError, match=r"dry\.safetensors is a clone, and tiny does not learn from pict"
+        StudyError, match=r"dry\.safetensors is a clone, and tiny does not learn from imag"
     ):
         tiny_plan(source_policy=clone_file)
 
@@ -107,7 +107,7 @@ def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
     settings = msgspec.structs.replace(
         QUICK_CLONING, clone=msgspec.structs.replace(QUICK_CLONING.clone, framing=framing)
     )
-    with pytest.raises(StudyError, match=r"takes pictures of 12 x 20 .* and cloning 10 x 20"):
+    with pytest.raises(StudyError, match=r"takes images of 12 x 20 .* and cloning 10 x 20"):
         _plan(clone_file, settings=settings)
 
 

@@ -149,7 +149,7 @@ def _observes(policy: CameraPolicy) -> str:
     card = policy.card
     parts: list[str] = []
     if card.eyes != "none":
-        parts.append(f"pictures of {card.framing.width} x {card.framing.height}, by {card.eyes}")
+        parts.append(f"images of {card.framing.width} x {card.framing.height}, by {card.eyes}")
     if card.state_layout is not None:
         parts.append(", ".join(n for n in card.state_layout.names if n not in card.unseen))
     return "; ".join(parts)

@@ -173,7 +173,7 @@ def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Itera
                     decoded = newest
                 part.pictures.append(pixels)
         if len(part.pictures) not in {0, len(part.steps)}:
-            raise DemosError(f"Only some steps of {name} have pictures.")
+            raise DemosError(f"Only some steps of {name} have images.")
         yield part
 
 
@@ -200,7 +200,7 @@ def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDAr
     if part.header.image_size not in {None, size}:
         wide, high = part.header.image_size or size
         raise DemosError(
-            f"{where} has {size[0]} x {size[1]} pixels, but the other pictures {wide} x {high}."
+            f"{where} has {size[0]} x {size[1]} pixels, but the other images {wide} x {high}."
         )
     return pixels if shrink is None else shrink(pixels, part.header)
 

@@ -45,7 +45,7 @@ def decode_picture(jpeg: bytes, name: str, *, grey: bool = False) -> NDArray[np.
         # Strict by default: a truncated image is an error, not filled up with grey.
         pixels = _simplejpeg().decode_jpeg(jpeg, colorspace="GRAY" if grey else "RGB")
     except ValueError as error:
-        raise DemosError(f"The picture {name} is damaged ({error}): {_REMEDY}.") from error
+        raise DemosError(f"The image {name} is damaged ({error}): {_REMEDY}.") from error
     return pixels[..., 0] if grey else pixels
 
 
@@ -73,13 +73,13 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
     """
     if jpeg.count(_SCAN) > _MAX_SCANS:
         raise DemosError(
-            f"The picture {name} has more than {_MAX_SCANS} scans, each of which takes the time of "
+            f"The image {name} has more than {_MAX_SCANS} scans, each of which takes the time of "
             f"a picture: {_REMEDY}."
         )
     height, width, _ = _header(jpeg, name)
     if height * width > MAX_PIXELS:
         raise DemosError(
-            f"The picture {name} claims {width} x {height} pixels, more than the limit of "
+            f"The image {name} claims {width} x {height} pixels, more than the limit of "
             f"{MAX_PIXELS}: {_REMEDY}."
         )
     return width, height

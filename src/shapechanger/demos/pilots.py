@@ -126,7 +126,7 @@ def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
     encoder = ObservationEncoder(env, QUALITY)
     needs = {"image": clone.card.eyes != "none", "state": clone.card.state_layout is not None}
     if needs["image"] and not encoder.has_picture:
-        raise DemosError(f"{path} drives by pictures, and {_name_of(env)} shows none.")
+        raise DemosError(f"{path} drives by images, and {_name_of(env)} shows none.")
     clone.card.require_layouts(encoder.action_layout, encoder.state_layout)
     is_dict = isinstance(env.observation_space, gym.spaces.Dict)
 

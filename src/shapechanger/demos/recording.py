@@ -83,8 +83,8 @@ class ObservationEncoder:
             or (state is not None and not _is_row(state))
         ):
             raise DemosError(
-                f"{name} has the observation space {space}, which cannot be recorded: it must be a "
-                "picture (uint8, height x width x 3), a vector, or a Dict of both as `image` and "
+                f"{name} has the observation space {space}, which cannot be recorded: it must be "
+                "an image (uint8, height x width x 3), a vector, or a Dict of both as `image` and "
                 "`state`."
             )
         self.has_picture, self._has_state = picture is not None, state is not None

@@ -92,7 +92,7 @@ class _Apart:
         jpeg = episode.jpeg(step)
         if jpeg is None or seen.jpeg is None:
             return
-        old, new = decode_picture(jpeg, step.frame), decode_picture(seen.jpeg, "the env's picture")
+        old, new = decode_picture(jpeg, step.frame), decode_picture(seen.jpeg, "the env's image")
         if old.shape == new.shape:
             self._pictures.append(float(np.abs(old.astype(float) - new).mean()))
 
@@ -105,10 +105,10 @@ class _Apart:
         """Describe the differences, one per line."""
         lines: list[str] = []
         if self._pictures and not any(self._pictures):
-            lines.append("the pictures are the same in every step")
+            lines.append("the images are the same in every step")
         elif self._pictures:
             lines.append(
-                f"pictures differ by {np.mean(self._pictures):.1f} of 255 on average, "
+                f"images differ by {np.mean(self._pictures):.1f} of 255 on average, "
                 f"{self._pictures[-1]:.1f} at the end"
             )
         if layout is not None and self._states:
@@ -150,6 +150,6 @@ def write_episode_film(episode: Episode, path: Path) -> str:
             frames.append(frame)
     write_film(frames, path, episode.header.control_hz)
     left = len(episode.kept) - len(frames)
-    rest = f"; {left} pictures of another size are left out" if left else ""
+    rest = f"; {left} images of another size are left out" if left else ""
     seconds = len(frames) / episode.header.control_hz
     return f"wrote {path}: {len(frames)} steps, {seconds:.1f} s{rest}"

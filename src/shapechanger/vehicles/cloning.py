@@ -245,7 +245,7 @@ class CloneLearner(Learner[CloningSettings]):
             missing.append("no demonstrator")
         if missing:
             raise StudyError(
-                f"{env} has {' and '.join(missing)}, and {self.name} learns from the pictures of "
+                f"{env} has {' and '.join(missing)}, and {self.name} learns from the images of "
                 "a demonstrator: give a --learner that begins with ppo."
             )
 
@@ -326,10 +326,10 @@ class CloneLearner(Learner[CloningSettings]):
         wanted = self.settings.clone.framing
         if card.framing != wanted:
             raise StudyError(
-                f"{path} takes pictures of {card.framing.height} x {card.framing.width} pixels "
+                f"{path} takes images of {card.framing.height} x {card.framing.width} pixels "
                 f"from {card.framing.top:g} of their height on, and {self.name} "
                 f"{wanted.height} x {wanted.width} from {wanted.top:g}: give a clone that takes "
-                "the same pictures."
+                "the same images."
             )
         try:
             data = msgspec.convert(card.data, _CardData)

@@ -270,7 +270,7 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
             missing = " and ".join(name for name, value in unknown if value is None)
             raise error(
                 f"{robot}: [camera] does not state {missing}, which waypoints need: `shapechanger "
-                "robot camera` measures them from one picture of a checkerboard, and writes a "
+                "robot camera` measures them from one image of a checkerboard, and writes a "
                 "profile to use."
             )
         if missing := " and ".join(name for name in sensors if name not in slices):
@@ -418,7 +418,7 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
             f"actions {', '.join(names)}."
         )
     if data.pictures is None:
-        raise DemosError("These demonstrations have no pictures, and waypoints are seen in them.")
+        raise DemosError("These demonstrations have no images, and waypoints are seen in them.")
     source = "as given"
     if response is None:
         response, source = _fitted(data), "fitted to the recorded motion"
@@ -433,7 +433,7 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
         f"{response.per_second:.2f} for each second at full steering, {source}.",
         f"{np.mean(~kept):.1%} of the steps are left out: it stands still, drives backward, or did "
         "not measure its speed.",
-        f"{np.mean(outside):.1%} of the waypoints are outside the picture, which ends "
+        f"{np.mean(outside):.1%} of the waypoints are outside the image, which ends "
         f"{math.degrees(HALF_WIDTH_RAD):.0f} degrees to each side; "
         f"{np.mean(labels.at_limit[kept]):.1%} are at the limit of the steering, so that the way "
         "may be farther aside.",

@@ -103,5 +103,5 @@ def test_a_policy_with_other_inputs_is_refused(tmp_path: Path) -> None:
         pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.safetensors"), "", 0)
     from shapechanger.vehicles.envs.demonstrators import CLONES
 
-    with pytest.raises(DemosError, match="drives by pictures"):
+    with pytest.raises(DemosError, match="drives by images"):
         pilot_of(CorridorEnv("state"), str(CLONES["car"]), "", 0)

@@ -16,8 +16,7 @@ from tests.demos.exchange.small import drive, keys_folder, tub_folder
 def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Import(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
     assert capsys.readouterr().out == (
-        f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 pictures\n"
-        f"wrote {tmp_path / 'data'}\n"
+        f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 images\nwrote {tmp_path / 'data'}\n"
     )
 
 
@@ -37,18 +36,16 @@ def test_a_partial_import_has_an_exit_code_of_its_own(
         main([*command, "--strict"])
     assert ended.value.code == 2
     sentence = capsys.readouterr().err
-    assert (
-        "is not whole (left out: 4 records with an empty picture: 3, 5, 8, and 1 more)" in sentence
-    )
+    assert "is not whole (left out: 4 records with an empty image: 3, 5, 8, and 1 more)" in sentence
     assert not (tmp_path / "data").exists()
     with pytest.raises(SystemExit) as ended:
         main(command)
     assert ended.value.code == 3
     output = capsys.readouterr()
-    assert "1 episode, 26 steps, 26 pictures" in output.out
+    assert "1 episode, 26 steps, 26 images" in output.out
     assert "note: Columns that are not imported: lap (float).\n" in output.out
     assert "which is taken to be 20 Hz; --hz states another rate.\n" in output.out
-    assert output.err == "left out 4 records with an empty picture: 3, 5, 8, and 1 more\n"
+    assert output.err == "left out 4 records with an empty image: 3, 5, 8, and 1 more\n"
     with pytest.raises(SystemExit) as ended:
         main(["demos", "import", str(tub), "--out", str(tmp_path / "b"), "--hz", "10"])
     assert ended.value.code == 3
@@ -85,6 +82,6 @@ def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "4 steps of 1 episode\nleft out 1 dropped steps\n" in output
     assert f"LeRobotDataset('set', root='{tmp_path / 'set'}')" in output
     Import(tmp_path / "set", tmp_path / "back", camera="camera").run()
-    assert "(lerobot): 1 episode, 4 steps, 4 pictures" in capsys.readouterr().out
+    assert "(lerobot): 1 episode, 4 steps, 4 images" in capsys.readouterr().out
     Export(tmp_path / "data", tmp_path / "logs", "mcap").run()
     assert "left out 1 dropped steps; --dropped includes them" in capsys.readouterr().out

@@ -122,19 +122,19 @@ EPISODES: dict[str, Callable[[Path], object]] = {
     "steps that are a pipe": lambda e: pipe(e / "steps.jsonl"),
     "steps that are a device": lambda e: link(e / "steps.jsonl", "/dev/zero"),
     "a header that is a device": lambda e: link(e / "episode.json", "/dev/zero"),
-    "a picture that is a device": lambda e: (
+    "an image that is a device": lambda e: (
         steps_with(frame=["000009.jpg", 0, "0"])(e),
         link(e / "frames/000009.jpg", "/dev/zero"),
     ),
-    "a picture that is a pipe": lambda e: (
+    "an image that is a pipe": lambda e: (
         steps_with(frame=["000001.jpg", 0, "0"])(e),
         pipe(e / "frames/000001.jpg"),
     ),
-    "a picture of 8 GiB": lambda e: (
+    "an image of 8 GiB": lambda e: (
         steps_with(frame=["000001.jpg", 8 * GIB, "0"])(e),
         sparse(e / "frames/000001.jpg", 8 * GIB),
     ),
-    "a picture elsewhere": steps_with(frame=["../../../secret.jpg", 6, "0"]),
+    "an image elsewhere": steps_with(frame=["../../../secret.jpg", 6, "0"]),
     "a header nested deeply": lambda e: (e / "episode.json").write_bytes(b"[" * 100_000),
     "a step nested deeply": added(nested()),
     "a step that is cut off": lambda e: (e / "steps.jsonl").write_bytes(
@@ -283,17 +283,17 @@ TUBS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: edit(f / "manifest.json", "catalog_0.catalog", "../secret"),
         "leaves the folder",
     ),
-    "a picture twice": (
+    "an image twice": (
         lambda f: edit(f / "catalog_0.catalog", "1_cam", "0_cam"),
         "of another record",
     ),
-    "a picture elsewhere": (
+    "an image elsewhere": (
         lambda f: edit(f / "catalog_0.catalog", "1_cam", "../../1_cam"),
         "leaves the folder",
     ),
-    "a picture of 60000 x 60000 pixels": (
+    "an image of 60000 x 60000 pixels": (
         lambda f: (f / "images/1_cam_image_array_.jpg").write_bytes(huge()),
-        "1 record with a damaged picture",
+        "1 record with a damaged image",
     ),
     "a catalog of 8 GiB": (lambda f: sparse(f / "catalog_0.catalog", 8 * GIB), "the limit"),
     "a catalog that is a pipe": (lambda f: pipe(f / "catalog_0.catalog"), "is missing"),
@@ -327,7 +327,7 @@ def test_a_csv_that_returns_to_a_picture_is_refused(tmp_path: Path, jail: Jail) 
     export_recording(tmp_path / "data", tmp_path / "csv", "csv")
     edit(tmp_path / "csv/steps.csv", "000002.jpg", "000000.jpg")
     text = refuse(jail("import", tmp_path / "csv", "--out", tmp_path / "out", "--strict"))
-    assert "returns to the picture" in text
+    assert "returns to the image" in text
 
 
 ROWS = "data/chunk-000/file-000.parquet"
@@ -371,11 +371,11 @@ LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
         column(PLACES, "tasks", lambda n: [["x" * (8 << 20)]] * n),
         "a text of more than 4096 characters",
     ),
-    "a picture of 128 MiB": (
+    "an image of 128 MiB": (
         column(ROWS, CAMERA, lambda n: [{"bytes": bytes((n == 0) << 27)} for n in range(n)]),
         "bytes, but claims",
     ),
-    "two pictures of 15 MiB in all rows": (column(ROWS, CAMERA, two_pictures), "unpacks to more"),
+    "two images of 15 MiB in all rows": (column(ROWS, CAMERA, two_pictures), "unpacks to more"),
     "a million rows": (many_rows, "bytes, but claims"),
     "an episode twice": (
         column(PLACES, "episode_index", lambda n: [0] * n),

@@ -38,7 +38,7 @@ def test_an_experts_recording_replays_identically(
     printed = output_of(capsys, "replay", first.path, "--env", "Car")
     assert "played 40 of 40 steps" in printed
     assert "the state is the same in every step" in printed
-    assert "the pictures are the same in every step" in printed
+    assert "the images are the same in every step" in printed
     printed = output_of(capsys, "replay", first.path, "--env", "Tank")
     assert "when recorded" in printed
 

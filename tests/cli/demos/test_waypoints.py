@@ -101,7 +101,7 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     assert "turns 1.90 rad for each metre and 0.00 for each second" in printed
     assert "fitted to the recorded motion" in printed
     assert "16.7% of the steps are left out: it stands still" in printed
-    assert "outside the picture, which ends 31 degrees to each side" in printed
+    assert "outside the image, which ends 31 degrees to each side" in printed
 
 
 def test_a_policy_of_waypoints_is_evaluated_on_steering(
@@ -214,7 +214,7 @@ def test_recordings_without_pictures_are_refused(tmp_path: Path) -> None:
     with EpisodeWriter.create(tmp_path, header) as writer:
         writer.add(Step(action=(0.0, 0.5), driver="person"))
         writer.close()
-    with pytest.raises(DemosError, match="have no pictures"):
+    with pytest.raises(DemosError, match="have no images"):
         as_waypoints(_loaded(tmp_path))
 
 

@@ -101,7 +101,7 @@ def test_shipped_profiles_and_invalid_images_are_refused(
         (str(profile), ["--picture", "none.jpg"], "Cannot read none.jpg"),
         (str(profile), ["--picture", "noise.jpg"], "noise.jpg is a damaged JPEG"),
         (str(profile), ["--picture", "bomb.jpg"], "more than 16 million pixels"),
-        (str(profile), ["--picture", "sparse.jpg"], "sparse.jpg is larger than a picture"),
+        (str(profile), ["--picture", "sparse.jpg"], "sparse.jpg is larger than an image"),
         (str(profile), ["--picture", "pipe.jpg"], "pipe.jpg is not a file"),
         (str(profile), ["--picture", "/dev/zero"], "/dev/zero is not a file"),
     ):

@@ -157,10 +157,10 @@ _GOOD = demonstrations(4, 0)
 @pytest.mark.parametrize(
     ("pictures", "actions", "words"),
     [
-        (_GOOD.pictures[:0], _GOOD.actions[:0], "There is no picture to learn from."),
-        (_GOOD.pictures, _GOOD.actions[:3], "4 pictures and 3 actions"),
+        (_GOOD.pictures[:0], _GOOD.actions[:0], "There is no image to learn from."),
+        (_GOOD.pictures, _GOOD.actions[:3], "4 images and 3 actions"),
         (_GOOD.pictures, _GOOD.actions[:, :1], r"shape \(4, 1\)"),
-        (_GOOD.pictures[..., 0], _GOOD.actions, "Pictures must be uint8"),
+        (_GOOD.pictures[..., 0], _GOOD.actions, "Images must be uint8"),
         (_GOOD.pictures, np.full((4, 2), np.nan), r"action 0 is \[nan, nan\]"),
         (_GOOD.pictures, np.array([[0, 0], [0, 1], [0, 1.5], [3, 0]]), r"action 2 is \[0.0, 1.5\]"),
     ],
@@ -173,7 +173,7 @@ def test_invalid_demonstrations_are_refused(
 
 
 def test_episode_lengths_must_add_up() -> None:
-    with pytest.raises(CloningError, match="5 pictures in total, but there are 4 pictures"):
+    with pytest.raises(CloningError, match="5 images in total, but there are 4 images"):
         clone(_GOOD.pictures, _GOOD.actions, settings=_QUICK, seed=0, episodes=[2, 3])
 
 

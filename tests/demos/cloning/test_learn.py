@@ -87,7 +87,7 @@ def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
     _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
     assert training.mirrored == 0.0
     assert training.mirror_note == (
-        "No picture is mirrored, because the mirror image of joint_0/angle is unknown."
+        "No image is mirrored, because the mirror image of joint_0/angle is unknown."
     )
 
 
@@ -141,7 +141,7 @@ def test_invalid_data_are_refused() -> None:
     data = stripes(20, 0)
     with pytest.raises(CloningError, match="no step to learn from"):
         learn(data, np.zeros(20, np.bool_), settings=QUICK)
-    with pytest.raises(CloningError, match="no pictures"):
+    with pytest.raises(CloningError, match="no images"):
         learn(replace(data, pictures=None), settings=QUICK, inputs="picture")
     with pytest.raises(CloningError, match="no state"):
         learn(replace(data, states=None, state_layout=None), settings=QUICK, inputs="both")

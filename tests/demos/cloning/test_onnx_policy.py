@@ -69,7 +69,7 @@ def test_missing_inputs_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "policy.onnx"
     export_clone(_policy(**_CARDS["both, several"]), file)
     exported = OnnxClone(file)
-    with pytest.raises(CloningError, match="needs a picture"):
+    with pytest.raises(CloningError, match="needs an image"):
         exported.predict(None, np.zeros(3))
     with pytest.raises(CloningError, match=r"needs the state speed, distance, bump"):
         exported.predict(_PICTURE, np.zeros(2))

@@ -75,9 +75,9 @@ def test_predictions_hardly_depend_on_brightness() -> None:
 
 def test_other_sizes_are_accepted_and_missing_images_refused() -> None:
     assert _policy().predict(np.zeros((50, 50, 3), np.uint8)).shape == (2,)
-    with pytest.raises(CloningError, match="Pictures must be uint8"):
+    with pytest.raises(CloningError, match="Images must be uint8"):
         _policy().predict(np.zeros((50, 50), np.uint8))
-    with pytest.raises(CloningError, match="needs a picture, and none was given"):
+    with pytest.raises(CloningError, match="needs an image, and none was given"):
         _policy().predict(None, np.zeros(3))
 
 

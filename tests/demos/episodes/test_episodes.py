@@ -288,7 +288,7 @@ def test_an_invalid_step_is_refused(tmp_path: Path, change: dict[str, object], r
 
 def test_an_invalid_frame_is_refused(tmp_path: Path) -> None:
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        with pytest.raises(DemosError, match="its picture is not a JPEG"):
+        with pytest.raises(DemosError, match="its image is not a JPEG"):
             writer.add(step(0), b"GIF89a")
         with pytest.raises(DemosError, match="more than the limit of 16777216"):
             writer.add(step(0), b"\xff\xd8" + bytes(1 << 24))

@@ -79,8 +79,8 @@ def _pipe(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (lambda f: (f / "2.jpg").unlink(), "1 line with a picture that is missing: line 3"),
-        (_edit("2.jpg", lambda jpeg: huge()), "with a damaged picture: line 3"),
+        (lambda f: (f / "2.jpg").unlink(), "1 line with an image that is missing: line 3"),
+        (_edit("2.jpg", lambda jpeg: huge()), "with a damaged image: line 3"),
         (_edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
         (_table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "must be a number, got 'x'"),
         (
@@ -90,7 +90,7 @@ def _pipe(folder: Path) -> None:
         (_table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "line 3: 5 cells instead of 6"),
         (_table(b"0.0,0.0,0.0,1.0", b",,,"), "line 3: the action is empty"),
         (_table(b"\n2.jpg", b"\n../2.jpg"), "leaves the folder"),
-        (_table(b"\n3.jpg", b"\n1.jpg"), "returns to the picture '1.jpg'"),
+        (_table(b"\n3.jpg", b"\n1.jpg"), "returns to the image '1.jpg'"),
         (_table(b"070.2", b"9" * 30), "captured_ns must be a time"),
         (_table(b"1499144070.2", b"soon"), "captured_ns must be a time, got 'soon'"),
         (_link_away, "leaves the folder"),
@@ -249,7 +249,7 @@ def _spoilt(file: h5py.File) -> None:
         (_in_file(_leads_away), "in another file"),
         (_edit("data/main_data.hdf5", lambda b: b.replace(b"SNOD", b"XXXX")), "is damaged"),
         (_in_file(_short), "has 2 entries, but"),
-        (_in_file(_spoilt), "with a damaged picture"),
+        (_in_file(_spoilt), "with a damaged image"),
     ],
 )
 def test_a_damaged_minari_dataset(
@@ -349,7 +349,7 @@ def test_nothing_to_export(tmp_path: Path) -> None:
         export_recording(tmp_path / "data", tmp_path / "csv", "csv")
     bare = header(image_size=None, state_layout="")
     record(tmp_path / "bare", bare, [(Step(action=(0.0, 0.0), driver="person"), None)])
-    with pytest.raises(DemosError, match="neither pictures nor a state"):
+    with pytest.raises(DemosError, match="neither images nor a state"):
         export_recording(tmp_path / "bare", tmp_path / "out-v0", "minari")
     with pytest.raises(DemosError, match="cannot mark excluded steps"):
         export_recording(tmp_path / "bare", tmp_path / "out", "tub", dropped=True)

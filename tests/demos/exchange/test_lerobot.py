@@ -180,7 +180,7 @@ def first_without_picture(data: Path) -> None:
     ("make", "options", "message"),
     [
         (lambda data: drive(data, image_size=(41, 32)), {}, "41 x 32 pixels: export them with"),
-        (first_without_picture, {}, "no picture of step 0"),
+        (first_without_picture, {}, "no image of step 0"),
         (
             lambda data: (drive(data, 1), drive(data, 1, control_hz=10.0)),
             {},
@@ -322,8 +322,8 @@ def longer(folder: Path) -> None:
             "have 64 x 48 pixels, but meta/info.json says 64 x 32",
         ),
         (cut(DATA, 300), "not an intact Parquet file"),
-        (cut(VIDEO, 300), "whose video cannot be read: .*has no pictures"),
-        (playlist, "whose video cannot be read: .*has no pictures"),
+        (cut(VIDEO, 300), "whose video cannot be read: .*has no images"),
+        (playlist, "whose video cannot be read: .*has no images"),
         (outside, "leaves the folder"),
         (longer, r"length is not dataset_to_index - dataset_from_index: 0 \(13 and 12\)"),
         (lambda f: (f / VIDEO).unlink(), "There is no .*file-000.mp4"),

@@ -71,8 +71,8 @@ FADED = np.dstack([plain(5), np.full((SIZE, SIZE), 128, np.uint8)])
         (png(plain(5), "WEBP"), "not JPEG, PNG or BMP"),
         (png(FADED), "partly transparent"),
         (png(np.zeros((8, 16, 3), np.uint8)), "of 16 x 8 pixels, and not 32 x 32"),
-        pytest.param(png(plain(5))[:60], "a damaged picture", id="cut PNG"),
-        (picture(0, SIZE, SIZE)[:200], "a damaged picture"),
+        pytest.param(png(plain(5))[:60], "a damaged image", id="cut PNG"),
+        (picture(0, SIZE, SIZE)[:200], "a damaged image"),
         (picture(0, 16, 8), "of 16 x 8 pixels, and not 32 x 32"),
         (b"", "not in the table"),
         (None, "not in the table"),
@@ -146,7 +146,7 @@ def test_other_features_are_named(tmp_path: Path) -> None:
     assert sum(map(len, pairs)) == COUNT
     (line,) = context.left_out_lines()
     assert line == (
-        "3 features with pictures of an unknown kind or of depth: observation.images.depth "
+        "3 features with images of an unknown kind or of depth: observation.images.depth "
         "(uint16, 4 x 4 x 1), observation.points (float32, 480 x 640 x 3), observation.scan "
         "(depth16, 480 x 640)"
     )
@@ -171,7 +171,7 @@ def test_a_camera_of_depth_is_not_chosen(tmp_path: Path, flag: str) -> None:
     depth = {"dtype": "video", "shape": [SIZE, SIZE, 1], "names": AXES, "info": {flag: True}}
     folder = write_set(tmp_path / "set", features={"observation.images.depth": depth})
     _, context = pairs_of(folder)
-    assert "1 feature with pictures of an unknown kind or of depth" in context.left_out_lines()[0]
+    assert "1 feature with images of an unknown kind or of depth" in context.left_out_lines()[0]
     with pytest.raises(UnknownName, match="There are: front"):
         pairs_of(folder, "depth")
 

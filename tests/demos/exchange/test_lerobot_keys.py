@@ -129,7 +129,7 @@ def every(change: Any) -> Any:
         ({"options": ["-output_ts_offset", "0.5"]}, [], r"begins 0\.5 s later"),
         # Images after a lost one moved up, and nothing says which one is lost.
         ({"pictures": [*range(5), *range(6, 16)]}, [], r"ends 0\.05 s before its last step"),
-        ({"places": place(0, to_timestamp=0.35)}, [1], "fewer pictures than steps"),
+        ({"places": place(0, to_timestamp=0.35)}, [1], "fewer images than steps"),
         ({"places": place(1, from_timestamp=0.35)}, [], r"overlaps.*0 \(0\.05 s\), 1"),
         (
             {"places": place(1, from_timestamp=0.42, to_timestamp=0.82)},

@@ -159,6 +159,6 @@ def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
     header = all_of(tmp_path / "back")[0].header
     assert Layout.from_json(header.state_layout).names == ("near/0", "near/1")
     text = "\n".join(done.left_out)
-    assert "2 observations with pictures of an unknown kind or of depth: depth (Box(" in text
+    assert "2 observations with images of an unknown kind or of depth: depth (Box(" in text
     assert "1 observation of more than 131072 values: points" in text
     assert any("observation mission (Text" in note for note in done.notes)

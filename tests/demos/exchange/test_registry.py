@@ -81,7 +81,7 @@ def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str
         main(command)
     assert ended.value.code == 3
     output = capsys.readouterr()
-    assert "(speeds): 1 episode, 2 steps, 0 pictures" in output.out
+    assert "(speeds): 1 episode, 2 steps, 0 images" in output.out
     assert output.err == "left out 1 line that is not a number: fast\n"
     (episode,) = all_of(tmp_path / "data")
     assert [step.action for step in episode.steps] == [(0.5,), (1.5,)]

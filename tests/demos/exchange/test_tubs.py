@@ -108,20 +108,20 @@ def _lines(folder: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
 @pytest.mark.parametrize(
     ("spoil", "expected", "kept"),
     [
-        (lambda f: (f / "images/3_cam_image_array_.jpg").unlink(), "picture that is missing: 3", 9),
+        (lambda f: (f / "images/3_cam_image_array_.jpg").unlink(), "image that is missing: 3", 9),
         (
             lambda f: (f / "images/3_cam_image_array_.jpg").write_bytes(b""),
-            "an empty picture: 3",
+            "an empty image: 3",
             9,
         ),
         (
             lambda f: (f / "images/3_cam_image_array_.jpg").write_bytes(picture(0)[:-99]),
-            "1 record with a damaged picture: 3",
+            "1 record with a damaged image: 3",
             9,
         ),
         (
             lambda f: (f / "images/0_cam_image_array_.jpg").write_bytes(picture(0, 80, 32)),
-            "with a picture of 80 x 32 pixels, and not 40 x 32: 0",
+            "with an image of 80 x 32 pixels, and not 40 x 32: 0",
             9,
         ),
         (lambda f: _lines(f, lambda lines: [*lines, bytes(512)]), "line of NUL bytes, as", 10),
@@ -160,10 +160,10 @@ def test_the_rest_of_a_damaged_tub_is_imported(
         ({"user/angle": 1.5}, "with user/angle or user/throttle that is not a number from -1 to 1"),
         ({"user/throttle": None}, "without user/throttle"),
         ({"user/mode": "local"}, "without pilot/angle and pilot/throttle, although a pilot drove"),
-        ({"cam/image_array": None}, "without a picture"),
-        ({"cam/image_array": "../1.jpg"}, "with a picture name that leaves the folder"),
-        ({"cam/image_array": "a\0b.jpg"}, "with a picture name that leaves the folder"),
-        ({"cam/image_array": "gone.jpg"}, "with a picture that is missing"),
+        ({"cam/image_array": None}, "without an image"),
+        ({"cam/image_array": "../1.jpg"}, "with an image name that leaves the folder"),
+        ({"cam/image_array": "a\0b.jpg"}, "with an image name that leaves the folder"),
+        ({"cam/image_array": "gone.jpg"}, "with an image that is missing"),
     ],
 )
 def test_records_that_are_not_whole(tmp_path: Path, change: dict[str, Any], expected: str) -> None:
@@ -182,7 +182,7 @@ def test_records_that_share_a_picture(tmp_path: Path) -> None:
     made[3]["cam/image_array"] = "1_cam_image_array_.jpg"
     episodes, done = imported(tub_folder(tmp_path / "tub", made))
     assert episodes == [[0, 2]]
-    assert done.left_out == ("2 records with the picture of another record: 1, 3",)
+    assert done.left_out == ("2 records with the image of another record: 1, 3",)
 
 
 def test_catalogs_in_another_order(tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
         (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
     _, done = imported(folder)
     assert done.warnings == (
-        "6 records with the picture of another number, up to 2 off (0, 1, 2, and 3 more): look "
+        "6 records with the image of another number, up to 2 off (0, 1, 2, and 3 more): look "
         "whether they belong together.",
     )
 
@@ -368,7 +368,7 @@ def test_pictures_of_other_formats(tmp_path: Path, form: str, mode: str) -> None
         (folder / "images" / record["cam/image_array"]).write_bytes(_image(mode, form))
     _, done = imported(folder)
     assert done.pictures == 3
-    assert done.notes == ("3 pictures encoded as JPEG of quality 100.",)
+    assert done.notes == ("3 images encoded as JPEG of quality 100.",)
 
 
 def test_cameras_of_other_names(tmp_path: Path) -> None:
@@ -380,7 +380,7 @@ def test_cameras_of_other_names(tmp_path: Path) -> None:
         (folder / f"images/{n}_left.jpg").write_bytes(picture(n))
         (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
     _, done = imported(folder)
-    assert (done.pictures, done.notes) == (3, ("The pictures come from the column cam/left.",))
+    assert (done.pictures, done.notes) == (3, ("The images come from the column cam/left.",))
     both = [r | {"cam/right": f"{r['_index']}_right.jpg"} for r in made]
     two = tub_folder(
         tmp_path / "two", both, inputs={"cam/left": "image_array", "cam/right": "jpeg"}

@@ -68,7 +68,7 @@ async def drive(robot: Running, client: Client, first: int, count: int) -> list[
     seen: list[Observation] = []
     for seq in range(first, first + count):
         robot.show()
-        await until(lambda: robot.daemon._hub.frame is not None, "there is a picture")
+        await until(lambda: robot.daemon._hub.frame is not None, "there is an image")
         answered = await client.observe()
         seen.append(answered)
         await client.send(

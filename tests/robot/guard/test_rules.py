@@ -276,7 +276,7 @@ def test_an_output_that_fails_stops_everything_without_hold() -> None:
 def test_a_stale_frame_stops_the_robot() -> None:
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     rules.offer(command(1, _T0), _T0)
-    assert rules.tick(_T0).stop_reason == "Blind: no picture yet."
+    assert rules.tick(_T0).stop_reason == "Blind: no image yet."
     rules.offer(command(2, _T0, frame_ns=_T0 + 51 * MS), _T0)
     assert rules.tick(_T0).seq is None  # A frame from the future is ignored.
     rules.offer(command(3, _T0, frame_ns=_T0 - 40 * MS), _T0)
@@ -284,7 +284,7 @@ def test_a_stale_frame_stops_the_robot() -> None:
     end = _T0 + 60 * MS
     assert rules.next_wake_ns(end - 1) == end
     assert rules.tick(end - 1).seq == 4
-    assert rules.tick(end).stop_reason == "Blind: no picture for 100 ms."
+    assert rules.tick(end).stop_reason == "Blind: no image for 100 ms."
     rules.offer(command(5, end, frame_ns=end), end)
     assert rules.tick(end).seq == 5
 

@@ -18,4 +18,4 @@ def study() -> Study:
 @pytest.fixture(scope="session")
 def page(study: Study) -> str:
     """The report of the study."""
-    return study_html(study, picture_note="No picture can be drawn here.")
+    return study_html(study, picture_note="No image can be drawn here.")

@@ -203,7 +203,7 @@ def test_pictures_are_embedded(study: Study) -> None:
 
 
 def test_without_pictures_a_note_is_shown(page: str, study: Study) -> None:
-    assert "No picture can be drawn here." in Reader(page).words
+    assert "No image can be drawn here." in Reader(page).words
     assert "There are no pictures." in Reader(study_html(study)).words
 
 

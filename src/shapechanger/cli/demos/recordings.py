@@ -284,7 +284,7 @@ def _told(done: Repair) -> str:
         if len(done.lost) > 1:
             parts[-1] += f", and so on ({len(done.lost) - 1} more)"
     if done.pictures:
-        parts.append(f"moved {counted(done.pictures, 'picture')} of no step aside")
+        parts.append(f"moved {counted(done.pictures, 'image')} of no step aside")
     if not done.was_closed:
         parts.append("closed it")
     return ", ".join(parts)
@@ -327,7 +327,7 @@ class Import:
         )
         say(
             f"read {self.source} ({done.format}): {counted(done.episodes, 'episode')}, "
-            f"{counted(done.steps, 'step')}, {counted(done.pictures, 'picture')}\nwrote {self.out}"
+            f"{counted(done.steps, 'step')}, {counted(done.pictures, 'image')}\nwrote {self.out}"
         )
         for note in done.notes:
             say(f"note: {note}")

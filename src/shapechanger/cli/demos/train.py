@@ -144,7 +144,7 @@ class TrainClone:
                 raise DemosError("--camera and --response belong to --waypoints: give it, too.")
             return None
         if self.head == "class" or self.inputs in {"state", "both"}:
-            raise DemosError("Waypoints are numbers, seen in pictures: leave out --head, --inputs.")
+            raise DemosError("Waypoints are numbers, seen in images: leave out --head, --inputs.")
         return _view(self.camera)
 
     def _require_files(self) -> None:

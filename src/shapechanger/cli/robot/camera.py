@@ -143,9 +143,9 @@ def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
     except OSError as error:
         raise RobotError(f"Cannot read {path}: {error.strerror or error}.") from error
     if len(jpeg) > _MOST_BYTES:
-        raise RobotError(f"{path} is larger than a picture can be, {_MOST_BYTES >> 20} MiB.")
+        raise RobotError(f"{path} is larger than an image can be, {_MOST_BYTES >> 20} MiB.")
     if not jpeg.startswith(_JPEG):
-        raise RobotError(f"{path} is not a JPEG: save the picture as one, such as picture.jpg.")
+        raise RobotError(f"{path} is not a JPEG: save the image as one, such as picture.jpg.")
     return _decoded(jpeg, f"{path} is")
 
 
@@ -156,7 +156,7 @@ def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
     except DemosError as error:
         raise RobotError(
             f"{subject} a damaged JPEG, or one of more than {MAX_PIXELS >> 20} million pixels: "
-            "take or save the picture again."
+            "take or save the image again."
         ) from error
 
 

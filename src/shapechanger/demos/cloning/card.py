@@ -87,7 +87,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         if bool(self.nerves) != (self.state_layout is not None):
             raise CloningError("nerves and state_layout must be given together.")
         if self.eyes == "none" and not self.nerves:
-            raise CloningError("A policy needs pictures, a state, or both.")
+            raise CloningError("A policy needs images, a state, or both.")
         if (self.head == "class") != bool(self.classes):
             raise CloningError("The head class, and no other, needs classes.")
         if any(len(action) != self.action_size for action in self.classes):
@@ -155,7 +155,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         if self.eyes == "none":
             pictures = None
         elif pictures is None:
-            raise CloningError("This policy needs a picture, and none was given.")
+            raise CloningError("This policy needs an image, and none was given.")
         seen = None if pictures is None else prepare(pictures, self.framing)
         layout = self.state_layout
         if layout is None:

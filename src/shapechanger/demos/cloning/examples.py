@@ -132,11 +132,11 @@ def steering_examples(
         )
     if len(pictures) != len(actions):
         raise CloningError(
-            f"Each picture needs an action: there are {len(pictures)} pictures and "
+            f"Each image needs an action: there are {len(pictures)} images and "
             f"{len(actions)} actions."
         )
     if not len(actions):
-        raise CloningError("There is no picture to learn from.")
+        raise CloningError("There is no image to learn from.")
     wrong = ~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1)  # Also finds NaN.
     if wrong.any():
         first = int(wrong.argmax())
@@ -165,7 +165,7 @@ def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]
     lengths = list(episodes) or [n]
     if min(lengths) < 0 or sum(lengths) != n:
         raise CloningError(
-            f"The episodes have {sum(lengths)} pictures in total, but there are {n} pictures."
+            f"The episodes have {sum(lengths)} images in total, but there are {n} images."
         )
     mask = np.zeros(n, np.bool_)
     end = 0

@@ -273,7 +273,7 @@ def _inputs_of(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
         inputs = "picture" if data.pictures is not None else "state"
     with_pictures, with_states = inputs in {"picture", "both"}, inputs in {"state", "both"}
     if with_pictures and data.pictures is None:
-        raise CloningError("These demonstrations have no pictures to learn from.")
+        raise CloningError("These demonstrations have no images to learn from.")
     if with_states and (data.states is None or not data.states.shape[1]):
         raise CloningError("These demonstrations have no state to learn from.")
     return with_pictures, with_states
@@ -288,11 +288,11 @@ def _mirrors(
         layout = data.state_layout
         of_states = mirror_of(layout) if with_states and layout is not None else None
     except CloningError as reason:
-        return None, None, 0.0, f"No picture is mirrored, because {reason}."
+        return None, None, 0.0, f"No image is mirrored, because {reason}."
     balance = mirror.balance(actions)
     share = 0.5 * balance
     note = (
-        f"{share:.1%} of the pictures are mirrored, because the driver steered to one side "
+        f"{share:.1%} of the images are mirrored, because the driver steered to one side "
         f"{balance:.1%} as much as to the other: the mirror image of a one-sided drive would teach "
         "the wrong side."
     )

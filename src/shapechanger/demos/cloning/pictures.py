@@ -75,13 +75,13 @@ def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
     """
     if pictures.ndim != 4 or pictures.shape[3] != CHANNELS or pictures.dtype != np.uint8:
         raise CloningError(
-            "Pictures must be uint8 with shape (n, height, width, 3), got "
+            "Images must be uint8 with shape (n, height, width, 3), got "
             f"{pictures.dtype} with shape {pictures.shape}."
         )
     if pictures.shape[1:] == framing.shape:
         return pictures
     if not pictures.shape[1] or not pictures.shape[2]:
-        raise CloningError(f"Pictures of shape {pictures.shape} have no pixels.")
+        raise CloningError(f"Images of shape {pictures.shape} have no pixels.")
     # At least one row is left.
     first = min(round(pictures.shape[1] * framing.top), pictures.shape[1] - 1)
     rows, rest_of_rows = divmod(pictures.shape[1] - first, framing.height)

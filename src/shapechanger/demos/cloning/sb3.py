@@ -220,7 +220,7 @@ class _Spaces(gym.Env[Any, Any]):
         parts: dict[str, gym.Space[Any]] = {}
         if card.eyes != "none":
             if size is None:
-                raise PolicyError("The size of the pictures is needed for this policy.")
+                raise PolicyError("The size of the images is needed for this policy.")
             parts[_IMAGE] = spaces.Box(0, 255, (*size, 3), np.uint8)
         if card.nerves:
             parts[_STATE] = spaces.Box(-np.inf, np.inf, (card.state_size,), np.float32)

@@ -95,21 +95,21 @@ def _wrong_with(frames: Path, picture: StepPicture, *, thorough: bool) -> str:
     """Return what is wrong with the image of a step, as part of a sentence; "" for nothing."""
     name, size = picture.name, picture.size
     if not _FRAME_NAME.fullmatch(name):
-        return f"its picture has the invalid name {name!r}"
+        return f"its image has the invalid name {name!r}"
     try:
         found = (frames / name).stat()
         if not stat.S_ISREG(found.st_mode):
-            return f"its picture {name} is not a regular file"
+            return f"its image {name} is not a regular file"
         if found.st_size > MAX_PICTURE_BYTES:
-            return f"its picture {name} has more than {MAX_PICTURE_BYTES} bytes"
+            return f"its image {name} has more than {MAX_PICTURE_BYTES} bytes"
         if found.st_size != size:
-            return f"its picture {name} has {found.st_size} bytes instead of {size}"
+            return f"its image {name} has {found.st_size} bytes instead of {size}"
         if thorough and not picture.fits(read_file(frames / name, MAX_PICTURE_BYTES)):
-            return f"its picture {name} was changed"
+            return f"its image {name} was changed"
     except FileNotFoundError:
-        return f"its picture {name} is missing"
+        return f"its image {name} is missing"
     except OSError as error:
-        return f"its picture {name} cannot be read ({error.strerror})"
+        return f"its image {name} cannot be read ({error.strerror})"
     return ""
 
 
@@ -197,9 +197,9 @@ class Episode:
         try:
             data = read_file(self.path / FRAMES / step.frame, MAX_PICTURE_BYTES)
         except OSError as error:
-            raise _broken(self.path, f"the picture {step.frame} cannot be read") from error
+            raise _broken(self.path, f"the image {step.frame} cannot be read") from error
         if not step.picture.fits(data):
-            raise _broken(self.path, f"the picture {step.frame} was changed")
+            raise _broken(self.path, f"the image {step.frame} was changed")
         return data
 
 

@@ -222,11 +222,9 @@ class EpisodeWriter:
         self._require_open()
         refusal = step.refusal(*self._sizes) or self._disorder(step)
         if jpeg is not None and len(jpeg) > MAX_PICTURE_BYTES:
-            refusal = (
-                f"its picture has {len(jpeg)} bytes, more than the limit of {MAX_PICTURE_BYTES}"
-            )
+            refusal = f"its image has {len(jpeg)} bytes, more than the limit of {MAX_PICTURE_BYTES}"
         elif jpeg is not None and not jpeg.startswith(_JPEG):
-            refusal = "its picture is not a JPEG"
+            refusal = "its image is not a JPEG"
         if refusal:
             raise DemosError(f"Step {self.steps} of {self.path} cannot be recorded: {refusal}.")
         if self.steps % _SPACE_CHECK_STEPS == 0:

@@ -171,7 +171,7 @@ def _own(folder: Path, path: Path, context: ImportContext) -> ExchangeEpisode:
         raise DemosError(f"{table.path} {what}: the columns must be those of {_HEADER}.")
     records = table.records(folder / _FRAMES)
     if header.image_size is None and any(record.frame for record in records):
-        raise DemosError(f"{table.path} has pictures, but {path} has no image_size.")
+        raise DemosError(f"{table.path} has images, but {path} has no image_size.")
     outcome = str(fields.get("outcome", ""))
     return episode_of(records, header, context, name=str(folder), what="line", outcome=outcome)
 
@@ -270,11 +270,11 @@ class _Table:
             if frame:
                 record.picture = frames / frame
             if frame and not is_inside(frames, frame):
-                record.fault = "with a picture name that leaves the folder"
+                record.fault = "with an image name that leaves the folder"
             elif frame != shown and frame in known:
-                record.fault = f"that returns to the picture {frame!r} of an earlier step"
+                record.fault = f"that returns to the image {frame!r} of an earlier step"
             elif not frame and shown:
-                record.fault = "without a picture"
+                record.fault = "without an image"
             else:
                 shown = frame
                 known.add(frame)

@@ -147,13 +147,13 @@ def decoded_steps(
                 jpeg, pixels = row.jpeg, decode_picture(row.jpeg, where)
                 if pixels.shape[1::-1] != size:
                     raise DemosError(
-                        "The picture {} has {} x {} pixels, and not {} x {} like the others: a {} "
+                        "The image {} has {} x {} pixels, and not {} x {} like the others: a {} "
                         "dataset has one size.".format(where, *pixels.shape[1::-1], *size, title)
                     )
             if not jpeg:
                 raise DemosError(
-                    f"There is no picture {where}, but {title} needs one at every step: drop the "
-                    "steps before the first picture, or export to csv."
+                    f"There is no image {where}, but {title} needs one at every step: drop the "
+                    "steps before the first image, or export to csv."
                 )
         yield row, jpeg, pixels
 

@@ -184,7 +184,7 @@ def with_pictures(
         if record.fault:
             context.leave_out(what, record.fault, record.name)
     if encoded:
-        context.note(f"{counted(encoded, 'picture')} encoded as JPEG of quality 100.")
+        context.note(f"{counted(encoded, 'image')} encoded as JPEG of quality 100.")
     return [record for record in records if not record.fault], common
 
 

@@ -105,7 +105,7 @@ class _Feature:
             channels, height, width = shape
         if channels not in _CHANNELS or not 0 < height * width <= MAX_PIXELS:
             raise DemosError(
-                f"{path}: {self.key} has the shape {list(self.shape)}, not of a picture."
+                f"{path}: {self.key} has the shape {list(self.shape)}, not of an image."
             )
         return width, height
 
@@ -177,7 +177,7 @@ def _chosen(features: Sequence[_Feature], context: ImportContext, path: Path) ->
         if feature.is_number or feature.is_picture or not image:
             context.note(f"The feature {about} is not imported.")
         else:
-            context.leave_out("feature", "with pictures of an unknown kind or of depth", about)
+            context.leave_out("feature", "with images of an unknown kind or of depth", about)
     return _Kept(numbers[_ACTION], tuple(states), camera, columns)
 
 
@@ -280,7 +280,7 @@ def _own_header(
     ours, theirs = ((one.action_size, one.state_size, one.image_size) for one in (header, found))
     if ours != theirs:
         raise DemosError(
-            f"{where} is of another dataset, with other actions, states or pictures: remove the "
+            f"{where} is of another dataset, with other actions, states or images: remove the "
             "file if the dataset was edited."
         )
     # The times come from the dataset.
@@ -330,9 +330,9 @@ def _records(
             record.picture = data = _bytes(row[stored])
             unpacked[first] = unpacked.get(first, 0) + (len(data) if data != read else 0)
             if unpacked[first] > most:  # One image can stand in any number of rows.
-                raise UnpacksToTooMuch(f"{first} unpacks to more than {most} bytes of pictures.")
+                raise UnpacksToTooMuch(f"{first} unpacks to more than {most} bytes of images.")
             read = data
-            record.fault = "" if data else "whose picture is not in the table"
+            record.fault = "" if data else "whose image is not in the table"
         yield record
 
 
@@ -352,7 +352,7 @@ def _in_order(located: Located, kept: _Kept, stored: str) -> Iterator[dict[str, 
                 yield row
                 due += 1
             if held > MAX_UNPACKED:  # Many rows may share one large value.
-                raise DemosError(f"{path} has pictures too far out of order: sort its rows.")
+                raise DemosError(f"{path} has images too far out of order: sort its rows.")
 
 
 def _bytes(value: Any) -> bytes:

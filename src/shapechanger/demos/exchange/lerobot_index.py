@@ -323,7 +323,7 @@ class Index:
             return f"whose video cannot be read: {str(error).removesuffix('.')}"
         if self._size is not None and times.size != self._size:
             sizes = "{} x {} pixels, but meta/info.json says {} x {}"
-            return f"whose pictures in {name} have {sizes.format(*times.size, *self._size)}"
+            return f"whose images in {name} have {sizes.format(*times.size, *self._size)}"
         places = sorted(self._filmed[path], key=self._span)
         period_s = self._period_s(times)
         for one, two in pairwise(places):
@@ -333,7 +333,7 @@ class Index:
         shown_s, end_s = float(times.seconds[0]), float(times.seconds[-1])
         early_s = self._span(places[0])[0] - shown_s
         late_s = end_s + period_s - max(self._span(place)[1] for place in places)
-        moved = "so that each step may have the picture of another one"
+        moved = "so that each step may have the image of another one"
         if early_s < -0.5 * period_s:
             return f"of {name}, which begins {-early_s:.4g} s later than {EPISODES} says, {moved}"
         for off_s, where in ((early_s, "begins earlier"), (late_s, "ends later")):
@@ -342,7 +342,7 @@ class Index:
                     f"{name} {where} than its episodes in {EPISODES}, by {off_s:.4g} s."
                 )
         if times.is_cut_off:
-            reason = "that is cut off, without the pictures after that"
+            reason = "that is cut off, without the images after that"
             self._context.leave_out("file", reason, name)
         elif late_s < -0.5 * period_s:
             steps_s = max(self._span(p)[0] + (p["length"] - 1) / self._rate_hz for p in places)
@@ -370,7 +370,7 @@ class Index:
             # If an image is lost, the ones after it moved up; which one is unknown.
             have_s = max(0.0, min(end_s, newest_s + period_s) - first_s)
             raise _Contradiction(
-                "with fewer pictures than steps",
+                "with fewer images than steps",
                 f"{have_s:.4g} s of video, and a last step at {at_s[-1] - first_s:.4g} s",
             )
         after = np.searchsorted(times.seconds, at_s).clip(max=len(times.ticks) - 1)
@@ -381,13 +381,13 @@ class Index:
         shown = off_s <= most_s
         if 2 * np.count_nonzero(shown) <= len(shown):
             raise _Contradiction(
-                "without a picture at the time of most steps",
+                "without an image at the time of most steps",
                 f"{np.count_nonzero(~shown)} of {len(shown)}, by up to {off_s.max():.3g} s",
             )
         for frame, by_s in zip(steps["frame"][~shown], off_s[~shown], strict=True):
             self._context.leave_out(
                 "step",
-                f"without a picture within {TOLERANCE_S * 1e3:g} ms",
+                f"without an image within {TOLERANCE_S * 1e3:g} ms",
                 f"{frame} of episode {number} ({by_s:.3g} s)",
             )
         return Located(number, steps[shown], located.paths, path, times)

@@ -241,7 +241,7 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
     pictured = {name: size for name, space in observed.items() if (size := picture_size_of(space))}
     if len(pictured) > 1:
         raise DemosError(
-            f"An observation in {main} has {len(pictured)} pictures ({', '.join(pictured)}), but "
+            f"An observation in {main} has {len(pictured)} images ({', '.join(pictured)}), but "
             "an episode has one camera: keep one of them in the dataset."
         )
     sensed = {
@@ -313,7 +313,7 @@ def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Sou
                     stored = at[parts.picture]
                     record.picture = bytes(stored) if parts.is_jpeg else pixels_of(stored, size)
                     if record.picture is None:
-                        record.fault = "whose picture does not fit its space"
+                        record.fault = "whose image does not fit its space"
                 if parts.infos:
                     _add_infos(record, at, reward)
                 yield record
@@ -416,7 +416,7 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
         "minari_version": version("minari"),
         "algorithm_name": ", ".join(sorted(drivers)),
         "description": (
-            "Episodes recorded by Shapechanger, and exported without a change: pictures are JPEG "
+            "Episodes recorded by Shapechanger, and exported without a change: images are JPEG "
             "as recorded, numbers have 64 bits, the last observation of an episode is there twice."
         ),
         "action_layout": plain["action_layout"],
@@ -457,7 +457,7 @@ def _space(
         return spaces.Dict({"image": picture, "state": state}), picture
     if picture is None and state is None:
         raise DemosError(
-            f"{name} has neither pictures nor a state, so it has no observations for Minari: "
+            f"{name} has neither images nor a state, so it has no observations for Minari: "
             "export it to csv."
         )
     return cast("spaces.Space[Any]", state if picture is None else picture), picture
@@ -502,8 +502,8 @@ def _write_episode(
             if is_grey(jpeg, where) != grey:
                 kind = "coloured" if grey else "grey"
                 raise DemosError(
-                    f"The picture {where} is {kind}, and the first one is not: a Minari dataset "
-                    "has pictures of one kind."
+                    f"The image {where} is {kind}, and the first one is not: a Minari dataset "
+                    "has images of one kind."
                 )
         for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
             _append(at, value)

@@ -74,7 +74,7 @@ def is_imported(name: str, space: spaces.Space[Any], context: ImportContext) -> 
     if not isinstance(space, numbers):
         context.note(f"The observation {about} is not imported.")
     elif deep and len(shape) in {2, 3} and min(shape[:2]) >= _MIN_PICTURE:
-        context.leave_out("observation", "with pictures of an unknown kind or of depth", about)
+        context.leave_out("observation", "with images of an unknown kind or of depth", about)
     elif math.prod(shape) > MAX_VALUES:
         context.leave_out("observation", f"of more than {MAX_VALUES} values", about)
     else:
@@ -116,7 +116,7 @@ def picture_size_of(space: spaces.Space[Any]) -> tuple[int, int] | None:
     height, width = shape[:2]
     if height * width > MAX_PIXELS:
         raise DemosError(
-            f"The pictures of the dataset have {width} x {height} pixels, more than the limit of "
+            f"The images of the dataset have {width} x {height} pixels, more than the limit of "
             f"{MAX_PIXELS}: make them smaller."
         )
     return (width, height) if min(height, width) >= _MIN_PICTURE else None

@@ -64,16 +64,16 @@ def load_jpeg(
     else:
         data = _read(picture) if isinstance(picture, Path) else picture or b""
         if not data.strip(b"\0"):
-            raise PictureError("with an empty picture")
+            raise PictureError("with an empty image")
         if len(data) > MAX_PICTURE_BYTES:
-            raise PictureError(f"with a picture of more than {MAX_PICTURE_BYTES} bytes")
+            raise PictureError(f"with an image of more than {MAX_PICTURE_BYTES} bytes")
         encoded = not data.startswith(_JPEG)
         try:
             pixels = _pixels(data) if encoded else decode_picture(data, "")
         except PictureError:
             raise
         except DemosError as error:
-            raise PictureError("with a damaged picture") from error
+            raise PictureError("with a damaged image") from error
         jpeg, found = encode_picture(pixels) if encoded else data, pixels.shape[1::-1]
     if size is not None and found != size:
         raise PictureError(other_size(found, size))
@@ -82,16 +82,16 @@ def load_jpeg(
 
 def other_size(found: Sequence[int], size: Sequence[int]) -> str:
     """Return the reason to leave out an image of another size, each in pixels."""
-    return "with a picture of {} x {} pixels, and not {} x {}".format(*found, *size)
+    return "with an image of {} x {} pixels, and not {} x {}".format(*found, *size)
 
 
 def _read(path: Path) -> bytes:
     try:
         return read_file(path, MAX_PICTURE_BYTES)
     except FileNotFoundError as error:
-        raise PictureError("with a picture that is missing") from error
+        raise PictureError("with an image that is missing") from error
     except OSError as error:
-        reason = f"with a picture that cannot be read ({error.strerror or error})"
+        reason = f"with an image that cannot be read ({error.strerror or error})"
         raise PictureError(reason) from error
 
 
@@ -99,24 +99,24 @@ def _pixels(data: bytes) -> NDArray[np.uint8]:
     """Decode a PNG or BMP of 8 bits, shape (height, width, 3)."""
     form = next((form for magic, form in _MAGIC.items() if data.startswith(magic)), "")
     if not form:
-        raise PictureError("with a picture that is not JPEG, PNG or BMP")
+        raise PictureError("with an image that is not JPEG, PNG or BMP")
     image = library("PIL.Image")
     try:
         with image.open(io.BytesIO(data), formats=[form]) as opened:
             if opened.width * opened.height > MAX_PIXELS:
-                raise PictureError(f"with a picture of more than {MAX_PIXELS} pixels")
+                raise PictureError(f"with an image of more than {MAX_PIXELS} pixels")
             if opened.mode.startswith(_DEEP) or (form == "PNG" and data[_PNG_DEPTH] == b"\x10"):
                 raise PictureError(
-                    "with a picture of more than 8 bits a value, like that of a depth camera"
+                    "with an image of more than 8 bits a value, like that of a depth camera"
                 )
             alpha = opened.convert("RGBA") if opened.has_transparency_data else None
             if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
-                raise PictureError("with a picture that is partly transparent")
+                raise PictureError("with an image that is partly transparent")
             return np.asarray(opened.convert("RGB"))
     except PictureError:
         raise
     except Exception as error:  # Pillow's errors have no common base.
-        raise PictureError("with a damaged picture") from error
+        raise PictureError("with a damaged image") from error
 
 
 # Constant quality, 0 to 51; see the measured error in docs/exchange.md.
@@ -156,7 +156,7 @@ class VideoWriter:
         width, height = size
         if width % 2 or height % 2:
             raise DemosError(
-                f"A video needs an even width and height, and the pictures have {width} x "
+                f"A video needs an even width and height, and the images have {width} x "
                 f"{height} pixels: export them with --images."
             )
         _ffmpeg([])
@@ -199,7 +199,7 @@ class VideoWriter:
             written = len(read_times(self._path).ticks) if self.frames else 0
         if self.frames != written:
             raise OutputError(
-                f"Cannot write {self._path}: it has {written} of {self.frames} pictures."
+                f"Cannot write {self._path}: it has {written} of {self.frames} images."
             )
 
 
@@ -241,18 +241,18 @@ def read_times(path: Path) -> VideoTimes:
                 # A packet: "stream, decoding time, presentation time, ...".
                 ticks.append(int(line.split(b",")[2]))
             if len(ticks) > most:
-                raise DemosError(f"{path} claims more pictures than it has bytes.")
+                raise DemosError(f"{path} claims more images than it has bytes.")
         process.wait()
         if not ticks or process.returncode:
             why = f" ({problem})" if (problem := _last_line(log)) else ""
-            raise DemosError(f"{path} has no pictures{why}: restore it.")
+            raise DemosError(f"{path} has no images{why}: restore it.")
         log.seek(0)
         said = log.read(1 << 20)
     found = _PIXELS.search(said)
     pixels = found[1].decode() if found else "unknown"
     if pixels.startswith(("gray", "ya")) and pixels.endswith(("le", "be")):
         raise DemosError(
-            f"{path} has grey pictures of more than 8 bits ({pixels}), like those of a depth "
+            f"{path} has grey images of more than 8 bits ({pixels}), like those of a depth "
             "camera, which cannot be imported."
         )
     try:
@@ -312,7 +312,7 @@ def read_pictures(
                 process.kill()
                 why = f" ({problem})" if (problem := _last_line(log)) else ""
                 raise DemosError(
-                    f"{path} is damaged: the picture at {float(tick * times.tick_s):.3f} s "
+                    f"{path} is damaged: the image at {float(tick * times.tick_s):.3f} s "
                     f"cannot be decoded{why}."
                 )
             yield np.frombuffer(data, np.uint8).reshape(height, width, 3)
@@ -331,8 +331,7 @@ def _next_picture(
     if head[0] and head != [b"P6\n", f"{width} {height}\n".encode(), b"255\n"]:
         found = head[1].decode(errors="replace").strip().replace(" ", " x ")
         raise DemosError(
-            f"The pictures in {path} have {found} pixels, but meta/info.json says "
-            f"{width} x {height}."
+            f"The images in {path} have {found} pixels, but meta/info.json says {width} x {height}."
         )
     data = stream.read(width * height * 3)
     return int(line), data if len(data) == width * height * 3 else b""

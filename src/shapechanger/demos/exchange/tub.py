@@ -147,14 +147,14 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
     deep = [name for name, kind in columns.items() if kind == _DEPTH]
     if deep and not cameras and not context.camera:
         context.warn(
-            f"The steps have no pictures, because those of {few(deep)} have 16 bits, as of depth, "
-            "and only pictures of 8 bits can be imported."
+            f"The steps have no images, because those of {few(deep)} have 16 bits, as of depth, "
+            "and only images of 8 bits can be imported."
         )
     if _IMAGE in cameras and not context.camera:
         return _IMAGE
     camera = choose_camera(folder, cameras, context)
     if camera not in {_IMAGE, context.camera}:
-        context.note(f"The pictures come from the column {camera}.")
+        context.note(f"The images come from the column {camera}.")
     return camera
 
 
@@ -212,20 +212,20 @@ def _find_pictures(records: Sequence[SourceRecord], images: Path, context: Impor
         if record.fault:
             continue
         if not name or not isinstance(name, str):
-            record.fault = "without a picture"
+            record.fault = "without an image"
             continue
         # Version 1 writes whole paths of the robot for the type "image".
         place = PurePath(name).name if PurePath(name).is_absolute() else name
         record.picture = images / place
         if not is_inside(images, place):
-            record.fault = "with a picture name that leaves the folder"
+            record.fault = "with an image name that leaves the folder"
         elif shown[name] > 1 and record.picture.is_file():
-            record.fault = "with the picture of another record"
+            record.fault = "with the image of another record"
         elif (match := _PICTURE_NUMBER.match(name)) and int(match[1]) != record.number:
             offsets[record.number] = int(match[1]) - record.number
     if offsets:
         context.warn(
-            f"{counted(len(offsets), 'record')} with the picture of another number, up to "
+            f"{counted(len(offsets), 'record')} with the image of another number, up to "
             f"{max(map(abs, offsets.values()))} off ({few(list(offsets))}): look whether they "
             "belong together."
         )
@@ -267,7 +267,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
         first_ns: int | None = None
         for step, jpeg in kept_steps(episode.rows):
             if jpeg is None:
-                raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
+                raise DemosError(f"A step of {episode.name} has no image: export it to csv.")
             first_ns = step.clock_ns if first_ns is None else first_ns
             last_ns = _time_ns(step, episode.header, began, first_ns, last_ns)
             name = f"{len(records)}_cam_image_array_.jpg"

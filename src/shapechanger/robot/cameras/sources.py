@@ -137,7 +137,7 @@ class Folder(WaitingCamera):
         folder = Path(plan.settings["path"]).expanduser()
         with translate_errors(
             OSError,
-            to=lambda error: RobotError(f"The folder of pictures cannot be read: {error}."),
+            to=lambda error: RobotError(f"The folder of images cannot be read: {error}."),
         ):
             files = sorted(one for one in folder.iterdir() if one.suffix.lower() in _SUFFIXES)
         if not files:

@@ -293,7 +293,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if newest is not None:
             self._spaces.shows(newest)
         if self._spaces.picture is None:
-            raise RenderError(f"{self.welcome.robot} has sent no picture. Does it have a camera?")
+            raise RenderError(f"{self.welcome.robot} has sent no image. Does it have a camera?")
         return self._spaces.picture.copy()
 
     def close(self) -> None:

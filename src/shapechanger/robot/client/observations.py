@@ -82,7 +82,7 @@ class RobotSpaces:
             )
         if min(size) < 1:
             raise SpaceMismatch(
-                f"A picture must have at least 1 x 1 pixels, got {size[0]} x {size[1]}."
+                f"An image must have at least 1 x 1 pixels, got {size[0]} x {size[1]}."
             )
         self._size = size
         self.has_image = has_camera if image is None else image
@@ -167,7 +167,7 @@ class RobotSpaces:
             return View(state, True, absent)
         self.shows(received)
         if self.picture is None:
-            raise LinkError("The robot has sent no picture yet.")
+            raise LinkError("The robot has sent no image yet.")
         fresh, self._viewed_seq = self._picture_seq != self._viewed_seq, self._picture_seq
         image = resize_picture(self.picture, self._size)
         image = image.copy() if image is self.picture else image

@@ -137,7 +137,7 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
     """Check the lines of a piece, write their frames, and return them."""
     lines = [line.encode() + b"\n" for line in piece.lines]
     if len(piece.frames) != len(lines):
-        raise DemosError(f"The robot sent {len(piece.frames)} pictures for {len(lines)} lines.")
+        raise DemosError(f"The robot sent {len(piece.frames)} images for {len(lines)} lines.")
     for number, (line, jpeg) in enumerate(zip(lines, piece.frames, strict=True), piece.first + 1):
         try:
             fields = decode_line(line)
@@ -151,12 +151,12 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
             continue
         # A robot's data must not escape the folder.
         if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
-            raise DemosError(f"A step names the picture {step.frame!r}.")
+            raise DemosError(f"A step names the image {step.frame!r}.")
         file = frames / step.frame
         known = file.read_bytes() if file.is_file() else b""
         if not (len(known) == picture.size if jpeg is None else picture.fits(jpeg)):
             raise DemosError(
-                f"The picture {step.frame} of step {step.index} is damaged on the robot."
+                f"The image {step.frame} of step {step.index} is damaged on the robot."
             )
         if jpeg is not None and known != jpeg:
             file.write_bytes(jpeg)

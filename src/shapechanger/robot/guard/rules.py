@@ -419,9 +419,9 @@ class Rules:
         if not self._stale_ns:
             return ""
         if self._frame_ns is None:
-            return "Blind: no picture yet."
+            return "Blind: no image yet."
         if now_ns - self._frame_ns >= self._stale_ns:
-            return f"Blind: no picture for {self._plan.limits.camera_stale_ms} ms."
+            return f"Blind: no image for {self._plan.limits.camera_stale_ms} ms."
         return ""
 
     def _stand(self, reason: str, now_ns: int) -> OutputDecision:

@@ -154,7 +154,7 @@ def check_limits(root: Table, profile: Profile) -> Profile:
     stale_ms = limits.camera_stale_ms if key in table.keys else _CAMERA_STALE_MS
     needed_ms = max(2000 / camera.fps, _LEAST_STALE_MS)  # One frame may be lost.
     if stale_ms < needed_ms:
-        words = f"must be at least {needed_ms:.0f} ms: one of two pictures may be lost at fps = "
+        words = f"must be at least {needed_ms:.0f} ms: one of two images may be lost at fps = "
         raise table.refused(key, f"{words}{camera.fps:g}")
     return replace(profile, limits=replace(limits, camera_stale_ms=stale_ms))
 

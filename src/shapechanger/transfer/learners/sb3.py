@@ -171,7 +171,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         """Read where a policy comes from."""
         if kind_of(path):
             raise StudyError(
-                f"{path} is a clone, and {self.name} does not learn from pictures: give "
+                f"{path} is a clone, and {self.name} does not learn from images: give "
                 f"--learner cloning, or a policy trained with {self.name}."
             )
         card = self.load(path).card

@@ -39,7 +39,7 @@ class _Renderer:
 
     def __init__(self, size: tuple[int, int], hidden: int, supersampled: int = 1) -> None:
         if min(size) < 1:
-            raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
+            raise RenderError(f"An image cannot be {size[0]} x {size[1]} pixels.")
         self._width, self._height = (supersampled * side for side in size)
         self._gl: Any = None
         self._model: mujoco.MjModel | None = None

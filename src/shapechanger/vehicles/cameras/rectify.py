@@ -118,7 +118,7 @@ class Rectifier:
         """
         if picture.shape != self._shape:
             raise WorldError(
-                f"The pictures of this camera have the shape {self._shape}, got {picture.shape}."
+                f"The images of this camera have the shape {self._shape}, got {picture.shape}."
             )
         pixels = picture.reshape(-1, 3)
         total = np.zeros((self._places.shape[1], 3), np.uint16)
@@ -180,7 +180,7 @@ class CanonicalView:
             f"looks {pitch:.3g} degrees down with a vertical field of view of {fovy:.3g}"
             for pitch, fovy in cameras
         )
-        return f"Pictures are warped to the camera of all vehicles; the one that took them {each}."
+        return f"Images are warped to the camera of all vehicles; the one that took them {each}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,7 +288,7 @@ def measure_camera(
         )
     if pitch_sd > _PITCH_SD_DEG or fovy_sd > _FOVY_SD_DEG:
         raise WorldError(
-            f"This picture leaves the pitch uncertain by {pitch_sd:.1f} degrees and the field of "
+            f"This image leaves the pitch uncertain by {pitch_sd:.1f} degrees and the field of "
             f"view by {fovy_sd:.1f}: bring the board nearer, turn it by 30 to 45 degrees to one "
             "side, or give the field of view of the camera's data sheet."
         )
@@ -369,7 +369,7 @@ def _find_corners(picture: NDArray[np.uint8], corners: tuple[int, int]) -> NDArr
     if not found:
         raise WorldError(
             f"There is no checkerboard of {corners[0]} x {corners[1]} inner corners in this "
-            f"picture of {grey.shape[1]} x {grey.shape[0]} pixels: show all of it with a white "
+            f"image of {grey.shape[1]} x {grey.shape[0]} pixels: show all of it with a white "
             "margin, near and in even light."
         )
     return np.asarray(points, np.float32)

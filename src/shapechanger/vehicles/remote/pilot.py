@@ -80,7 +80,7 @@ def require_fit(
         actions, state = map(Layout.from_json, (robot.action_layout, robot.state_layout))
         card.require_layouts(actions, state)
     if card.eyes != "none" and robot.image_size is None:
-        raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by pictures.")
+        raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by images.")
     if has_waypoints and not robot.has_geometry:
         raise RobotRefused(
             f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
