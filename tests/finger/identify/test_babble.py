@@ -14,7 +14,7 @@ import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.errors import FingerError, LayoutError, UnknownName
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINTS
 from shapechanger.finger.controller import FingerBabble
-from shapechanger.finger.identify import FingerLog, result
+from shapechanger.finger.identify import FingerLog
 from shapechanger.finger.identify.log import record_babble
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.layout import Feature, Layout
@@ -81,7 +81,7 @@ def test_an_env_is_identified_by_ten_seconds_of_its_motion(monkeypatch: pytest.M
         taken.append(log)
         return SimpleNamespace(parameters=NOMINAL)
 
-    monkeypatch.setattr(result, "identify", identified)
+    monkeypatch.setattr("shapechanger.finger.identify.identify", identified)
     with gym.make("shapechanger/Finger-v1", max_episode_steps=-1, actions="tension") as env:
         source = env.unwrapped.identified_source(0)
     assert source == {"parameters": msgspec.to_builtins(NOMINAL)}

@@ -7,9 +7,11 @@ import re
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import inspect
 
 from shapechanger.errors import ProfileError
 from shapechanger.robot.profile import shipped_profiles
+from shapechanger.robot.profile.toml import permitted
 from tests.robot.profile.texts import EVERYTHING, changed, read
 
 # Text to replace in EVERYTHING, its replacement, and part of the message; then part of the reported
@@ -232,3 +234,8 @@ def test_a_stop_may_not_let_the_robot_drive_on(key: str) -> None:
     read(tank)
     with pytest.raises(ProfileError, match=rf"{key} of \[stop\] would keep \[output.left\] driv"):
         read(tank.replace("propels = true", "", 1))
+
+
+def test_a_key_without_a_description_names_its_type() -> None:
+    """A chip of another package may declare such keys."""
+    assert permitted(inspect.type_info(list[int])) == "a list"
