@@ -303,8 +303,8 @@ def _as5600(sensor: SensorPlan) -> Device:
     settings = sensor.settings
     wires = (*_i2c(settings["bus"]), *_LOGIC_WIRES)
     loads = tuple(
-        Load(f"channel {channel}", f"AS5600 {joint}")
-        for joint, channel in zip(settings["joints"], settings["channels"], strict=True)
+        Load(f"channel {row['channel']}", f"AS5600 {joint}")
+        for joint, row in settings["rows"].items()
     )
     parts = (
         ("TCA9548A board", 1, "multiplexer of the encoders"),
