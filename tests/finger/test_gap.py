@@ -19,7 +19,6 @@ from shapechanger.finger.gap import (
     require_balance,
     resolve_gap,
 )
-from shapechanger.finger.identify import log, result
 from shapechanger.finger.parameters import NOMINAL, CommandPath
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.tensions import spans_all_torques
@@ -187,8 +186,10 @@ def test_an_identified_source_has_what_was_found(
 ) -> None:
     """On a rig's path, motors are drawn around it; otherwise it is that finger."""
     found = NOMINAL.replace(tendon_friction=0.25, path=CommandPath() if on_rig else None)
-    monkeypatch.setattr(log, "record_babble", lambda *given: None)
-    monkeypatch.setattr(result, "identify", lambda log: SimpleNamespace(parameters=found))
+    monkeypatch.setattr("shapechanger.finger.identify.record_babble", lambda *given: None)
+    monkeypatch.setattr(
+        "shapechanger.finger.identify.identify", lambda log: SimpleNamespace(parameters=found)
+    )
     source = FingerReachEnv().identified_source(0)
     if on_rig:
         assert source["reward"] == {"change": 5.0}

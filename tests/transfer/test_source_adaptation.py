@@ -12,7 +12,6 @@ import pytest
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import RobotError, StudyError
-from shapechanger.finger.identify import log, result
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.transfer.executor import Serial
@@ -43,8 +42,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
     out = tmp_path_factory.mktemp("gap") / "study"
     task = TransferTask(FINGER, REAL_LIKE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(log, "record_babble", recorded)
-        patch.setattr(result, "identify", lambda log: found)
+        patch.setattr("shapechanger.finger.identify.record_babble", recorded)
+        patch.setattr("shapechanger.finger.identify.identify", lambda log: found)
         plan = tiny_plan(task=task, arms=_EVERY, source_steps=64)
         return run_study(plan, out, executor=Serial()), out, moved
 

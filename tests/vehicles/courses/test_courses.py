@@ -236,11 +236,10 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
 
 
 def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> None:
-    from shapechanger.vehicles.courses import channel
 
     def never(world: str, rng: np.random.Generator, seed: int) -> Course | None:
         return None
 
-    monkeypatch.setattr(channel, "open_course", never)
+    monkeypatch.setattr("shapechanger.vehicles.courses.open_course", never)
     with pytest.raises(WorldError, match="No yard with seed 3"):
         lay_out("yard", 3)
