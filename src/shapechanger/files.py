@@ -127,6 +127,12 @@ def _write(path: Path, content: bytes, mode: int | None) -> None:
             file.flush()
             os.fsync(fd)
         part.replace(path)
+        # After a power failure the folder must have the new name, too.
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
     except OSError:
         part.unlink(missing_ok=True)
         raise

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import numpy as np
 import simplejpeg
 
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.channel import GuardState
+from shapechanger.robot.guard.channel import NO_STATE, GuardState
 from shapechanger.robot.link.card import RobotCard
 
 SIZE = (160, 120)
@@ -60,4 +61,4 @@ def guard_state(**changes: Any) -> GuardState:
         "quantities": {"speed": 0.25},
         "sources": {"speed": "wheel"},
     }
-    return GuardState(**(fields | changes))
+    return msgspec.structs.replace(NO_STATE, **(fields | changes))

@@ -122,6 +122,14 @@ def test_an_invalid_order_is_refused(field: str, value: object) -> None:
         decode_order(data)
 
 
+@pytest.mark.parametrize("field", GuardState.__struct_fields__)
+def test_a_state_without_a_field_is_refused(field: str) -> None:
+    fields = msgspec.structs.asdict(_STATE)
+    del fields[field]
+    with pytest.raises(ValueError, match=f"missing required field `{field}`"):
+        decode_state(json.dumps(fields).encode())
+
+
 def test_a_state_with_long_reasons_fits_into_a_datagram() -> None:
     words = "\N{GRINNING FACE}" * 250
     state = msgspec.structs.replace(_STATE, stop_reason=words, refused=words)

@@ -20,7 +20,7 @@ from shapechanger.robot.daemon.library import RecordingLibrary
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.daemon.recorder import Recorder
-from shapechanger.robot.guard.channel import GuardState, Order
+from shapechanger.robot.guard.channel import NO_STATE, GuardState, Order
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link.messages import (
     Command,
@@ -87,7 +87,7 @@ class SessionHub:
         features = Layout.from_json(plan.card.state_layout).features
         self._names = [f.name for f in features for _ in range(f.size)]
         self._absent = {f.name: _ABSENT for f in features if not f.name.endswith(_APPLIED)}
-        self.state = GuardState(stop_reason="The guard has not reported yet.")
+        self.state = NO_STATE
         self.frame: Frame | None = None
         self.frame_seq = 0
         self.frame_arrived = asyncio.Event()

@@ -81,22 +81,41 @@ class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         bumps: How many bumps there were since the guard started.
     """
 
-    at_ns: int = 0
-    armed: bool = False
-    emergency: bool = False
-    emergencies: int = 0
-    stop_reason: str = ""
-    applied: tuple[float, ...] = ()
-    applied_session: int = 0
-    applied_seq: int | None = None
-    applied_ns: int | None = None
-    refused: str = ""
-    refused_seq: int | None = None
-    outputs: dict[str, float] = {}
-    quantities: dict[str, float] = {}
-    sources: dict[str, str] = {}
-    bumps: int = 0
+    at_ns: int
+    armed: bool
+    emergency: bool
+    emergencies: int
+    stop_reason: str
+    applied: tuple[float, ...]
+    applied_session: int
+    applied_seq: int | None
+    applied_ns: int | None
+    refused: str
+    refused_seq: int | None
+    outputs: dict[str, float]
+    quantities: dict[str, float]
+    sources: dict[str, str]
+    bumps: int
 
+
+NO_STATE: Final = GuardState(
+    at_ns=0,
+    armed=False,
+    emergency=False,
+    emergencies=0,
+    stop_reason="The guard has not reported yet.",
+    applied=(),
+    applied_session=0,
+    applied_seq=None,
+    applied_ns=None,
+    refused="",
+    refused_seq=None,
+    outputs={},
+    quantities={},
+    sources={},
+    bumps=0,
+)
+"""State until the guard's first report."""
 
 encode: Final = msgspec.json.encode
 decode_order: Final = msgspec.json.Decoder(Order).decode
