@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, drop, keep, read_episode
+from shapechanger.demos.episodes.outline import read_outline
 from shapechanger.robot.daemon.library import (
     Answer,
     LineIndex,
@@ -117,6 +118,13 @@ def test_a_summary_agrees_with_the_whole_episode(
         assert summary.seconds == episode.seconds
         assert (summary.closed, summary.outcome) == (episode.closed, episode.outcome)
         assert (summary.created, summary.driver) == (episode.header.created, "Ada")
+
+
+def test_a_step_that_is_still_being_written_does_not_count(tmp_path: Path) -> None:
+    steps = record(tmp_path, 3) / "steps.jsonl"
+    lines = [line for line in steps.read_bytes().splitlines() if b'"kind":"step"' in line]
+    steps.write_bytes(b"\n".join(lines))  # The last line lacks its end.
+    assert read_outline(steps.parent).steps == 2
 
 
 def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:

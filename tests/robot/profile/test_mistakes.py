@@ -104,6 +104,7 @@ mix = { arm = 1.0 } -> mix = { arm = 0.0 } -> has the weight 0 for 'arm': leave 
 [output.drive] -> [action.wave]\n[output.drive] -> [action.wave] moves nothing: no mix names it
 part = "wheels" -> part = "wheel" -> not 'wheel' (did you mean 'wheels'?)
 mix = { throttle = 1 } -> mix = { arm = 1 } -> propels = true, because it moves the wheels
+enable = 26 -> offset = -0.1 -> is at -0.1 when its actions rest, and must be at 0 then
 enable = 26 -> offset = 0.1 -> is at 0.1 when its actions rest, and must be at 0 then
 mix.throttle = 0.5 -> mix.arm = 0.5 -> is at 0.125 when its actions rest -> [output.pump]
 right_us = 1000 -> right_us = 1500 -> must lie between left_us -> [output.steer]
