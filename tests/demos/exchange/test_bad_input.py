@@ -238,9 +238,18 @@ def _spoilt(file: h5py.File) -> None:
     file["episode_0/observations/image"][1] = np.frombuffer(picture(1)[:-200], np.uint8)
 
 
+def _with_rest(text: str) -> Callable[[Path], None]:
+    """Return a change of what the first step has without a column."""
+    return _in_file(lambda file: file["episode_0/infos/step"].__setitem__(0, text))
+
+
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
+        *(
+            (_with_rest(text), "1 step whose infos/step cannot be read (")
+            for text in ("{", "7", "{}", "[" * 10**5, '{"step": {}, "marks": [], "dropped": null}')
+        ),
         (lambda f: (f / "data/main_data.hdf5").unlink(), "which is not in"),
         (_edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
         (_edit("data/metadata.json", lambda b: b[:3000]), "is not valid JSON"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -149,7 +150,8 @@ def test_minari_loads_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     )
     np.testing.assert_array_equal(episode.actions, [(0.1 * n, 1 / 3) for n in range(5)])
     assert episode.truncations.tolist() == [False] * 4 + [True]
-    assert episode.infos["driver"].tolist() == [b"person"] * 5
+    rests = [json.loads(text) for text in episode.infos["step"]]
+    assert [rest["step"]["driver"] for rest in rests] == ["person"] * 5
     assert dataset.observation_space["image"].contains(episode.observations["image"][0])
 
 

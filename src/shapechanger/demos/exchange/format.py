@@ -35,21 +35,21 @@ _FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
 _NAMES: Final = """
 step        | index   | step        |                    | frame_index               | _index          | /step
 frame       | picture | frame       | observations/image | observation.images.camera | cam/image_array | /camera
-driver      | text    | driver      | infos/driver       |                           | user/mode       | /step
+driver      | text    | driver      | infos/step         |                           | user/mode       | /step
 action      | action  | action/     | actions            | action                    | user/, pilot/   | /action
-applied     | action  | applied/    | infos/applied      |                           |                 | /applied
-wanted      | action  | wanted/     | infos/wanted       |                           | pilot/          | /wanted
+applied     | action  | applied/    | infos/step         |                           |                 | /applied
+wanted      | action  | wanted/     | infos/step         |                           | pilot/          | /wanted
 state       | state   | state/      | observations/state | observation.state         | other numbers   | /state
-captured_ns | time    | captured_ns | infos/captured_ns  | timestamp                 | _timestamp_ms   | log time
-decided_ns  | time    | decided_ns  | infos/decided_ns   |                           |                 | log time
-wall_ns     | time    | wall_ns     | infos/wall_ns      |                           | _timestamp_ms   | /step
+captured_ns | time    | captured_ns | infos/step         | timestamp                 | _timestamp_ms   | log time
+decided_ns  | time    | decided_ns  | infos/step         |                           |                 | log time
+wall_ns     | time    | wall_ns     | infos/step         |                           | _timestamp_ms   | /step
 reward      | number  | reward      | rewards            | next.reward               |                 | /reward
-terms       | json    | terms       | infos/more         |                           |                 | /reward
+terms       | json    | terms       | infos/step         |                           |                 | /reward
 terminated  | flag    | terminated  | terminations       | next.terminated           |                 | /step
 truncated   | flag    | truncated   | truncations        | next.done                 |                 | /step
-stop_reason | text    | stop_reason | infos/stop_reason  |                           |                 | /step
-marks       | json    | marks       | infos/more         |                           |                 | /step
-dropped     | text    | dropped     | infos/more         |                           |                 | /step
+stop_reason | text    | stop_reason | infos/step         |                           |                 | /step
+marks       | json    | marks       | infos/step         |                           |                 | /step
+dropped     | text    | dropped     | infos/step         |                           |                 | /step
 """  # noqa: E501
 _ALIASES: Final[dict[str, dict[str, float]]] = {
     "frame": dict.fromkeys(("file", "image", "picture", "filename"), 1.0),

@@ -5,11 +5,9 @@ that was recorded, which Minari decodes on reading; it is not encoded again. Ima
 pixels, which Minari does not store as JPEG, are stored as pixels, with the JPEG in `infos/jpeg`.
 Minari needs one observation more than there are steps, so the last one is repeated.
 
-In the infos of a step, `has_applied` and `has_wanted` say whether these actions are known, and
-`rewarded` whether the reward is, which is NaN if not; an unknown time is -2^63; `frame` is the
-index of the image in the episode, the same for steps that share one; `more` is JSON of the
-rest. `cut_off` says whether an end was added. The headers of the episodes, the layouts and the rate
-are in `metadata.json`.
+Of the infos of a step, `frame` is the index of the image in the episode, the same for steps that
+share one, and `step` is everything without a column of its own, as JSON. The reward is NaN where
+it is unknown. The headers of the episodes, the layouts and the rate are in `metadata.json`.
 
 Of a dataset of others, at most one part of an observation may be an image; all other values become
 the state, in order. Images that are not JPEG are encoded with quality 100. The driver is unknown
@@ -25,7 +23,7 @@ import copy
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -36,7 +34,6 @@ from typing import Any, Final, cast
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
@@ -49,6 +46,7 @@ from shapechanger.demos.exchange.files import (
     names_in,
     open_hdf5,
     own_headers,
+    parse_json,
     read_json_object,
 )
 from shapechanger.demos.exchange.format import (
@@ -59,49 +57,35 @@ from shapechanger.demos.exchange.format import (
     Format,
     ImportContext,
     few,
-    fields_of,
     name_in,
 )
-from shapechanger.demos.exchange.imports import (
-    SourceRecord,
-    as_json,
-    episode_of,
-    unreadable,
-)
+from shapechanger.demos.exchange.imports import SourceRecord, as_json, episode_of, unreadable
 from shapechanger.demos.exchange.minari_spaces import (
+    box_of,
     is_imported,
+    is_stored_as_jpeg,
     leaves_in,
     picture_size_of,
     pixels_of,
     space_features,
+    space_of,
 )
-from shapechanger.demos.jpeg import is_grey, picture_size
+from shapechanger.demos.jpeg import is_grey
 from shapechanger.errors import DemosError
-from shapechanger.layout import Layout
 
 _DATA: Final = "data"
 _METADATA: Final = "metadata.json"
 _MAIN: Final = "main_data.hdf5"
 _OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
-_UNKNOWN_NS: Final = -(2**63)
-_FRAME, _JPEG, _CUT_OFF = "infos/frame", "infos/jpeg", "infos/cut_off"
+_FRAME, _JPEG = "infos/frame", "infos/jpeg"
 _OBSERVATIONS: Final = "observations"
-_ACTION, _STATE, _PICTURE, _REWARD, _TERMINATED, _TRUNCATED, _DRIVER, _STOP, _MORE = (
+_ACTION, _STATE, _PICTURE, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
     name_in("minari", field)
-    for field in (
-        *("action", "state", "frame", "reward", "terminated", "truncated"),
-        *("driver", "stop_reason", "terms"),
-    )
+    for field in ("action", "state", "frame", "reward", "terminated", "truncated", "driver")
 )
-_TIMES: Final = fields_of("time")
-_INFOS: Final = (
-    *(f"infos/{name}" for name in ("rewarded", "has_applied", "has_wanted", *_TIMES)),
-    *("infos/applied", "infos/wanted", _DRIVER, _STOP, _MORE),
-)
+_IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys of a step that its JSON lacks.
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
-_MIN_JPEG: Final = 32  # Pixels.
-_BRIGHTEST: Final = 255
 
 
 def _data_folder(folder: Path) -> Path | None:
@@ -226,7 +210,7 @@ def _own(file: Any, number: int, plain: dict[str, Any]) -> _Parts:
         state=[(state, header.state_size)] if header.state_layout else [],
         picture=(_JPEG if "jpeg" in infos else picture) if pictured else "",
         is_jpeg=True,
-        infos=(*_INFOS, _FRAME) if pictured else _INFOS,
+        infos=(_STEP, _FRAME) if pictured else (_STEP,),
     )
 
 
@@ -273,13 +257,14 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
         sizes = {name: max(1, math.prod(space.shape or ())) for name, space in leaves.items()}
         return [(f"{part}/{name}" if name else part, size) for name, size in sizes.items()]
 
-    as_jpeg = metadata.get("jpeg_encoding", True)
     return _Parts(
         header=header,
         action=places(acted, _ACTION),
         state=places(sensed, _OBSERVATIONS),
         picture="" if camera is None else f"{_OBSERVATIONS}/{camera}".rstrip("/"),
-        is_jpeg=camera is not None and bool(as_jpeg) and _stored_as_jpeg(observed[camera]),
+        is_jpeg=camera is not None
+        and bool(metadata.get("jpeg_encoding", True))
+        and is_stored_as_jpeg(observed[camera]),
     )
 
 
@@ -288,7 +273,6 @@ def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Sou
     group, size = f"episode_{number}", parts.header.image_size
     with open_hdf5(main) as file:
         columns = parts.columns(file, number)
-        cut_off = bool(parts.infos) and bool(column(file, f"{group}/{_CUT_OFF}", 1)[0])
         count = chunk_of(columns.values(), _CHUNK)
         for start in range(0, steps, count):
             part = slice(start, min(start + count, steps))
@@ -305,7 +289,7 @@ def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Sou
                         state=tuple(states[place].tolist()),
                         reward=None if math.isnan(reward) else reward,
                         terminated=bool(at[_TERMINATED]),
-                        truncated=bool(at[_TRUNCATED]) and not (cut_off and step == steps - 1),
+                        truncated=bool(at[_TRUNCATED]),
                     ),
                 )
                 if parts.picture:
@@ -315,7 +299,7 @@ def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Sou
                     if record.picture is None:
                         record.fault = "whose image does not fit its space"
                 if parts.infos:
-                    _add_infos(record, at, reward)
+                    _add_rest(record, at[_STEP])
                 yield record
 
 
@@ -338,24 +322,21 @@ def _flat(
     return np.concatenate(flat, axis=1)
 
 
-def _add_infos(record: SourceRecord, at: Mapping[str, Any], reward: float) -> None:
-    """Complete a record of an own dataset; it has a fault if its infos cannot be read."""
+def _add_rest(record: SourceRecord, text: bytes) -> None:
+    """Complete a record of an own dataset; it has a fault if its JSON cannot be read."""
+    step = record.step
+    columns = {"action": step.action, "state": step.state, "terminated": step.terminated}
     try:
-        more = json.loads(at[_MORE])
-        fields: dict[str, Any] = {"driver": at[_DRIVER].decode()}
-        times = {name: int(at[f"infos/{name}"]) for name in _TIMES}
-        fields |= {name: ns for name, ns in times.items() if ns != _UNKNOWN_NS}
-        for name in ("applied", "wanted"):
-            if at[f"infos/has_{name}"]:
-                fields[name] = tuple(at[f"infos/{name}"].tolist())
-        fields["reward"] = reward if at["infos/rewarded"] else None
-        fields["terms"] = {name: float(v) for name, v in more.get("terms", {}).items()}
-        fields["stop_reason"] = str(more.get("stop_reason", at[_STOP].decode()))
-        record.step = replace(record.step, **fields)
-        record.marks = tuple(map(str, more.get("marks", ())))
-        record.dropped = None if more.get("dropped") is None else str(more["dropped"])
-    except (ValueError, TypeError, AttributeError, LookupError) as error:
-        record.fault = f"whose infos cannot be read ({error})"
+        rest = parse_json(text.decode(), _STEP)
+        fields = rest["step"] | columns
+        if "reward" in fields:
+            fields["reward"] = step.reward
+        record.step = Step.from_json(fields)
+        record.marks = tuple(map(str, rest["marks"]))
+        record.dropped = None if rest["dropped"] is None else str(rest["dropped"])
+    except (DemosError, ValueError, TypeError, LookupError) as error:
+        reason = str(error).removesuffix(".")
+        record.fault = f"whose {_STEP} cannot be read ({reason})"
 
 
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
@@ -378,18 +359,18 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     rows = [iter(episode.rows) for episode in episodes]
     first = next(rows[0])
     rows[0] = chain((first,), rows[0])
-    space, picture = _space(header, first, episodes[0].name)
+    space, picture = space_of(header, first.jpeg, episodes[0].name)
     storage = storages.MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=space,
-        action_space=_box(header.action_layout),
+        action_space=box_of(header.action_layout),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
     with h5py.File(folder / _DATA / _MAIN, "a", track_order=True) as file:
-        for number, episode in enumerate(episodes):
+        for number, (episode, remaining) in enumerate(zip(episodes, rows, strict=True)):
             group = file.create_group(f"episode_{number}")
-            steps = _write_episode(group, episode, rows[number], picture)
+            steps = _write_episode(group, episode, remaining, picture)
             drivers.update(step.driver for step in steps)
             group.attrs["id"] = number
             group.attrs["total_steps"] = len(steps)
@@ -434,47 +415,6 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
     return found
 
 
-def _box(layout: str) -> spaces.Box:
-    """Return the space of the values of a layout, in 64 bits, so that nothing is rounded."""
-    named = Layout.from_json(layout)
-    return spaces.Box(named.low, named.high, dtype=np.float64)
-
-
-def _space(
-    header: EpisodeHeader, first: ExchangeStep, name: str
-) -> tuple[spaces.Space[Any], spaces.Box | None]:
-    """Return the space of all observations by the first step, and its part of the images."""
-    state = _box(header.state_layout) if header.state_layout else None
-    picture = None
-    if first.jpeg is not None or header.image_size is not None:
-        where = f"of the first step of {name}"
-        jpeg = first.jpeg or b""
-        width, height = header.image_size or picture_size(jpeg, where)
-        grey = bool(jpeg) and is_grey(jpeg, where)
-        shape = (height, width) if grey else (height, width, 3)
-        picture = spaces.Box(0, _BRIGHTEST, shape, np.uint8)
-    if picture is not None and state is not None:
-        return spaces.Dict({"image": picture, "state": state}), picture
-    if picture is None and state is None:
-        raise DemosError(
-            f"{name} has neither images nor a state, so it has no observations for Minari: "
-            "export it to csv."
-        )
-    return cast("spaces.Space[Any]", state if picture is None else picture), picture
-
-
-def _stored_as_jpeg(space: spaces.Space[Any]) -> bool:
-    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
-    box = cast("Any", space)
-    return (
-        isinstance(space, spaces.Box)
-        and len(box.shape) in {2, 3}
-        and min(box.shape[:2]) >= _MIN_JPEG
-        and box.dtype == np.uint8
-        and bool(np.all(box.low == 0) and np.all(box.high == _BRIGHTEST))
-    )
-
-
 def _write_episode(
     group: Any, episode: ExchangeEpisode, rows: Iterable[ExchangeStep], picture: spaces.Box | None
 ) -> list[Step]:
@@ -483,13 +423,13 @@ def _write_episode(
     The last observation is repeated. An episode without an end is truncated at its last step: a
     learner must not take the next episode for its continuation.
     """
-    header, steps, more, frames = episode.header, list[Step](), list[str](), list[int]()
+    header, steps, rests, frames = episode.header, list[Step](), list[str](), list[int]()
     state_at, picture_at = _observed(picture is not None, bool(header.state_layout))
     size, grey = None, False
     observed: list[Any] = []  # The columns of the images; the last one is Minari's.
     if picture is not None:
         size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
-        as_jpeg = _stored_as_jpeg(picture)
+        as_jpeg = is_stored_as_jpeg(picture)
         blob = library("h5py").vlen_dtype(np.uint8)
         observed.append(_empty(group, picture_at if as_jpeg else _JPEG, (), blob))
         if not as_jpeg:
@@ -508,7 +448,8 @@ def _write_episode(
         for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
             _append(at, value)
         steps.append(row.step)
-        more.append(_more(row))
+        rest = {n: v for n, v in row.step.to_json().items() if n not in _IN_COLUMNS}
+        rests.append(json.dumps({"step": rest, "marks": row.marks, "dropped": row.dropped}))
         frames.append(frame)
 
     def write(name: str, values: Sequence[Any], dtype: Any) -> None:
@@ -523,28 +464,14 @@ def _write_episode(
         write(state_at, [*(step.state for step in steps), steps[-1].state], np.float64)
     write(_ACTION, [step.action for step in steps], np.float64)
     write(_REWARD, [math.nan if s.reward is None else s.reward for s in steps], np.float64)
-    write("infos/rewarded", [step.reward is not None for step in steps], np.bool_)
-    cut_off = not (steps[-1].terminated or steps[-1].truncated)
-    write(_CUT_OFF, [cut_off], np.bool_)
+    ended = steps[-1].terminated
     write(_TERMINATED, [step.terminated for step in steps], np.bool_)
     write(
         _TRUNCATED,
-        [*(step.truncated for step in steps[:-1]), cut_off or steps[-1].truncated],
+        [*(step.truncated for step in steps[:-1]), not ended or steps[-1].truncated],
         np.bool_,
     )
-    unknown = (math.nan,) * header.action_size
-    for field in ("applied", "wanted"):
-        values = [getattr(step, field) for step in steps]
-        write(f"infos/{field}", [unknown if v is None else v for v in values], np.float64)
-        write(f"infos/has_{field}", [value is not None for value in values], np.bool_)
-    for field in _TIMES:
-        times = [getattr(step, field) for step in steps]
-        write(f"infos/{field}", [_UNKNOWN_NS if ns is None else ns for ns in times], np.int64)
-    text = library("h5py").string_dtype("utf-8")
-    write(_DRIVER, [step.driver for step in steps], text)
-    # HDF5 cannot store NUL in a text.
-    write(_STOP, [step.stop_reason.replace("\0", "") for step in steps], text)
-    write(_MORE, more, text)
+    write(_STEP, rests, library("h5py").string_dtype("utf-8"))
     return steps
 
 
@@ -557,19 +484,6 @@ def _empty(group: Any, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
 def _append(column: Any, value: Any) -> None:
     column.resize(len(column) + 1, axis=0)
     column[-1] = value
-
-
-def _more(row: ExchangeStep) -> str:
-    """Return everything without a column of its own, as JSON, which has no NaN and infinity."""
-    terms = {n: v if math.isfinite(v) else repr(v) for n, v in row.step.terms.items()}
-    more: dict[str, Any] = {"terms": terms} if terms else {}
-    if row.marks:
-        more["marks"] = list(row.marks)
-    if row.dropped is not None:
-        more["dropped"] = row.dropped
-    if "\0" in row.step.stop_reason:
-        more["stop_reason"] = row.step.stop_reason
-    return json.dumps(more)
 
 
 FORMAT: Final = Format(

@@ -1,4 +1,4 @@
-"""Spaces of other projects' Minari datasets: features of a layout, and images."""
+"""Spaces of Minari datasets: of others as features of a layout and images, and our own."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library, parse_json
 from shapechanger.demos.exchange.format import ImportContext
 from shapechanger.demos.exchange.imports import features_of
-from shapechanger.demos.jpeg import MAX_PIXELS
+from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
 from shapechanger.errors import DemosError, MissingExtra
-from shapechanger.layout import Feature
+from shapechanger.layout import Feature, Layout
 
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
+_MIN_JPEG: Final = 32  # Pixels.
+_BRIGHTEST: Final = 255
 _CHANNELS: Final = (1, 3)
 _DEEP: Final = (np.uint16, np.int16, np.uint32)
 
@@ -137,3 +140,43 @@ def pixels_of(stored: Any, size: tuple[int, int] | None) -> NDArray[np.uint8] | 
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[1::-1] != size:
         return None
     return np.repeat(pixels, 3, -1) if pixels.shape[-1] == 1 else pixels
+
+
+def box_of(layout: str) -> spaces.Box:
+    """Return the space of the values of a layout, in 64 bits, so that nothing is rounded."""
+    named = Layout.from_json(layout)
+    return spaces.Box(named.low, named.high, dtype=np.float64)
+
+
+def space_of(
+    header: EpisodeHeader, jpeg: bytes | None, name: str
+) -> tuple[spaces.Space[Any], spaces.Box | None]:
+    """Return the space of all observations by the first image, and its part of the images."""
+    state = box_of(header.state_layout) if header.state_layout else None
+    picture = None
+    if jpeg is not None or header.image_size is not None:
+        where = f"of the first step of {name}"
+        width, height = header.image_size or picture_size(jpeg or b"", where)
+        grey = bool(jpeg) and is_grey(jpeg, where)
+        shape = (height, width) if grey else (height, width, 3)
+        picture = spaces.Box(0, _BRIGHTEST, shape, np.uint8)
+    if picture is not None and state is not None:
+        return spaces.Dict({"image": picture, "state": state}), picture
+    if picture is None and state is None:
+        raise DemosError(
+            f"{name} has neither images nor a state, so it has no observations for Minari: "
+            "export it to csv."
+        )
+    return cast("spaces.Space[Any]", state if picture is None else picture), picture
+
+
+def is_stored_as_jpeg(space: spaces.Space[Any]) -> bool:
+    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
+    box = cast("Any", space)
+    return (
+        isinstance(space, spaces.Box)
+        and len(box.shape) in {2, 3}
+        and min(box.shape[:2]) >= _MIN_JPEG
+        and box.dtype == np.uint8
+        and bool(np.all(box.low == 0) and np.all(box.high == _BRIGHTEST))
+    )
