@@ -136,8 +136,8 @@ def environment_page(env_id: str) -> SitePage:
         )
     else:
         observation, action = layouts_of(env)
-        parts += ["## Actions", _layout_table(action)]
-        parts += ["## Observations", _layout_table(observation)]
+        parts += ["## Actions in full", _layout_table(action)]
+        parts += ["## Observations in full", _layout_table(observation)]
         try:
             parts.append(_certificate(env_id, env))
         except RenderError as error:  # Vehicles are compared by what their cameras see, too.

@@ -139,19 +139,76 @@ class _Ant(Binding):
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Gymnasium's `Ant-v5` with any body of the ant family.
+    """Run forwards on four legs: Gymnasium's `Ant-v5` with any body of the ant family.
 
-    Actions, observations, rewards and infos equal `Ant-v5`'s; `observation_layout` and
-    `action_layout` name each number. Three things depend on the body:
+    Actions, observations, rewards and infos equal `Ant-v5`'s. An ant with more joints has larger
+    spaces.
 
-    - **Start pose**: the model's own, with each joint at least a tenth of its range inside its
-      limits, and the torso high enough for the feet. Noise is drawn as in `Ant-v5`; joints stay
-      inside their limits and feet above the floor.
-    - **Healthy range**: an ant is unhealthy when its torso's up axis points down, when it is higher
-      than 1.9 times its own standing height and 1.3 times its start, or when its state is not
-      finite. A lower limit could
-      not distinguish a flipped ant, which rests at 0.27 m, from one that lies down.
-    - **Spaces**: an ant with more joints has larger spaces.
+    ## Action space
+    `Box(-1, 1, (8,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
+    lasts 0.05 s.
+
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | hip_4/motor   | -1  | 1   | 1    |
+    | 1   | ankle_4/motor | -1  | 1   | 1    |
+    | 2   | hip_1/motor   | -1  | 1   | 1    |
+    | 3   | ankle_1/motor | -1  | 1   | 1    |
+    | 4   | hip_2/motor   | -1  | 1   | 1    |
+    | 5   | ankle_2/motor | -1  | 1   | 1    |
+    | 6   | hip_3/motor   | -1  | 1   | 1    |
+    | 7   | ankle_3/motor | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (105,), float64)`, for the unedited body:
+
+    | Num    | Observation   | Min     | Max     | Unit   |
+    | ------ | ------------- | ------- | ------- | ------ |
+    | 0      | torso/z       | -inf    | inf     | m      |
+    | 1      | torso/qw      | -1      | 1       | 1      |
+    | 2      | torso/qx      | -1      | 1       | 1      |
+    | 3      | torso/qy      | -1      | 1       | 1      |
+    | 4      | torso/qz      | -1      | 1       | 1      |
+    | 5      | hip_1/angle   | -0.5236 | 0.5236  | rad    |
+    | 6      | ankle_1/angle | 0.5236  | 1.222   | rad    |
+    | 7      | hip_2/angle   | -0.5236 | 0.5236  | rad    |
+    | 8      | ankle_2/angle | -1.222  | -0.5236 | rad    |
+    | 9      | hip_3/angle   | -0.5236 | 0.5236  | rad    |
+    | 10     | ankle_3/angle | -1.222  | -0.5236 | rad    |
+    | 11     | hip_4/angle   | -0.5236 | 0.5236  | rad    |
+    | 12     | ankle_4/angle | 0.5236  | 1.222   | rad    |
+    | 13     | torso/vx      | -inf    | inf     | m/s    |
+    | 14     | torso/vy      | -inf    | inf     | m/s    |
+    | 15     | torso/vz      | -inf    | inf     | m/s    |
+    | 16     | torso/wx      | -inf    | inf     | rad/s  |
+    | 17     | torso/wy      | -inf    | inf     | rad/s  |
+    | 18     | torso/wz      | -inf    | inf     | rad/s  |
+    | 19-26  | */velocity    | -inf    | inf     | rad/s  |
+    | 27-104 | */contact/*   | -1      | 1       | N·m, N |
+
+    ## Reward
+    `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 1 while healthy, plus the velocity
+    of the torso along x, m/s, minus `0.5 sum(action^2)`, minus `0.0005 sum(force^2)` of the contact
+    forces and torques, each clipped to [-1, 1].
+
+    ## Start
+    The model's own pose, with each joint at least a tenth of its range inside its limits, and the
+    torso high enough for the feet. Noise is drawn as in `Ant-v5`, with `reset_noise_scale` (0.1);
+    joints stay inside their limits and feet above the floor.
+
+    ## End
+    Terminated when the ant is unhealthy: its torso's up axis points down, it is higher than 1.9
+    times its own standing height and 1.3 times its start, or its state is not finite. A lower limit
+    could not distinguish a flipped ant, which rests at 0.27 m, from one that lies down. Truncated
+    after 1,000 steps.
+
+    ## Info
+    `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
+    `reward_forward`, `reward_ctrl`, `reward_contact` and `reward_survive`. `diverged` if the
+    simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of an ant, edits of `shapechanger.morphology`, or their JSON.
@@ -391,10 +448,75 @@ def is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
 
 
 class ExtendedAntEnv(AntEnv):
-    """The ant with a third segment on each leg, which makes both spaces larger than the ant's.
+    """Run forwards on four legs of three segments, which make both spaces larger than the ant's.
+
+    ## Action space
+    `Box(-1, 1, (12,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
+    lasts 0.05 s.
+
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | hip_4/motor   | -1  | 1   | 1    |
+    | 1   | ankle_4/motor | -1  | 1   | 1    |
+    | 2   | hip_1/motor   | -1  | 1   | 1    |
+    | 3   | ankle_1/motor | -1  | 1   | 1    |
+    | 4   | hip_2/motor   | -1  | 1   | 1    |
+    | 5   | ankle_2/motor | -1  | 1   | 1    |
+    | 6   | hip_3/motor   | -1  | 1   | 1    |
+    | 7   | ankle_3/motor | -1  | 1   | 1    |
+    | 8   | foot_4/motor  | -1  | 1   | 1    |
+    | 9   | foot_1/motor  | -1  | 1   | 1    |
+    | 10  | foot_2/motor  | -1  | 1   | 1    |
+    | 11  | foot_3/motor  | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (137,), float64)`, for the unedited body:
+
+    | Num    | Observation   | Min     | Max     | Unit   |
+    | ------ | ------------- | ------- | ------- | ------ |
+    | 0      | torso/z       | -inf    | inf     | m      |
+    | 1      | torso/qw      | -1      | 1       | 1      |
+    | 2      | torso/qx      | -1      | 1       | 1      |
+    | 3      | torso/qy      | -1      | 1       | 1      |
+    | 4      | torso/qz      | -1      | 1       | 1      |
+    | 5      | hip_1/angle   | -0.5236 | 0.5236  | rad    |
+    | 6      | ankle_1/angle | 0.5236  | 0.8727  | rad    |
+    | 7      | foot_1/angle  | 0.5236  | 1.222   | rad    |
+    | 8      | hip_2/angle   | -0.5236 | 0.5236  | rad    |
+    | 9      | ankle_2/angle | -0.8727 | -0.5236 | rad    |
+    | 10     | foot_2/angle  | -1.222  | -0.5236 | rad    |
+    | 11     | hip_3/angle   | -0.5236 | 0.5236  | rad    |
+    | 12     | ankle_3/angle | -0.8727 | -0.5236 | rad    |
+    | 13     | foot_3/angle  | -1.222  | -0.5236 | rad    |
+    | 14     | hip_4/angle   | -0.5236 | 0.5236  | rad    |
+    | 15     | ankle_4/angle | 0.5236  | 0.8727  | rad    |
+    | 16     | foot_4/angle  | 0.5236  | 1.222   | rad    |
+    | 17     | torso/vx      | -inf    | inf     | m/s    |
+    | 18     | torso/vy      | -inf    | inf     | m/s    |
+    | 19     | torso/vz      | -inf    | inf     | m/s    |
+    | 20     | torso/wx      | -inf    | inf     | rad/s  |
+    | 21     | torso/wy      | -inf    | inf     | rad/s  |
+    | 22     | torso/wz      | -inf    | inf     | rad/s  |
+    | 23-34  | */velocity    | -inf    | inf     | rad/s  |
+    | 35-136 | */contact/*   | -1      | 1       | N·m, N |
+
+    ## Reward
+    As for `AntEnv`.
+
+    ## Start
+    As for `AntEnv`.
+
+    ## End
+    As for `AntEnv`.
+
+    ## Info
+    As for `AntEnv`.
+
+    ## Versions
+    v1: the first.
 
     Args:
-        body: See `AntEnv`; None for the extended ant.
+        body: As for `AntEnv`; None for the extended ant.
         actuated_extension: Whether the third segments have motors, which makes 12; the
             original release (2017) had 8.
         **arguments: All arguments of `AntEnv`.

@@ -65,11 +65,44 @@ class _Pendulum(Binding):
 class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     TunedStep, GymnasiumInvertedPendulumEnv
 ):
-    """Gymnasium's `InvertedPendulum-v5` with any body of the pendulum family.
+    """Balance a pole on a cart: Gymnasium's `InvertedPendulum-v5` with any body of its family.
 
-    Actions, observations, rewards, infos and the start equal `InvertedPendulum-v5`'s;
-    `observation_layout` and `action_layout` name each number. An episode ends when the pole leans
-    by more than 0.2 rad, whatever its length.
+    The paper's bodies are "SmallInvertedPendulum" and "BigInvertedPendulum", with a pole half and
+    twice as long.
+
+    ## Action space
+    `Box(-3, 3, (1,), float32)`: the force on the cart divided by the motor's gear of 100 N. An
+    action lasts 0.04 s.
+
+    | Num | Action      | Min | Max | Unit |
+    | --- | ----------- | --- | --- | ---- |
+    | 0   | slide/motor | -3  | 3   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (4,), float64)`, for the unedited body:
+
+    | Num | Observation     | Min    | Max   | Unit  |
+    | --- | --------------- | ------ | ----- | ----- |
+    | 0   | slider/position | -1     | 1     | m     |
+    | 1   | hinge/angle     | -1.571 | 1.571 | rad   |
+    | 2   | slider/velocity | -inf   | inf   | m/s   |
+    | 3   | hinge/velocity  | -inf   | inf   | rad/s |
+
+    ## Reward
+    `1` for each step after which the pole stands.
+
+    ## Start
+    Position and velocity 0, each with uniform noise of `reset_noise_scale` (0.01).
+
+    ## End
+    Terminated when the pole leans by more than 0.2 rad, whatever its length, or the state is not
+    finite. Truncated after 1,000 steps.
+
+    ## Info
+    `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a pendulum, edits of `shapechanger.morphology`, or their JSON.
@@ -125,12 +158,52 @@ InvertedPendulumEnv.tuned = InvertedPendulumEnv
 class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Reshapable, GymnasiumInvertedDoublePendulumEnv
 ):
-    """Gymnasium's `InvertedDoublePendulum-v5` with an editable body.
+    """Balance two poles on a cart: Gymnasium's `InvertedDoublePendulum-v5` with an editable body.
 
-    Actions, observations, rewards, infos and the start equal `InvertedDoublePendulum-v5`'s;
-    `observation_layout` and `action_layout` name each number. Reward and end use the tip's
-    height relative to the poles' length: Gymnasium's limit of 1 m for poles of 1.2 m becomes 2 m
-    for poles twice as long.
+    Reward and end use the tip's height relative to the poles' length: Gymnasium's limit of 1 m for
+    poles of 1.2 m becomes 2 m for poles twice as long.
+
+    ## Action space
+    `Box(-1, 1, (1,), float32)`: the force on the cart divided by the motor's gear of 500 N. An
+    action lasts 0.05 s.
+
+    | Num | Action      | Min | Max | Unit |
+    | --- | ----------- | --- | --- | ---- |
+    | 0   | slide/motor | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (9,), float64)`, for the unedited body:
+
+    | Num | Observation             | Min | Max | Unit  |
+    | --- | ----------------------- | --- | --- | ----- |
+    | 0   | slider/position         | -1  | 1   | m     |
+    | 1   | hinge/sin               | -1  | 1   | 1     |
+    | 2   | hinge2/sin              | -1  | 1   | 1     |
+    | 3   | hinge/cos               | -1  | 1   | 1     |
+    | 4   | hinge2/cos              | -1  | 1   | 1     |
+    | 5   | slider/velocity         | -10 | 10  | m/s   |
+    | 6   | hinge/velocity          | -10 | 10  | rad/s |
+    | 7   | hinge2/velocity         | -10 | 10  | rad/s |
+    | 8   | slider/constraint_force | -10 | 10  | N     |
+
+    ## Reward
+    `healthy_reward - distance_penalty - velocity_penalty`: 10 while the poles stand, minus `0.01
+    x^2 + (y - 2)^2` of the tip at (x, y), m, minus `0.001 w1^2 + 0.005 w2^2` of the hinges'
+    velocities, rad/s.
+
+    ## Start
+    At rest and upright, with uniform noise of `reset_noise_scale` (0.1) on positions, and normal
+    noise of this standard deviation on velocities.
+
+    ## End
+    Terminated when the tip is at 1 m or below. Truncated after 1,000 steps.
+
+    ## Info
+    `reward_survive`, `distance_penalty` and `velocity_penalty`. `diverged` if the simulation has
+    diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON. It

@@ -201,10 +201,62 @@ def _grown(number: float, growth: float, before: Lift, after: Lift) -> float:
 class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Runner, GymnasiumHalfCheetahEnv
 ):
-    """Gymnasium's `HalfCheetah-v5` with an editable body.
+    """Run forwards in a plane on two legs: Gymnasium's `HalfCheetah-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `HalfCheetah-v5`'s. See `Runner` for the
-    arguments, and for the start pose, which follows from the body.
+    Actions, observations, rewards and infos equal `HalfCheetah-v5`'s.
+
+    ## Action space
+    `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gears of 120, 90, 60, 120,
+    60 and 30 N·m. An action lasts 0.05 s.
+
+    | Num | Action       | Min | Max | Unit |
+    | --- | ------------ | --- | --- | ---- |
+    | 0   | bthigh/motor | -1  | 1   | 1    |
+    | 1   | bshin/motor  | -1  | 1   | 1    |
+    | 2   | bfoot/motor  | -1  | 1   | 1    |
+    | 3   | fthigh/motor | -1  | 1   | 1    |
+    | 4   | fshin/motor  | -1  | 1   | 1    |
+    | 5   | ffoot/motor  | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (17,), float64)`, for the unedited body:
+
+    | Num   | Observation    | Min    | Max   | Unit  |
+    | ----- | -------------- | ------ | ----- | ----- |
+    | 0     | rootz/position | -inf   | inf   | m     |
+    | 1     | rooty/angle    | -inf   | inf   | rad   |
+    | 2     | bthigh/angle   | -0.52  | 1.05  | rad   |
+    | 3     | bshin/angle    | -0.785 | 0.785 | rad   |
+    | 4     | bfoot/angle    | -0.4   | 0.785 | rad   |
+    | 5     | fthigh/angle   | -1     | 0.7   | rad   |
+    | 6     | fshin/angle    | -1.2   | 0.87  | rad   |
+    | 7     | ffoot/angle    | -0.5   | 0.5   | rad   |
+    | 8     | rootx/velocity | -inf   | inf   | m/s   |
+    | 9     | rootz/velocity | -inf   | inf   | m/s   |
+    | 10-16 | */velocity     | -inf   | inf   | rad/s |
+
+    ## Reward
+    `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.1 sum(action^2)`.
+
+    ## Start
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.1) on
+    positions, and normal noise of this standard deviation on velocities. Joints stay inside their
+    limits and feet above the floor.
+
+    ## End
+    Never terminated; truncated after 1,000 steps.
+
+    ## Info
+    `x_position`, m; `x_velocity`, m/s; `reward_forward` and `reward_ctrl`. `diverged` if the
+    simulation has diverged.
+
+    ## Versions
+    v1: the first.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
+        **arguments: All arguments of `HalfCheetah-v5` and of `Reshapable`.
     """
 
     family = HALF_CHEETAH
@@ -220,10 +272,60 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     HealthyRunner, GymnasiumHopperEnv
 ):
-    """Gymnasium's `Hopper-v5` with an editable body.
+    """Hop forwards on one leg: Gymnasium's `Hopper-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Hopper-v5`'s. See `HealthyRunner` for the
-    arguments, and for the start pose and the healthy heights, which follow from the body.
+    Actions, observations, rewards and infos equal `Hopper-v5`'s.
+
+    ## Action space
+    `Box(-1, 1, (3,), float32)`: torques of the motors divided by their gear of 200 N·m. An action
+    lasts 0.008 s.
+
+    | Num | Action            | Min | Max | Unit |
+    | --- | ----------------- | --- | --- | ---- |
+    | 0   | thigh_joint/motor | -1  | 1   | 1    |
+    | 1   | leg_joint/motor   | -1  | 1   | 1    |
+    | 2   | foot_joint/motor  | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (11,), float64)`, for the unedited body:
+
+    | Num  | Observation       | Min     | Max    | Unit  |
+    | ---- | ----------------- | ------- | ------ | ----- |
+    | 0    | rootz/position    | -inf    | inf    | m     |
+    | 1    | rooty/angle       | -inf    | inf    | rad   |
+    | 2    | thigh_joint/angle | -2.618  | 0      | rad   |
+    | 3    | leg_joint/angle   | -2.618  | 0      | rad   |
+    | 4    | foot_joint/angle  | -0.7854 | 0.7854 | rad   |
+    | 5    | rootx/velocity    | -10     | 10     | m/s   |
+    | 6    | rootz/velocity    | -10     | 10     | m/s   |
+    | 7-10 | */velocity        | -10     | 10     | rad/s |
+
+    ## Reward
+    `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
+    minus `0.001 sum(action^2)`.
+
+    ## Start
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
+    stay inside their limits and feet above the floor.
+
+    ## End
+    Terminated when the torso is below 0.7 m or leans by more than 0.2 rad, or a number of the state
+    is not between -100 and 100. For other bodies these heights scale with their standing height.
+    Truncated after 1,000 steps.
+
+    ## Info
+    `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
+    `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
+        healthy_z_range: Heights of the torso between which the body is healthy, m; None
+            derives them from the body.
+        **arguments: All other arguments of `Hopper-v5` and of `Reshapable`.
     """
 
     family = HOPPER
@@ -233,10 +335,65 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     HealthyRunner, GymnasiumWalker2dEnv
 ):
-    """Gymnasium's `Walker2d-v5` with an editable body.
+    """Walk forwards in a plane: Gymnasium's `Walker2d-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Walker2d-v5`'s. See `HealthyRunner` for the
-    arguments, and for the start pose and the healthy heights, which follow from the body.
+    Actions, observations, rewards and infos equal `Walker2d-v5`'s.
+
+    ## Action space
+    `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gear of 100 N·m. An action
+    lasts 0.008 s.
+
+    | Num | Action                 | Min | Max | Unit |
+    | --- | ---------------------- | --- | --- | ---- |
+    | 0   | thigh_joint/motor      | -1  | 1   | 1    |
+    | 1   | leg_joint/motor        | -1  | 1   | 1    |
+    | 2   | foot_joint/motor       | -1  | 1   | 1    |
+    | 3   | thigh_left_joint/motor | -1  | 1   | 1    |
+    | 4   | leg_left_joint/motor   | -1  | 1   | 1    |
+    | 5   | foot_left_joint/motor  | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (17,), float64)`, for the unedited body:
+
+    | Num   | Observation            | Min     | Max    | Unit  |
+    | ----- | ---------------------- | ------- | ------ | ----- |
+    | 0     | rootz/position         | -inf    | inf    | m     |
+    | 1     | rooty/angle            | -inf    | inf    | rad   |
+    | 2     | thigh_joint/angle      | -2.618  | 0      | rad   |
+    | 3     | leg_joint/angle        | -2.618  | 0      | rad   |
+    | 4     | foot_joint/angle       | -0.7854 | 0.7854 | rad   |
+    | 5     | thigh_left_joint/angle | -2.618  | 0      | rad   |
+    | 6     | leg_left_joint/angle   | -2.618  | 0      | rad   |
+    | 7     | foot_left_joint/angle  | -0.7854 | 0.7854 | rad   |
+    | 8     | rootx/velocity         | -10     | 10     | m/s   |
+    | 9     | rootz/velocity         | -10     | 10     | m/s   |
+    | 10-16 | */velocity             | -10     | 10     | rad/s |
+
+    ## Reward
+    `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
+    minus `0.001 sum(action^2)`.
+
+    ## Start
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.005). Joints
+    stay inside their limits and feet above the floor.
+
+    ## End
+    Terminated when the torso is below 0.8 m or above 2 m, or leans by more than 1 rad. For other
+    bodies these heights scale with their standing height. Truncated after 1,000 steps.
+
+    ## Info
+    `x_position`, and `z_distance_from_origin`, m; `x_velocity`, m/s; `reward_forward`,
+    `reward_ctrl` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
+        healthy_z_range: Heights of the torso between which the body is healthy, m; None
+            derives them from the body.
+        **arguments: All other arguments of `Walker2d-v5` and of `Reshapable`.
     """
 
     family = WALKER2D
@@ -246,10 +403,51 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Runner, GymnasiumSwimmerEnv
 ):
-    """Gymnasium's `Swimmer-v5` with an editable body.
+    """Swim forwards in a plane: Gymnasium's `Swimmer-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Swimmer-v5`'s. It swims in the horizontal
-    plane and has no standing height. See `Runner` for the arguments.
+    Actions, observations, rewards and infos equal `Swimmer-v5`'s.
+
+    ## Action space
+    `Box(-1, 1, (2,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
+    lasts 0.04 s.
+
+    | Num | Action           | Min | Max | Unit |
+    | --- | ---------------- | --- | --- | ---- |
+    | 0   | motor1_rot/motor | -1  | 1   | 1    |
+    | 1   | motor2_rot/motor | -1  | 1   | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (8,), float64)`, for the unedited body:
+
+    | Num | Observation         | Min    | Max   | Unit  |
+    | --- | ------------------- | ------ | ----- | ----- |
+    | 0   | free_body_rot/angle | -inf   | inf   | rad   |
+    | 1   | motor1_rot/angle    | -1.745 | 1.745 | rad   |
+    | 2   | motor2_rot/angle    | -1.745 | 1.745 | rad   |
+    | 3   | slider1/velocity    | -inf   | inf   | m/s   |
+    | 4   | slider2/velocity    | -inf   | inf   | m/s   |
+    | 5-7 | */velocity          | -inf   | inf   | rad/s |
+
+    ## Reward
+    `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.0001 sum(action^2)`.
+
+    ## Start
+    Straight and at rest, with uniform noise of `reset_noise_scale` (0.1); it has no standing
+    height.
+
+    ## End
+    Never terminated; truncated after 1,000 steps.
+
+    ## Info
+    `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
+    `reward_forward` and `reward_ctrl`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
+        **arguments: All arguments of `Swimmer-v5` and of `Reshapable`.
     """
 
     family = SWIMMER
@@ -259,11 +457,102 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     HealthyRunner, GymnasiumHumanoidEnv
 ):
-    """Gymnasium's `Humanoid-v5` with an editable body.
+    """Walk forwards on two legs with arms and a waist: `Humanoid-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Humanoid-v5`'s. See `HealthyRunner` for the
-    arguments, and for the start pose and the healthy heights, which follow from the body: the knees
-    start at their limit, bent by 2 degrees, where Gymnasium's start straight.
+    Actions, observations, rewards and infos equal `Humanoid-v5`'s.
+
+    ## Action space
+    `Box(-0.4, 0.4, (17,), float32)`: torques of the motors divided by their gears: 300 N·m for the
+    hips' y axes, 200 N·m for the knees, 25 N·m for the arms and 100 N·m for all others. An action
+    lasts 0.015 s.
+
+    | Num | Action                | Min  | Max | Unit |
+    | --- | --------------------- | ---- | --- | ---- |
+    | 0   | abdomen_y/motor       | -0.4 | 0.4 | 1    |
+    | 1   | abdomen_z/motor       | -0.4 | 0.4 | 1    |
+    | 2   | abdomen_x/motor       | -0.4 | 0.4 | 1    |
+    | 3   | right_hip_x/motor     | -0.4 | 0.4 | 1    |
+    | 4   | right_hip_z/motor     | -0.4 | 0.4 | 1    |
+    | 5   | right_hip_y/motor     | -0.4 | 0.4 | 1    |
+    | 6   | right_knee/motor      | -0.4 | 0.4 | 1    |
+    | 7   | left_hip_x/motor      | -0.4 | 0.4 | 1    |
+    | 8   | left_hip_z/motor      | -0.4 | 0.4 | 1    |
+    | 9   | left_hip_y/motor      | -0.4 | 0.4 | 1    |
+    | 10  | left_knee/motor       | -0.4 | 0.4 | 1    |
+    | 11  | right_shoulder1/motor | -0.4 | 0.4 | 1    |
+    | 12  | right_shoulder2/motor | -0.4 | 0.4 | 1    |
+    | 13  | right_elbow/motor     | -0.4 | 0.4 | 1    |
+    | 14  | left_shoulder1/motor  | -0.4 | 0.4 | 1    |
+    | 15  | left_shoulder2/motor  | -0.4 | 0.4 | 1    |
+    | 16  | left_elbow/motor      | -0.4 | 0.4 | 1    |
+
+    ## Observation space
+    `Box(-inf, inf, (348,), float64)`, for the unedited body:
+
+    | Num     | Observation           | Min     | Max      | Unit            |
+    | ------- | --------------------- | ------- | -------- | --------------- |
+    | 0       | torso/z               | -inf    | inf      | m               |
+    | 1       | torso/qw              | -1      | 1        | 1               |
+    | 2       | torso/qx              | -1      | 1        | 1               |
+    | 3       | torso/qy              | -1      | 1        | 1               |
+    | 4       | torso/qz              | -1      | 1        | 1               |
+    | 5       | abdomen_z/angle       | -0.7854 | 0.7854   | rad             |
+    | 6       | abdomen_y/angle       | -1.309  | 0.5236   | rad             |
+    | 7       | abdomen_x/angle       | -0.6109 | 0.6109   | rad             |
+    | 8       | right_hip_x/angle     | -0.4363 | 0.08727  | rad             |
+    | 9       | right_hip_z/angle     | -1.047  | 0.6109   | rad             |
+    | 10      | right_hip_y/angle     | -1.92   | 0.3491   | rad             |
+    | 11      | right_knee/angle      | -2.793  | -0.03491 | rad             |
+    | 12      | left_hip_x/angle      | -0.4363 | 0.08727  | rad             |
+    | 13      | left_hip_z/angle      | -1.047  | 0.6109   | rad             |
+    | 14      | left_hip_y/angle      | -1.92   | 0.3491   | rad             |
+    | 15      | left_knee/angle       | -2.793  | -0.03491 | rad             |
+    | 16      | right_shoulder1/angle | -1.484  | 1.047    | rad             |
+    | 17      | right_shoulder2/angle | -1.484  | 1.047    | rad             |
+    | 18      | right_elbow/angle     | -1.571  | 0.8727   | rad             |
+    | 19      | left_shoulder1/angle  | -1.047  | 1.484    | rad             |
+    | 20      | left_shoulder2/angle  | -1.047  | 1.484    | rad             |
+    | 21      | left_elbow/angle      | -1.571  | 0.8727   | rad             |
+    | 22      | torso/vx              | -inf    | inf      | m/s             |
+    | 23      | torso/vy              | -inf    | inf      | m/s             |
+    | 24      | torso/vz              | -inf    | inf      | m/s             |
+    | 25      | torso/wx              | -inf    | inf      | rad/s           |
+    | 26      | torso/wy              | -inf    | inf      | rad/s           |
+    | 27      | torso/wz              | -inf    | inf      | rad/s           |
+    | 28-44   | */velocity            | -inf    | inf      | rad/s           |
+    | 45-174  | */inertia/*           | -inf    | inf      | kg·m², kg·m, kg |
+    | 175-252 | */twist/*             | -inf    | inf      | rad/s, m/s      |
+    | 253-269 | */drive               | -inf    | inf      | N·m             |
+    | 270-347 | */contact/*           | -inf    | inf      | N·m, N          |
+
+    ## Reward
+    `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 5 while healthy, plus 1.25 times
+    the velocity of the centre of mass along x, m/s, minus `0.1 sum(action^2)`, minus `5e-7
+    sum(force^2)` of the contact forces and torques, which is at most 10.
+
+    ## Start
+    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
+    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.01). Joints
+    stay inside their limits and feet above the floor. The knees start at their limit, bent by 2
+    degrees, where Gymnasium's start straight.
+
+    ## End
+    Terminated when the torso is below 1 m or above 2 m. For other bodies these heights scale with
+    their standing height. Truncated after 1,000 steps.
+
+    ## Info
+    `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
+    `tendon_length`, m, and `tendon_velocity`, m/s; `reward_forward`, `reward_ctrl`,
+    `reward_contact` and `reward_survive`. `diverged` if the simulation has diverged.
+
+    ## Versions
+    v1: the first.
+
+    Args:
+        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
+        healthy_z_range: Heights of the torso between which the body is healthy, m; None
+            derives them from the body.
+        **arguments: All other arguments of `Humanoid-v5` and of `Reshapable`.
     """
 
     family = HUMANOID

@@ -126,14 +126,33 @@ class RangesEnv(DriveEnv):
     the arithmetic of its guard is: a step takes a sixth of the time or less, the tank's a third.
 
     ## Action space
-    That of `VehicleEnv`: `Box(-1, 1, (2,), float32)`, `[steering, throttle]`, for one control
-    period of the profile, 1/20 s. Where the vehicle stands, a throttle other than 0 acts with a
-    size of at least 0.25, which moves it.
+    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. It acts for one control period
+    of the profile, 1/20 s. Where the vehicle stands, a throttle other than 0 acts with a size of at
+    least 0.25, which moves it.
+
+    | Num | Action   | Min | Max | Unit |
+    | --- | -------- | --- | --- | ---- |
+    | 0   | steering | -1  | 1   | 1    |
+    | 1   | throttle | -1  | 1   | 1    |
 
     ## Observation space
-    `Box((11,), float32)`: distances from the middle of the front bumper to walls and obstacles at
-    `BEARINGS_DEG`, m, from 0 to `FARTHEST_M`; speed along the heading, m/s; rate of turn, rad/s,
+    `Box((11,), float32)`: distances from the middle of the front bumper to walls and obstacles, by
+    their bearings, positive to the left; speed along the heading; and rate of turn,
     counter-clockwise.
+
+    | Num | Observation  | Min | Max | Unit  |
+    | --- | ------------ | --- | --- | ----- |
+    | 0   | range/-90deg | 0   | 6   | m     |
+    | 1   | range/-60deg | 0   | 6   | m     |
+    | 2   | range/-35deg | 0   | 6   | m     |
+    | 3   | range/-15deg | 0   | 6   | m     |
+    | 4   | range/+0deg  | 0   | 6   | m     |
+    | 5   | range/+15deg | 0   | 6   | m     |
+    | 6   | range/+35deg | 0   | 6   | m     |
+    | 7   | range/+60deg | 0   | 6   | m     |
+    | 8   | range/+90deg | 0   | 6   | m     |
+    | 9   | speed        | -5  | 5   | m/s   |
+    | 10  | yaw_rate     | -15 | 15  | rad/s |
 
     ## Reward
     `DriveReward` with a metre of progress along the course for a metre forward, minus 3 for each
@@ -148,6 +167,9 @@ class RangesEnv(DriveEnv):
 
     ## Info
     As `VehicleEnv`: `progress`, `collisions`, `pose`, `course`, `standing`, `reward_terms`.
+
+    ## Versions
+    v1: the first.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".

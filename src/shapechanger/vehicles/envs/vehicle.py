@@ -43,8 +43,13 @@ class VehicleEnv(DriveEnv):
     twin, or over the link.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`: `[steering, throttle]`; -1 steers left, +1 drives forward. It acts
-    for one control period of the profile, 1/20 s.
+    `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. It acts for one control period
+    of the profile, 1/20 s.
+
+    | Num | Action   | Min | Max | Unit |
+    | --- | -------- | --- | --- | ---- |
+    | 0   | steering | -1  | 1   | 1    |
+    | 1   | throttle | -1  | 1   | 1    |
 
     ## Observation space
     The camera's frame, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
@@ -70,6 +75,9 @@ class VehicleEnv(DriveEnv):
     `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`, `armed`, `emergency`, `absent`,
     `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
 
+    ## Versions
+    v1: the first.
+
     Args:
         vehicle: "car", "tank", "boat" or "truck".
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the vehicle's
@@ -78,7 +86,7 @@ class VehicleEnv(DriveEnv):
         steering: Replaces the profile's steering; None to keep it.
         size: Width and height of frames in pixels; None for the profile's.
         image: Whether observations include the frame.
-        state: Whether observations include the state next tos the frame.
+        state: Whether observations include the state next to the frame.
         reward: Weights by name that replace those of the profile.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
         randomise: Whether `reset` samples light, textures and the camera's pose too.
@@ -238,15 +246,31 @@ class WaypointEnv(WaypointView, DriveEnv):
     the vehicle turns into steering by its own `SteeringResponse`, measured when the env is made.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`: bearing of the free way `AHEAD_M` ahead, in `WIDEST_RAD`, positive
-    to the right; and the speed, -1 for standing and 1 for full throttle. It acts for one control
-    period, 1/20 s.
+    `Box(-1, 1, (2,), float32)`: bearing of the free way 0.8 m ahead, where 1 is 1 rad to the right;
+    and the speed, -1 for standing and 1 for full throttle. It acts for one control period, 1/20 s.
+
+    | Num | Action           | Min | Max | Unit |
+    | --- | ---------------- | --- | --- | ---- |
+    | 0   | waypoint/bearing | -1  | 1   | 1    |
+    | 1   | waypoint/speed   | -1  | 1   | 1    |
 
     ## Observation space
     The rectified frame, RGB, `uint8`, shape (48, 80, 3).
 
-    ## Reward, start, end and info
-    Those of `RangesEnv`, or of `VehicleEnv` with `sensed`.
+    ## Reward
+    The terms of `RangesEnv`, or of `VehicleEnv` with `sensed`.
+
+    ## Start
+    At a random place of a course that the seed draws, looking along it, at rest.
+
+    ## End
+    Terminated by a collision, unless `put_back`. Truncated after 1,000 steps.
+
+    ## Info
+    The same keys as `RangesEnv`, or as `VehicleEnv` with `sensed`.
+
+    ## Versions
+    v1: the first.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
