@@ -39,9 +39,6 @@ class _Lgpio(types.ModuleType):
     def gpiochip_close(self, handle: int) -> None:
         self.closed = True
 
-    def gpio_get_chip_info(self, handle: int) -> tuple[int, int, str, str]:
-        return 0, 58, "gpiochip0", "pinctrl-bcm2711"
-
     def gpio_claim_input(self, handle: int, pin: int, flags: int = 0) -> None:
         self.outputs.discard(pin)
         self.pwm.pop(pin, None)
@@ -143,32 +140,12 @@ def test_active_low_output_stays_high_when_opened_and_closed(lgpio: _Lgpio) -> N
     assert (26 in lgpio.outputs, lgpio.levels[26]) == (True, 1)
 
 
-def test_closing_servo_pins_continues_after_a_failure(
-    lgpio: _Lgpio, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pins = importlib.import_module(_OURS).LgpioServoPins()
-    for pin in (17, 18, 19):
-        pins.pulse(pin, 1500, 50)
-    send = lgpio.tx_servo
-
-    def fail_on_18(handle: int, pin: int, width_us: int, hz: int) -> None:
-        if pin == 18:
-            raise lgpio.error("bad")
-        send(handle, pin, width_us, hz)
-
-    monkeypatch.setattr(lgpio, "tx_servo", fail_on_18)
-    with pytest.raises(lgpio.error):
-        pins.close()
-    assert (lgpio.levels[17], lgpio.levels[19], lgpio.closed) == (0, 0, True)
-
-
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
-    """Closing sets the pin low, where lgpio keeps its present level."""
-    pins = importlib.import_module(_OURS).LgpioServoPins()
-    pins.pulse(17, 1503, 50)
-    assert lgpio.pulses[17] == 1503
-    pins.close()
-    assert (lgpio.pulses[17], lgpio.levels[17], lgpio.closed) == (0, 0, True)
-    with pytest.raises(OSError, match="closed"):
-        pins.pulse(17, 1500, 50)
-    pins.close()
+    """A width of 0 sets the pin low, where lgpio keeps its present level."""
+    factory = _factory()
+    factory.pulse(17, 1503, 50)
+    assert (lgpio.pulses[17], lgpio.levels[17]) == (1503, 1)
+    factory.pulse(17, 0, 50)
+    assert (lgpio.pulses[17], lgpio.levels[17]) == (0, 0)
+    factory.close()
+    assert (17 in lgpio.outputs, lgpio.levels[17], lgpio.closed) == (True, 0, True)

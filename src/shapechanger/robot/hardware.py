@@ -82,7 +82,6 @@ class I2cBus(Protocol):
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
         """Send one byte to a chip without registers."""
-        ...
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
         """Read consecutive registers."""
@@ -90,29 +89,9 @@ class I2cBus(Protocol):
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
         """Write consecutive registers, one byte each."""
-        ...
 
     def close(self) -> None:
         """Close the bus."""
-        ...
-
-
-class ServoPins(Protocol):
-    """Servo pulses on pins, as of `lgpio.tx_servo`."""
-
-    def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses on a pin.
-
-        Args:
-            pin: BCM number.
-            width_us: Width of a pulse, us; 0 ends them.
-            frequency_hz: Pulses per second.
-        """
-        ...
-
-    def close(self) -> None:
-        """End all pulses."""
-        ...
 
 
 class Hardware:
@@ -122,24 +101,31 @@ class Hardware:
 
     Args:
         _: Argument of a twin's hardware.
+
+    Attributes:
+        clock: Clock of this process.
     """
 
     def __init__(self, _: str = "") -> None:
         self.clock = Clock()
-        """Clock of this process."""
         self._pin_factory: Any = None
 
     def pin_factory(self) -> Any:
         """Return gpiozero's factory for lgpio, independent of the environment variables.
 
-        Its pins go low at once; see `lgpio_pins`.
+        Its pins go low at once, and it sends servo pulses; see `lgpio_pins.LowAtOnceFactory`.
 
         Raises:
             RobotError: If the pins do not exist or cannot be opened.
         """
         if self._pin_factory is None:
-            # Of gpiozero or lgpio, or one of them is missing.
-            with translate_errors(Exception, to=_no_pins):
+            with translate_errors(
+                Exception,  # Of gpiozero or lgpio, or one of them is missing.
+                to=lambda error: RobotError(
+                    f"Cannot open this machine's pins ({str(error) or type(error).__name__}); "
+                    "`shapechanger robot serve --twin` needs none."
+                ),
+            ):
                 from shapechanger.robot.lgpio_pins import LowAtOnceFactory  # lgpio, an extra.
 
                 self._pin_factory = LowAtOnceFactory()
@@ -150,12 +136,6 @@ class Hardware:
         from smbus2 import SMBus
 
         return SMBus(bus)
-
-    def servo_pins(self) -> ServoPins:
-        """Open the pins that send servo pulses, with lgpio."""
-        from shapechanger.robot.lgpio_pins import LgpioServoPins  # lgpio.
-
-        return LgpioServoPins()
 
     def servo_port(self, settings: Any, open_port: Callable[[Any], Any]) -> Any:
         """Open the port of a servo bus, a `ServoPort` for `BusSettings`, both of `drivers.servos`.
@@ -171,13 +151,6 @@ class Hardware:
         if self._pin_factory is not None:
             self._pin_factory.close()
             self._pin_factory = None
-
-
-def _no_pins(error: Exception) -> RobotError:
-    return RobotError(
-        f"Cannot open this machine's pins ({str(error) or type(error).__name__}); "
-        "`shapechanger robot serve --twin` needs none."
-    )
 
 
 def load(place: str) -> Any:

@@ -13,13 +13,10 @@ immediately.
 
 from __future__ import annotations
 
-from contextlib import ExitStack, suppress
-from typing import Any, Final
+from typing import Any
 
 import lgpio
 from gpiozero.pins.lgpio import LGPIOFactory, LGPIOPin
-
-_MOST_CHIPS: Final = 32
 
 
 class LowAtOncePin(LGPIOPin):
@@ -57,63 +54,30 @@ class LowAtOncePin(LGPIOPin):
 
 
 class LowAtOnceFactory(LGPIOFactory):
-    """Factory of `LowAtOncePin`."""
-
-    def __init__(self, chip: int | None = None) -> None:
-        super().__init__(chip)
-        self.pin_class: Any = LowAtOncePin
-
-
-def _open_gpio_chip() -> int:
-    """Open the GPIO chip of the header's pins.
-
-    Its number differs between models and kernels; its label does not: pinctrl-bcm2835,
-    pinctrl-bcm2711 or pinctrl-rp1.
-    """
-    for chip in range(_MOST_CHIPS):
-        with suppress(lgpio.error):  # There are fewer, or it is another user's.
-            handle = lgpio.gpiochip_open(chip)
-            _, _, _, label = lgpio.gpio_get_chip_info(handle)
-            if label.startswith("pinctrl-"):
-                return handle
-            lgpio.gpiochip_close(handle)
-    raise OSError(
-        "no gpiochip of a Raspberry Pi's header can be opened; its user must be in the group gpio"
-    )
-
-
-class LgpioServoPins:
-    """Servo pulses on pins; see `ServoPins`.
-
-    Their timing jitters, as lgpio's own documentation says; a PCA9685 or the kernel's PWM
-    (`over = "sysfs"`) is steadier. lgpio takes 500 to 2500 us at 40 to 500 Hz.
-    """
+    """Factory of `LowAtOncePin`, which also sends servo pulses."""
 
     def __init__(self) -> None:
-        self._handle: int | None = _open_gpio_chip()
-        self._pins: set[int] = set()
+        super().__init__()
+        self.pin_class: Any = LowAtOncePin
+        self._pulsed: set[int] = set()
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses of this width from the next cycle on; 0 stops them immediately."""
+        """Send servo pulses on a pin from the next cycle on; a width of 0 stops them at once.
+
+        The pin stays a low output until the factory is closed. The timing jitters, as lgpio's own
+        documentation says; a PCA9685 or the kernel's PWM (`over = "sysfs"`) is steadier.
+
+        Args:
+            pin: BCM number.
+            width_us: Width of a pulse, 500 to 2500 us, or 0.
+            frequency_hz: Pulses per second, 40 to 500.
+        """
         if self._handle is None:
-            raise OSError("the servo pins are closed")
-        if pin not in self._pins:
+            raise OSError("the pins are closed")
+        if pin not in self._pulsed:
             lgpio.gpio_claim_output(self._handle, pin, 0)
-            self._pins.add(pin)
+            self._pulsed.add(pin)
         lgpio.tx_servo(self._handle, pin, width_us, frequency_hz)
         if width_us == 0:
             # lgpio releases the pin at its current level, see the module.
             lgpio.gpio_write(self._handle, pin, 0)
-
-    def close(self) -> None:
-        """Stop all pulses; the pins stay low outputs until the chip is closed."""
-        if self._handle is None:
-            return
-        with ExitStack() as stack:
-            stack.callback(self._let_go, self._handle)
-            for pin in self._pins:
-                stack.callback(self.pulse, pin, 0, 50)
-
-    def _let_go(self, handle: int) -> None:
-        self._handle = None
-        lgpio.gpiochip_close(handle)

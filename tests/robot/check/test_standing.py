@@ -165,7 +165,7 @@ def _hardware(where: str = "", act: Callable[[], object] = lambda: None) -> Any:
         raise RobotError("Not here.")
 
     made: Any = SimpleNamespace(clock=Clock())
-    pins = dict.fromkeys(("pin_factory", "i2c", "servo_pins", "servo_port"), refuse)
+    pins = dict.fromkeys(("pin_factory", "i2c", "servo_port"), refuse)
     camera = {"open": lambda: made, "read": lambda: Frame(b"\xff\xd8", 1), "close": lambda: None}
     for name, other in (pins | camera).items():
         setattr(made, name, lambda *_, run=act if name == where else other: run())

@@ -68,13 +68,17 @@ class ScriptedPin(MockPWMPin):
 
 
 class ScriptedFactory(MockFactory):
-    """Factory of scripted pins."""
+    """Factory of scripted pins, and the width of the servo pulses on each."""
 
     def __init__(self) -> None:
         super().__init__(pin_class=ScriptedPin)
         self.now_s = 0.0
         self.log: list[tuple[str, float]] = []
         self.fault = Fault()
+        self.widths_us: dict[int, int] = {}
+
+    def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
+        self.fault.during(functools.partial(self.widths_us.__setitem__, pin, width_us))
 
     def drive(self, pin: int, level: int, at_s: float) -> None:
         self.now_s = at_s
@@ -112,20 +116,6 @@ class FakeBus:
         self.closed += 1
 
 
-class FakeServoPins:
-    """Records the pulse width of each pin."""
-
-    def __init__(self, fault: Fault) -> None:
-        self.widths_us: dict[int, int] = {}
-        self._fault = fault
-
-    def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        self._fault.during(functools.partial(self.widths_us.__setitem__, pin, width_us))
-
-    def close(self) -> None:
-        """Close it."""
-
-
 class FakeHardware:
     """All fake hardware of a robot.
 
@@ -138,16 +128,12 @@ class FakeHardware:
         self.factory = ScriptedFactory()
         self.fault = self.factory.fault
         self.bus = FakeBus(chips or {}, self.fault)
-        self.pulses = FakeServoPins(self.fault)
 
     def pin_factory(self) -> Any:
         return self.factory
 
     def i2c(self, bus: int) -> FakeBus:
         return self.bus
-
-    def servo_pins(self) -> FakeServoPins:
-        return self.pulses
 
     def servo_port(self, settings: BusSettings, open_port: object) -> ServoPort:
         """Raise, since servo buses are simulated elsewhere."""

@@ -64,7 +64,7 @@ class _Bench:
             pins.pop("GPIO5", None)  # Without a speed the direction has no effect.
         return {
             "pins": pins,
-            "pulses": {pin: us for pin, us in self.hardware.pulses.widths_us.items() if us},
+            "pulses": {pin: us for pin, us in self.hardware.factory.widths_us.items() if us},
             "channel": [chip.get(register, 0) for register in range(0x06 + 8, 0x06 + 12)],
             "asleep": chip[0x00] & 0x10,
             "kernel": {file.name: file.read_text() for file in self._folder.iterdir()},

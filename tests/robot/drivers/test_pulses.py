@@ -44,11 +44,11 @@ def test_servo_gets_no_pulse_before_the_first_write() -> None:
     """A pulse on opening would make the servo jump."""
     hardware = FakeHardware()
     servo = hardware.output("servo", **_AT)
-    assert hardware.pulses.widths_us == {}
+    assert hardware.factory.widths_us == {}
     assert servo.write(-0.5, 0) == -0.5
-    assert hardware.pulses.widths_us == {12: 1250}
+    assert hardware.factory.widths_us == {12: 1250}
     servo.release()
-    assert hardware.pulses.widths_us == {12: 0}
+    assert hardware.factory.widths_us == {12: 0}
     servo.close()
 
 
@@ -64,16 +64,16 @@ def test_controller_gets_neutral_until_it_is_armed() -> None:
     """Neutral is sent for `arm_s`, also after a release."""
     hardware = FakeHardware()
     esc = hardware.output("esc", **_AT)
-    assert hardware.pulses.widths_us == {12: 1500}
+    assert hardware.factory.widths_us == {12: 1500}
     assert esc.write(1.0, 5_000 * MS) == 0.0
     assert esc.write(1.0, 7_499 * MS) == 0.0
-    assert hardware.pulses.widths_us == {12: 1500}
+    assert hardware.factory.widths_us == {12: 1500}
     assert esc.write(1.0, 7_500 * MS) == 1.0
-    assert hardware.pulses.widths_us == {12: 2000}
+    assert hardware.factory.widths_us == {12: 2000}
     esc.release()
     assert esc.write(1.0, 8_000 * MS) == 0.0  # It needs neutral again.
     esc.close()
-    assert hardware.pulses.widths_us == {12: 0}
+    assert hardware.factory.widths_us == {12: 0}
 
 
 def _armed(reverse: str) -> tuple[Any, FakeHardware]:
@@ -87,7 +87,7 @@ def test_controller_without_a_brake_reverses_at_once_or_not(
 ) -> None:
     esc, hardware = _armed(reverse)
     assert esc.write(-1.0, 0) == value
-    assert hardware.pulses.widths_us == {12: us}
+    assert hardware.factory.widths_us == {12: us}
 
 
 def test_controller_brakes_before_it_reverses() -> None:
@@ -96,7 +96,7 @@ def test_controller_brakes_before_it_reverses() -> None:
     esc.write(1.0, 0)
     sent: list[tuple[float, int]] = []
     for ms in range(0, 600, 100):
-        sent.append((esc.write(-0.5, ms * MS), hardware.pulses.widths_us[12]))
+        sent.append((esc.write(-0.5, ms * MS), hardware.factory.widths_us[12]))
     assert sent == [(0, 1250), (0, 1250), (0, 1500), (0, 1500), (-0.5, 1250), (-0.5, 1250)]
     assert esc.write(0.0, 700 * MS) == 0.0
     assert esc.write(-0.5, 800 * MS) == -0.5  # It has not gone forward.

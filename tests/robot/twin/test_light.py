@@ -23,7 +23,6 @@ from shapechanger.robot.hardware import connect
 hardware = connect("shapechanger.robot.twin.hardware:connect", sys.argv[2])
 hardware.pin_factory()
 hardware.i2c(1)
-hardware.servo_pins()
 hardware.close()
 print(*sorted({name.partition(".")[0] for name in sys.modules}))
 """

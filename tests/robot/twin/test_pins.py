@@ -145,7 +145,7 @@ def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
     """Pulses have whole microseconds; when the process dies, the pin keeps a constant level."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
-        hardware.servo_pins().pulse(12, 1503, 50)
+        hardware.pin_factory().pulse(12, 1503, 50)
         assert operator.levels().pulses[12] == (1503, 50)
         die(hardware)
         levels = operator.levels()

@@ -51,7 +51,7 @@ def i2c_claims(bus: int, key: str, address: int, group: str = "") -> Iterator[Cl
 
 
 class I2cDevice:
-    """A chip on an I2C bus, whose errors name it.
+    """A chip on an I2C bus, whose errors name it; the base of its driver.
 
     Args:
         name: Name of the device, such as "Sensor 'imu'".
@@ -68,12 +68,12 @@ class I2cDevice:
         with device_errors(self.name):
             self._bus = hardware.i2c(keys.bus)
 
-    def read(self, register: int, length: int = 1) -> bytes:
+    def read_registers(self, register: int, length: int = 1) -> bytes:
         """Read consecutive registers."""
         with device_errors(self.name):
             return bytes(self._bus.read_i2c_block_data(self._address, register, length))
 
-    def write(self, register: int, *data: int) -> None:
+    def write_registers(self, register: int, *data: int) -> None:
         """Write consecutive registers, one byte each."""
         with device_errors(self.name):
             self._bus.write_i2c_block_data(self._address, register, data)

@@ -21,7 +21,9 @@ if TYPE_CHECKING:  # Only a twin has a world.
 
 _CONFIGURATION: Final = 0x00
 _BUS_VOLTAGE: Final = 0x02
-_CONTINUOUS_32_V: Final = (0x39, 0x9F)  # The value at power-up: 0x399F.
+_AT_POWER_ON: Final = 0x399F  # Configuration: 32 V, continuously.
+_RESET: Final = 0x8000  # Bit of the configuration.
+_CONVERSION_READY: Final = 0x2  # Bit of the bus voltage.
 _V_PER_STEP: Final = 0.004
 _STATUS_BITS: Final = 3  # Below the voltage: two flags and one unused bit.
 _PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shared.
@@ -33,32 +35,22 @@ class Ina219Keys(I2cKeys, frozen=True, kw_only=True):
     address: Annotated[int, Meta(ge=0x40, le=0x4F)] = 0x40
 
 
-class Ina219:
+class Ina219(I2cDevice):
     """Voltage sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        keys = Ina219Keys.of(plan.settings)
+        super().__init__(f"Sensor {plan.name!r}", Ina219Keys.of(plan.settings), hardware)
         self._read_ns: int | None = None
         self._volts = 0.0
-        self._device = I2cDevice(f"Sensor {plan.name!r}", keys, hardware)
-        self._device.write(_CONFIGURATION, *_CONTINUOUS_32_V)
+        self.write_registers(_CONFIGURATION, *_AT_POWER_ON.to_bytes(2))
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the voltage of the "battery" in V, updated ten times a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
-            word = int.from_bytes(self._device.read(_BUS_VOLTAGE, 2))
+            word = int.from_bytes(self.read_registers(_BUS_VOLTAGE, 2))
             self._volts = (word >> _STATUS_BITS) * _V_PER_STEP
             self._read_ns = now_ns
         return {"battery": self._volts}
-
-    def close(self) -> None:
-        """Close the bus."""
-        self._device.close()
-
-
-_RESET: Final = 0x8000  # Bit of the configuration.
-_AT_POWER_ON: Final = 0x399F
-_CONVERSION_READY: Final = 0x2
 
 
 class SimulatedIna219(SimulatedChip):

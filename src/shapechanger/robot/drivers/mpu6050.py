@@ -37,7 +37,8 @@ _RANGE_500_DEG_PER_S: Final = 1 << 3  # GYRO_CONFIG, FS_SEL.
 _RANGE_4_G: Final = 1 << 3  # ACCEL_CONFIG, AFS_SEL.
 _AWAKE: Final = 1  # PWR_MGMT_1: awake, clock from the x gyroscope.
 
-_M_PER_S2: Final = 9.80665 / 8192.0  # 8192 LSB/g at 4 g.
+_STANDARD_GRAVITY: Final = 9.80665  # m/s2
+_M_PER_S2: Final = _STANDARD_GRAVITY / 8192.0  # 8192 LSB/g at 4 g.
 _RAD_PER_S: Final = math.radians(1.0) / 65.5  # 65.5 LSB/(deg/s) at 500 deg/s.
 
 # A gyroscope at rest reads up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"). So
@@ -52,23 +53,22 @@ class Mpu6050Keys(I2cKeys, frozen=True, kw_only=True):
     address: Annotated[int, Meta(ge=0x68, le=0x69)] = 0x68
 
 
-class Mpu6050:
+class Mpu6050(I2cDevice):
     """Inertial sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        keys = Mpu6050Keys.of(plan.settings)
+        super().__init__(f"Sensor {plan.name!r}", Mpu6050Keys.of(plan.settings), hardware)
         self._zero_rad_per_s: float | None = None
-        self._device = device = I2cDevice(f"Sensor {plan.name!r}", keys, hardware)
-        (identity,) = device.read(_WHO_AM_I)
+        (identity,) = self.read_registers(_WHO_AM_I)
         if identity != _IDENTITY:
             raise RobotError(
-                f"{device.name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
+                f"{self.name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
                 f"not 0x{_IDENTITY:02x}."
             )
-        device.write(_PWR_MGMT_1, _AWAKE)
-        device.write(_CONFIG, _LOW_PASS_44_HZ)
-        device.write(_GYRO_CONFIG, _RANGE_500_DEG_PER_S)
-        device.write(_ACCEL_CONFIG, _RANGE_4_G)
+        self.write_registers(_PWR_MGMT_1, _AWAKE)
+        self.write_registers(_CONFIG, _LOW_PASS_44_HZ)
+        self.write_registers(_GYRO_CONFIG, _RANGE_500_DEG_PER_S)
+        self.write_registers(_ACCEL_CONFIG, _RANGE_4_G)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return acceleration forward and left in m/s², and yaw rate to the left in rad/s.
@@ -78,10 +78,10 @@ class Mpu6050:
         Raises:
             RobotError: If it does not respond, or sleeps, as after a loss of power.
         """
-        measured = self._device.read(_ACCEL_XOUT_H, _MEASURED.size)
+        measured = self.read_registers(_ACCEL_XOUT_H, _MEASURED.size)
         x, y, z, _, _, _, yaw = _MEASURED.unpack(measured)
         if x == y == z == 0:  # Not even gravity is measured.
-            raise RobotError(f"{self._device.name} is asleep: it lost power for a moment.")
+            raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
         rate = yaw * _RAD_PER_S
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
             zero = rate if self._zero_rad_per_s is None else self._zero_rad_per_s
@@ -92,16 +92,11 @@ class Mpu6050:
             "yaw_rate": rate - (self._zero_rad_per_s or 0.0),
         }
 
-    def close(self) -> None:
-        """Close the bus."""
-        self._device.close()
-
 
 _GYRO_ZOUT_L: Final = 0x48
 _RESET: Final = 0x80  # PWR_MGMT_1.
 _SLEEP: Final = 0x40
 
-_STANDARD_GRAVITY: Final = 9.80665  # m/s2
 _LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)  # Section 4.17.
 _LSB_PER_DEG_PER_S: Final = (131.0, 65.5, 32.8, 16.4)  # Section 4.19.
 _ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
@@ -145,15 +140,9 @@ class SimulatedMpu6050(SimulatedChip):
         seen = self._world.inputs()
         per_g = _LSB_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
         per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]
-        values = (
-            seen.acceleration_x / _STANDARD_GRAVITY * per_g,
-            seen.acceleration_y / _STANDARD_GRAVITY * per_g,
-            per_g,
-            _ROOM_TEMPERATURE,
-            0.0,
-            0.0,
-            math.degrees(seen.yaw_rate) * per_rate,
-        )
+        x, y = (a / _STANDARD_GRAVITY * per_g for a in (seen.acceleration_x, seen.acceleration_y))
+        yaw = math.degrees(seen.yaw_rate) * per_rate
+        values = (x, y, per_g, _ROOM_TEMPERATURE, 0.0, 0.0, yaw)
         words = [max(-32768, min(32767, round(value))) for value in values]
         _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *words)
 

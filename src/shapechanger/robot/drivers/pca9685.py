@@ -21,8 +21,8 @@ from shapechanger.robot.drivers.chip import Claim, PulseSource, device_errors
 from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, i2c_claims
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin
 from shapechanger.robot.drivers.simulation import (
+    NO_PULSE,
     DutyOf,
-    I2cChips,
     Levels,
     Pulse,
     PwmChannel,
@@ -79,29 +79,34 @@ def prescale_for(hz: float) -> int:
     return round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1
 
 
-class Pca9685:
+class Pca9685(I2cDevice):
     """One chip, shared by its channels within the process.
 
     The known state of each channel is cached, so that nothing is sent twice. A failed transfer may
     have taken partial effect; after one, all channels are in doubt, and the outputs are disabled,
     if there is a pin for it, until all channels have been rewritten.
+
+    Attributes:
+        hz: Frequency of the pulses, Hz.
+        output_enable: Pin at the OE input; -1 for none.
+        steps: Width of the pulses of each open channel, steps of 1/4096 of the period; None for a
+            channel in doubt.
+        step_us: Width of a step, µs: 4.88 µs at 50 Hz.
     """
 
     def __init__(self, keys: Pca9685Keys, hz: int, hardware: Hardware) -> None:
+        super().__init__("The PCA9685", keys, hardware)
         self.hz = hz
         self.output_enable = keys.output_enable
-        self.channels: set[int] = set()
+        self.steps: dict[int, int | None] = {}
         self._wakes_up_s = _WAKE_UP_S if hardware.clock.is_real else 0.0
         self._prescale = prescale_for(hz)
-        self._steps: dict[int, int] = {}  # By channel; missing for a channel in doubt.
+        self.step_us = (self._prescale + 1) / _OSCILLATOR_MHZ
         self._must_start = False
         self._unchanged = 0
         self._enable: Any = None
-        self._device = device = I2cDevice("The PCA9685", keys, hardware)
-        self.name = device.name
-        self._opened = ExitStack()
         with device_errors(self.name), ExitStack() as undo:
-            undo.callback(device.close)
+            undo.callback(self.close)
             if keys.output_enable != NO_PIN:
                 from gpiozero import DigitalOutputDevice  # Boards without such a pin need none.
 
@@ -113,31 +118,24 @@ class Pca9685:
             self._start()
             if self._enable is not None:
                 # Pulses left by a dead process must not return with the first pulse.
-                device.write(_ALL_OFF_H, _NO_PULSE >> 8)
+                self.write_registers(_ALL_OFF_H, _NO_PULSE >> 8)
             self._opened = undo.pop_all()
 
-    def step_us(self) -> float:
-        """Width of one step, µs: 4.88 µs at 50 Hz."""
-        return (self._prescale + 1) / _OSCILLATOR_MHZ
-
     def send(self, channel: int, steps: int) -> None:
-        """Send pulses.
-
-        Args:
-            channel: Channel of the chip, 0 to 15.
-            steps: Width of a pulse, steps of 1/4096 of the period.
-        """
-        if self._steps.get(channel) != steps:
+        """Send pulses of a width in steps."""
+        if self.steps[channel] != steps:
             self._write(channel, steps)
             return
         self._unchanged += 1
         if self._unchanged >= _UNCHANGED_PER_CHECK:
             self._unchanged = 0
-            self._check()
+            with self._doubt_on_failure():
+                if self.read_registers(_MODE1)[0] & _SLEEP:
+                    raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
 
     def stop(self, channel: int) -> None:
         """Stop the pulses of a channel; after the last one, disable the outputs."""
-        self._steps.pop(channel, None)
+        self.steps[channel] = None
         with ExitStack() as stack:
             stack.callback(self._write, channel, _NO_PULSE)
             if not self._sends():
@@ -145,42 +143,34 @@ class Pca9685:
 
     def leave(self, channel: int) -> None:
         """Remove a channel; the last one closes the chip."""
-        self.channels.discard(channel)
-        self._steps.pop(channel, None)
-        if not self.channels:
+        self.steps.pop(channel, None)
+        if not self.steps:
             self._opened.close()
 
     def _start(self) -> None:
-        device = self._device
-        (mode,), (prescale,) = device.read(_MODE1), device.read(_PRESCALE)
+        (mode,), (prescale,) = self.read_registers(_MODE1), self.read_registers(_PRESCALE)
         asleep = mode & _SLEEP or prescale != self._prescale
         if asleep:
             # No pulses first, so that none restart with the oscillator.
-            device.write(_ALL_OFF_H, _NO_PULSE >> 8)
-            device.write(_MODE1, _AUTO_INCREMENT | _SLEEP)
-            device.write(_PRESCALE, self._prescale)
-        device.write(_MODE2, _TOTEM_POLE)
-        device.write(_MODE1, _AUTO_INCREMENT)
+            self.write_registers(_ALL_OFF_H, _NO_PULSE >> 8)
+            self.write_registers(_MODE1, _AUTO_INCREMENT | _SLEEP)
+            self.write_registers(_PRESCALE, self._prescale)
+        self.write_registers(_MODE2, _TOTEM_POLE)
+        self.write_registers(_MODE1, _AUTO_INCREMENT)
         if asleep and self._wakes_up_s:
             time.sleep(self._wakes_up_s)
         self._must_start = False
-
-    def _check(self) -> None:
-        """Check that the chip is awake."""
-        with self._doubt_on_failure():
-            if self._device.read(_MODE1)[0] & _SLEEP:
-                raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
 
     def _write(self, channel: int, steps: int) -> None:
         with self._doubt_on_failure():
             if self._must_start:
                 self._start()
-            self._device.write(_CHANNEL_0 + 4 * channel, 0, 0, steps & 0xFF, steps >> 8)
-            self._steps[channel] = steps
-            self._switch(self._sends() and self.channels <= self._steps.keys())
+            self.write_registers(_CHANNEL_0 + 4 * channel, 0, 0, steps & 0xFF, steps >> 8)
+            self.steps[channel] = steps
+            self._switch(self._sends() and None not in self.steps.values())
 
     def _sends(self) -> bool:
-        return any(steps != _NO_PULSE for steps in self._steps.values())
+        return any(steps not in (None, _NO_PULSE) for steps in self.steps.values())
 
     def _switch(self, on: bool) -> None:
         if self._enable is not None:
@@ -192,25 +182,46 @@ class Pca9685:
         with ExitStack() as failed:
             failed.callback(self._switch, False)
             failed.callback(setattr, self, "_must_start", True)
-            failed.callback(self._steps.clear)
+            failed.callback(self.steps.update, dict.fromkeys(self.steps))
             yield
             failed.pop_all()
 
 
-class Pca9685Channel:
-    """One channel; see `PulseChannel`."""
+# The chips of this process, by hardware, bus and address, while a channel has them.
+_OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 
-    def __init__(self, chip: Pca9685, channel: int) -> None:
-        chip.channels.add(channel)
-        self._chip = chip
-        self._channel = channel
-        self._opened = ExitStack()
-        self._opened.callback(chip.leave, channel)
-        self._opened.callback(chip.stop, channel)
+
+class Pca9685Channel:
+    """One channel, opened without pulses; see `PulseChannel`.
+
+    Raises:
+        RobotError: If the chip does not respond, the channel is used twice, or another channel of
+            the chip has another frequency or enable pin.
+    """
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        keys, hz = Pca9685Keys.of(plan.settings), plan.settings["hz"]
+        place = (hardware, keys.bus, keys.address)
+        chip = _OPEN.get(place)
+        if chip is None or not chip.steps:
+            chip = _OPEN[place] = Pca9685(keys, hz, hardware)
+        if (chip.hz, chip.output_enable) != (hz, keys.output_enable):
+            raise RobotError(
+                f"{chip.name} has one frequency and one output_enable for all of its channels, not "
+                f"{chip.hz} and {hz} Hz, GPIO{chip.output_enable} and GPIO{keys.output_enable}."
+            )
+        if keys.channel in chip.steps:
+            raise RobotError(f"Channel {keys.channel} of {chip.name} is used twice.")
+        self._chip, self._channel = chip, keys.channel
+        with ExitStack() as undo:
+            undo.callback(chip.leave, keys.channel)  # A retry finds the channel free.
+            self.release()
+            undo.callback(self.release)
+            self._opened = undo.pop_all()
 
     def write_us(self, width_us: float) -> float:
         """Send pulses of this width, rounded to steps; see `PulseChannel.write_us`."""
-        step_us = self._chip.step_us()
+        step_us = self._chip.step_us
         steps = min(max(round(width_us / step_us), 0), _STEPS - 1)
         self._chip.send(self._channel, steps)
         return steps * step_us
@@ -222,37 +233,6 @@ class Pca9685Channel:
     def close(self) -> None:
         """Stop the pulses and close, even if the chip does not respond."""
         self._opened.close()
-
-
-# The chips of this process, by hardware, bus and address, while a channel has them.
-_OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
-
-
-def open_channel(plan: OutputPlan, hardware: Hardware) -> Pca9685Channel:
-    """Open a channel without pulses.
-
-    Raises:
-        RobotError: If the chip does not respond, the channel is used twice, or another channel of
-            the chip has another frequency or enable pin.
-    """
-    keys, hz = Pca9685Keys.of(plan.settings), plan.settings["hz"]
-    place = (hardware, keys.bus, keys.address)
-    chip = _OPEN.get(place)
-    if chip is None or not chip.channels:
-        chip = _OPEN[place] = Pca9685(keys, hz, hardware)
-    if (chip.hz, chip.output_enable) != (hz, keys.output_enable):
-        raise RobotError(
-            f"{chip.name} has one frequency and one output_enable for all of its channels, not "
-            f"{chip.hz} and {hz} Hz, GPIO{chip.output_enable} and GPIO{keys.output_enable}."
-        )
-    if keys.channel in chip.channels:
-        raise RobotError(f"Channel {keys.channel} of {chip.name} is used twice.")
-    channel = Pca9685Channel(chip, keys.channel)
-    with ExitStack() as undo:
-        undo.callback(chip.leave, keys.channel)  # A retry finds the channel free.
-        channel.release()
-        undo.pop_all()
-    return channel
 
 
 _CHANNELS: Final = 16
@@ -273,10 +253,8 @@ class SimulatedPca9685(SimulatedChip):
         self._registers = bytearray(256)
         # Section 7.3, table 4: after power-on it sleeps, with all channels fully off.
         self._registers[_MODE1] = 0x11
-        self._registers[0x01] = 0x04
-        self._registers[0x02:0x06] = bytes((0xE2, 0xE4, 0xE8, 0xE0))
-        for channel in range(_CHANNELS):
-            self._registers[_CHANNEL_0 + 4 * channel + 3] = _FULL
+        self._registers[0x01:0x06] = bytes((0x04, 0xE2, 0xE4, 0xE8, 0xE0))
+        self._registers[_CHANNEL_0 + 3 : _LAST_LED + 1 : 4] = bytes([_FULL]) * _CHANNELS
         self._registers[_PRESCALE] = 0x1E
         self._halted: set[int] = set()  # Channels that wait for RESTART after a sleep.
 
@@ -291,7 +269,7 @@ class SimulatedPca9685(SimulatedChip):
         ]
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, starting at a register; without auto-increment all of that register."""
+        """Read bytes from a register on; without auto-increment all of that register."""
         return [self._registers[at] for at in self._addressed(register, length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
@@ -312,8 +290,8 @@ class SimulatedPca9685(SimulatedChip):
             if self._registers[_MODE1] & _SLEEP:  # Section 7.3.5: only while it sleeps.
                 self._registers[at] = max(byte, _MIN_PRESCALE)
         elif _FIRST_ALL_LED <= at <= _ALL_OFF_H:
-            for channel in range(_CHANNELS):
-                self._registers[_CHANNEL_0 + 4 * channel + at - _FIRST_ALL_LED] = byte
+            first = _CHANNEL_0 + at - _FIRST_ALL_LED
+            self._registers[first : _LAST_LED + 1 : 4] = bytes([byte]) * _CHANNELS
             self._halted.clear()
         else:
             self._registers[at] = byte
@@ -354,14 +332,15 @@ def _pulse_of(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
     def pulse_us(levels: Levels) -> float:
         if keys.output_enable != NO_PIN and duty(levels, keys.output_enable) > 0.0:
             return 0.0
-        return levels.channels.get(channel, Pulse(0.0, 0.0)).us
+        return levels.channels.get(channel, NO_PULSE).us
 
     return pulse_us
 
 
-def _chips(plan: OutputPlan) -> I2cChips:
-    return {(plan.settings["bus"], plan.settings["address"]): SimulatedPca9685()}
-
-
-PCA9685: Final = PulseSource(keys=Pca9685Keys, open=open_channel, pulse_of=_pulse_of, chips=_chips)
+PCA9685: Final = PulseSource(
+    keys=Pca9685Keys,
+    open=Pca9685Channel,
+    pulse_of=_pulse_of,
+    chips=lambda plan: {(plan.settings["bus"], plan.settings["address"]): SimulatedPca9685()},
+)
 """A board with 16 channels of pulses."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Final, Literal
@@ -25,7 +25,7 @@ from shapechanger.robot.drivers.chip import (
     device_errors,
 )
 from shapechanger.robot.drivers.pins import Pin
-from shapechanger.robot.drivers.simulation import DutyOf, Levels, Pulse, WiredOutput
+from shapechanger.robot.drivers.simulation import NO_PULSE, DutyOf, Levels, WiredOutput
 from shapechanger.robot.hardware import Hardware
 
 Width = Annotated[int, Meta(ge=500, le=2500)]
@@ -98,11 +98,9 @@ class PulseRange:
 
 
 class _WholeMicroseconds:
-    """Channel with pulses of whole microseconds, sent only when they change."""
+    """Channel with pulses of whole microseconds, sent when they change; see `PulseChannel`."""
 
-    def __init__(self, pulse: Callable[[int], None]) -> None:
-        self._pulse = pulse
-        self._width_us: int | None = None
+    _width_us: int | None = None
 
     def write_us(self, width_us: float) -> float:
         """Send pulses of this width; see `PulseChannel.write_us`."""
@@ -113,28 +111,18 @@ class _WholeMicroseconds:
         """Stop the pulses; the pin stays low."""
         self._send(0)
 
+    def close(self) -> None:
+        """Stop the pulses."""
+        self._send(0)
+
     def _send(self, width_us: int) -> None:
         if width_us != self._width_us:
             self._width_us = None  # A failed write may still have taken effect.
             self._pulse(width_us)
             self._width_us = width_us
 
-
-class _PinChannel(_WholeMicroseconds):
-    """Pulses on a pin; see `ServoPins`."""
-
-    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
-        super().__init__(self._send_pulse)
-        self._pin: int = plan.settings["pin"]
-        self._hz: int = plan.settings["hz"]
-        self._pins = hardware.servo_pins()
-
-    def close(self) -> None:
-        with closing(self._pins):
-            self._send(0)
-
-    def _send_pulse(self, width_us: int) -> None:
-        self._pins.pulse(self._pin, width_us, self._hz)
+    def _pulse(self, width_us: int) -> None:
+        raise NotImplementedError
 
 
 class _LgpioKeys(Keys, frozen=True, kw_only=True):
@@ -147,9 +135,20 @@ class _LgpioKeys(Keys, frozen=True, kw_only=True):
     pin: Pin
 
 
+class _PinChannel(_WholeMicroseconds):
+    """Pulses on a pin, by its factory."""
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        self._pin, self._hz = plan.settings["pin"], plan.settings["hz"]
+        self._factory = hardware.pin_factory()
+
+    def _pulse(self, width_us: int) -> None:
+        self._factory.pulse(self._pin, width_us, self._hz)
+
+
 def _pulse_on_pin(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
     pin = plan.settings["pin"]
-    return lambda levels: levels.pulses.get(pin, Pulse(0.0, 0.0)).us
+    return lambda levels: levels.pulses.get(pin, NO_PULSE).us
 
 
 LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_of=_pulse_on_pin)
@@ -158,44 +157,6 @@ LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_of=_pulse_on
 
 _ROOT: Final = Path("/sys/class/pwm")
 _EXPORT_S: Final = 1.0  # udev takes a moment to assign a new channel to the group gpio.
-
-
-class SysfsPwm(_WholeMicroseconds):
-    """One channel of the PWM hardware; see `PulseChannel`."""
-
-    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
-        super().__init__(self._send_pulse)
-        keys = _SysfsKeys.of(plan.settings)
-        chip = _ROOT / f"pwmchip{keys.chip}"
-        self._name = f"Channel {keys.channel} of {chip}"
-        self._folder = chip / f"pwm{keys.channel}"
-        with device_errors(self._name):
-            if not self._folder.exists():
-                (chip / "export").write_text(f"{keys.channel}\n")
-            self._write_when_allowed("period", 1_000_000_000 // plan.settings["hz"])
-            self._send(0)
-            self._write("enable", 1)
-
-    def close(self) -> None:
-        """Stop the pulses and disable the channel."""
-        with device_errors(self._name), ExitStack() as stack:
-            stack.callback(self._write, "enable", 0)
-            self._send(0)
-
-    def _send_pulse(self, width_us: int) -> None:
-        with device_errors(self._name):
-            self._write("duty_cycle", width_us * 1000)
-
-    def _write(self, file: str, number: int) -> None:
-        (self._folder / file).write_text(f"{number}\n")
-
-    def _write_when_allowed(self, file: str, number: int) -> None:
-        deadline = time.monotonic() + _EXPORT_S
-        while time.monotonic() < deadline:
-            with suppress(PermissionError, FileNotFoundError):
-                return self._write(file, number)
-            time.sleep(0.01)
-        self._write(file, number)
 
 
 class _SysfsKeys(Keys, frozen=True, kw_only=True):
@@ -212,6 +173,43 @@ class _SysfsKeys(Keys, frozen=True, kw_only=True):
     def claims(self) -> Iterator[Claim]:
         """Return the claim of the channel."""
         yield Claim("channel", f"channel {self.channel} of PWM chip {self.chip}")
+
+
+class SysfsPwm(_WholeMicroseconds):
+    """One channel of the PWM hardware; see `PulseChannel`."""
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        keys = _SysfsKeys.of(plan.settings)
+        chip = _ROOT / f"pwmchip{keys.chip}"
+        self._name = f"Channel {keys.channel} of {chip}"
+        self._folder = chip / f"pwm{keys.channel}"
+        with device_errors(self._name):
+            if not self._folder.exists():
+                (chip / "export").write_text(f"{keys.channel}\n")
+            period_ns, deadline = 1_000_000_000 // plan.settings["hz"], time.monotonic() + _EXPORT_S
+            while True:
+                try:
+                    self._write("period", period_ns)
+                    break
+                except (PermissionError, FileNotFoundError):
+                    if time.monotonic() >= deadline:
+                        raise
+                    time.sleep(0.01)
+            self._send(0)
+            self._write("enable", 1)
+
+    def close(self) -> None:
+        """Stop the pulses and disable the channel."""
+        with device_errors(self._name), ExitStack() as stack:
+            stack.callback(self._write, "enable", 0)
+            self._send(0)
+
+    def _pulse(self, width_us: int) -> None:
+        with device_errors(self._name):
+            self._write("duty_cycle", width_us * 1000)
+
+    def _write(self, file: str, number: int) -> None:
+        (self._folder / file).write_text(f"{number}\n")
 
 
 SYSFS: Final = PulseSource(keys=_SysfsKeys, open=SysfsPwm)
@@ -250,16 +248,26 @@ class _PulsedOutput:
         return self._pulses.value(width_us)
 
 
-def _wired_pulse(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
-    """Return a reader of the width of an output's pulses on a twin, µs; 0 for no pulse."""
-    over = plan.settings["over"]
-    pulse_of = PULSES[over].pulse_of
-    if pulse_of is None:
+def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    """Return what reads an output's state from its pulses; see `OutputChip.wire`."""
+    over, stands_still = plan.settings["over"], OUTPUTS[plan.driver].drives
+    if (pulse_of := PULSES[over].pulse_of) is None:
         has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_of)
         raise RobotError(
             f"Output {plan.name!r}: the twin has no servos over {over!r}; it has them over {has}."
         )
-    return pulse_of(plan, duty)
+    pulse_us, pulses = pulse_of(plan, duty), PulseRange.of(plan)
+    tolerance = _DEAD_BAND_US / abs(pulses.high_us - pulses.middle_us)
+
+    def state(levels: Levels) -> WiredOutput:
+        if not (us := pulse_us(levels)):
+            return WiredOutput(None, True)
+        if stands_still and abs(us - pulses.middle_us) <= _DEAD_BAND_US:
+            return WiredOutput(0.0, True)
+        value = max(-1.0, min(1.0, pulses.value(us)))
+        return WiredOutput(value, not stands_still and abs(value - rest) <= tolerance)
+
+    return state
 
 
 _DEG_PER_VALUE: Final = 90.0  # Assumed travel from end to end, a value of 2: 180 degrees.
@@ -308,23 +316,10 @@ class ServoDriver(_PulsedOutput):
         super().release()
 
 
-def _wired_servo(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
-    pulses, pulse_us = PulseRange.of(plan), _wired_pulse(plan, duty)
-    tolerance = _DEAD_BAND_US / abs(pulses.high_us - pulses.middle_us)
-
-    def state(levels: Levels) -> WiredOutput:
-        if not (us := pulse_us(levels)):
-            return WiredOutput(None, True)
-        value = max(-1.0, min(1.0, pulses.value(us)))
-        return WiredOutput(value, abs(value - rest) <= tolerance)
-
-    return state
-
-
 SERVO: Final = OutputChip(
     keys=ServoKeys,
     open=ServoDriver,
-    wire=_wired_servo,
+    wire=_wired,
     pulses=ServoKeys.widths,
     lights=_LIT_PIN,
     differs="it turns no faster than its profile allows",
@@ -417,20 +412,6 @@ class Esc(_PulsedOutput):
         return applied if value else 0.0
 
 
-def _wired_esc(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
-    pulses, pulse_us = PulseRange.of(plan), _wired_pulse(plan, duty)
-
-    def state(levels: Levels) -> WiredOutput:
-        us = pulse_us(levels)
-        if not us:
-            return WiredOutput(None, True)
-        if abs(us - pulses.middle_us) <= _DEAD_BAND_US:
-            return WiredOutput(0.0, True)
-        return WiredOutput(max(-1.0, min(1.0, pulses.value(us))), False)
-
-    return state
-
-
 # A controller arms a little earlier than its driver expects.
 _ARM_SHARE: Final = 0.8
 
@@ -487,7 +468,7 @@ class SpeedController:
 ESC: Final = OutputChip(
     keys=EscKeys,
     open=Esc,
-    wire=_wired_esc,
+    wire=_wired,
     unpowered=WiredOutput(None, True),
     obeys=SpeedController,
     pulses=EscKeys.widths,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:  # It needs NumPy, and a guard loads none.
     from shapechanger.contract.world import Readings
@@ -40,6 +40,10 @@ class Pulse(NamedTuple):
     hz: float
 
 
+NO_PULSE: Final = Pulse(0.0, 0.0)
+"""None, at no frequency."""
+
+
 class PwmChannel(NamedTuple):
     """A PWM channel of a chip: bus, address of the chip, number of the channel."""
 
@@ -65,13 +69,7 @@ class Levels:
     edges_ns: dict[int, int] = field(default_factory=dict[int, int])
 
     def drive(self, pin: int, duty: float, t: int) -> None:
-        """Drive a pin.
-
-        Args:
-            pin: BCM number.
-            duty: Share of the time at which it is high, 0 to 1.
-            t: Time of the change, ns.
-        """
+        """Drive a pin, by its BCM number, with a duty from 0 to 1 from the time `t` on, ns."""
         if duty in (0.0, 1.0) and self.duties.get(pin, 0.0) == 1.0 - duty:
             self.edges_ns[pin] = t
         self.duties[pin] = duty
@@ -83,12 +81,7 @@ class Levels:
         self.pulses.pop(pin, None)
 
     def pulse(self, pin: int, pulse: Pulse) -> None:
-        """Send servo pulses on a pin.
-
-        Args:
-            pin: BCM number.
-            pulse: The pulses.
-        """
+        """Send servo pulses on a pin."""
         self.duties[pin] = pulse.us * pulse.hz / 1e6
         self.pulses[pin] = pulse
 
@@ -125,21 +118,11 @@ class SimulatedChip:
         return ()
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes.
-
-        Args:
-            register: Register of the first byte.
-            length: Number of bytes.
-        """
+        """Read bytes, the first one of them at a register."""
         raise NotImplementedError
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes; a chip without settings ignores them.
-
-        Args:
-            register: Register of the first byte.
-            data: The bytes.
-        """
+        """Write bytes, the first one at a register; a chip without settings ignores them."""
 
 
 I2cChips = Mapping[tuple[int, int], SimulatedChip]
@@ -161,21 +144,9 @@ class SimulatedSensor:
         self.levels: Mapping[int, int] = levels or {}
 
     def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
-        """Return the edges between two times.
-
-        Args:
-            start_ns: End of the last call.
-            end_ns: Current time.
-            seen: Current state of the world.
-        """
+        """Return the edges from the end of the last call to now, in the current world."""
         return []
 
     def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:
-        """Return the edges that will follow from an output.
-
-        Args:
-            t: Time, ns.
-            pin: BCM number of the output.
-            level: Its level or duty, 0 to 1.
-        """
+        """Return the edges that will follow from the level or duty of an output, 0 to 1."""
         return []

@@ -129,6 +129,7 @@ class TwinPinFactory(PiFactory):
         self.clock = clock
         self.pin_class = TwinPin
         self._by_number: dict[int, TwinPin] = {}
+        self._pulsed: set[int] = set()
         board.on_edge = self._report_edge
 
     def pin(self, name: int | str) -> TwinPin:
@@ -136,6 +137,16 @@ class TwinPinFactory(PiFactory):
         pin: TwinPin = super().pin(name)
         self._by_number[pin.number] = pin
         return pin
+
+    def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
+        """Send servo pulses on a pin; see `LowAtOnceFactory.pulse`.
+
+        If the process dies, the pin keeps the level that it has at that moment.
+        """
+        if pin not in self._pulsed:
+            self.board.ask(int, "claim", pin, "output", "floating", 0)
+            self._pulsed.add(pin)
+        self.board.post("pulse", pin, width_us, frequency_hz)
 
     def close(self) -> None:
         """Close all pins."""

@@ -124,34 +124,6 @@ class TwinBus:
         """Let go of the bus; its chips keep running."""
 
 
-class TwinServoPins:
-    """Pins that send pulses of whole microseconds.
-
-    A thread of the process sends the pulses. If the process dies, they end, and the pin keeps the
-    level that it has at that moment.
-    """
-
-    def __init__(self, board: BoardClient) -> None:
-        self._board = board
-        self._pulses: dict[int, tuple[int, int]] = {}
-
-    def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
-        """Send pulses of this width on a BCM pin from now on; 0 for none."""
-        if pin not in self._pulses:
-            self._board.ask(int, "claim", pin, "output", "floating", 0)
-        us, hz = int(width_us), int(frequency_hz)
-        if self._pulses.get(pin) != (us, hz):
-            self._board.post("pulse", pin, us, hz)
-            self._pulses[pin] = us, hz
-
-    def close(self) -> None:
-        """End all pulses; the pins stay low."""
-        if not self._board.closed:
-            for pin, (_, frequency_hz) in list(self._pulses.items()):
-                self.pulse(pin, 0, frequency_hz)
-        self._pulses.clear()
-
-
 class TwinServoPort:
     """Port of the servo bus; see `ServoPort`. Its servos answer at once or not at all."""
 
@@ -192,10 +164,6 @@ class TwinHardware(Hardware):
     def i2c(self, bus: int) -> TwinBus:
         """Return the I2C bus of a number."""
         return TwinBus(self.board, bus)
-
-    def servo_pins(self) -> TwinServoPins:
-        """Return the pins that send servo pulses."""
-        return TwinServoPins(self.board)
 
     def servo_port(self, settings: BusSettings, open_port: object) -> TwinServoPort:
         """Return the port of the servo bus; its first use fails if the board has no such bus."""

@@ -26,21 +26,16 @@ class Bh1750Keys(I2cKeys, frozen=True, kw_only=True):
     address: Annotated[int, Meta(ge=0x23, le=0x5C)] = 0x23
 
 
-class Bh1750:
+class Bh1750(I2cDevice):
     """Light sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        self._name = plan.name
-        keys = Bh1750Keys.of(plan.settings)
-        self._device = I2cDevice(f"Sensor {plan.name!r}", keys, hardware)
+        super().__init__(f"Sensor {plan.name!r}", Bh1750Keys.of(plan.settings), hardware)
+        self._quantity = f"{plan.name}/light"
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the light, lx."""
-        counts = int.from_bytes(self._device.read(_MEASURE, 2))
-        return {f"{self._name}/light": counts / _COUNTS_PER_LUX}
-
-    def close(self) -> None:
-        self._device.close()
+        return {self._quantity: int.from_bytes(self.read_registers(_MEASURE, 2)) / _COUNTS_PER_LUX}
 
 
 class SimulatedBh1750(SimulatedChip):
