@@ -68,7 +68,7 @@ def open_finger(
 
 
 class FingerWorld(World):
-    """Bones and joints of a finger; see `World`, `TendonWorld` and `JointWorld`.
+    """Bones and joints of a finger; see `World` and `TendonWorld`.
 
     It has no surroundings and no other sensors.
 
@@ -125,7 +125,7 @@ class FingerWorld(World):
         return self.travels()
 
     def measured_angle(self, joint: str) -> float:
-        """Return one reading of a joint's angle, rad; see `JointWorld`."""
+        """Return one reading of a joint's angle, rad, with the noise of its encoder."""
         if joint not in JOINTS:
             raise RobotError(f"A finger has the joints {', '.join(JOINTS)}, and no {joint}.")
         angle = float(self._data.qpos[JOINTS.index(joint)])

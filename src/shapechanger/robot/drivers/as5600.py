@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Final, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from msgspec import Meta
 
@@ -79,10 +79,8 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
         """Refuse two joints on one channel."""
         users: dict[int, str] = {}
         for name, joint in self.rows.items():
-            other = users.setdefault(joint.channel, name)
-            if other != name:
-                words = f"has the channel {joint.channel}, which {other} has, too"
-                raise KeyMistake(name, words)
+            if (other := users.setdefault(joint.channel, name)) != name:
+                raise KeyMistake(name, f"has the channel {joint.channel}, which {other} has, too")
 
     def claims(self) -> Iterator[Claim]:
         """Return the claims of the addresses; all encoders of a bus answer at the same one."""
@@ -105,17 +103,17 @@ class As5600:
         keys = As5600Keys.of(plan.settings)
         self.joints = keys.rows
         self._mux = keys.mux
-        self._words = (
+        self._mux_name = (
             f"The multiplexer of sensor {plan.name!r} at 0x{keys.mux:02x} on I2C bus {keys.bus}"
         )
         self._missed = dict.fromkeys(keys.rows, 0)
-        with device_errors(self._words):
+        with device_errors(self._mux_name):
             self._bus = hardware.i2c(keys.bus)
 
     def measure(self, joint: str) -> tuple[int, Magnet]:
         """Read the raw angle of one joint, 0 to 4095, which a missing magnet makes meaningless."""
         channel = self.joints[joint].channel
-        with device_errors(self._words):
+        with device_errors(self._mux_name):
             self._bus.write_byte(self._mux, 1 << channel)
         with device_errors(f"The encoder of {joint}, on channel {channel},"):
             status, high, low = self._bus.read_i2c_block_data(ADDRESS, _STATUS, 3)
@@ -144,14 +142,12 @@ class As5600:
         failures: dict[str, None] = {}  # A missing multiplexer is reported once.
         for name, joint in self.joints.items():
             try:
-                counts = self.counts(name)
+                said[f"{name}/angle"] = joint.angle(self.counts(name))
+                self._missed[name] = 0
             except RobotError as error:
                 self._missed[name] += 1
                 if self._missed[name] >= _MOST_MISSED:
                     failures[str(error)] = None
-                continue
-            self._missed[name] = 0
-            said[f"{name}/angle"] = joint.angle(counts)
         if failures:
             raise RobotError(" ".join(failures))
         return said
@@ -171,16 +167,6 @@ def open_and_read(plan: SensorPlan, hardware: Hardware) -> As5600:
     return sensor
 
 
-@runtime_checkable
-class JointWorld(Protocol):
-    """A world with joints that encoders measure."""
-
-    def measured_angle(self, joint: str) -> float:
-        """Return one reading of a joint's angle, rad, with the noise of its encoder."""
-        ...
-
-
-_RAW_ANGLE: Final = 0x0C
 _STATUS_OF: Final = {
     "": _MAGNET_DETECTED,
     "gone": _TOO_WEAK,
@@ -210,15 +196,12 @@ class SimulatedAs5600(SimulatedChip):
 
     def read(self, register: int, length: int) -> list[int]:
         """Read bytes, starting at a register; those that no driver reads are 0."""
-        high, low = divmod(self._counts(), 256)
-        known = {_STATUS: _STATUS_OF[self._magnet], _RAW_ANGLE: high, _RAW_ANGLE + 1: low}
+        counts = 0
+        if self._magnet != "gone":
+            turned = self._keys.direction * self._angle() / (2.0 * math.pi)
+            counts = (self._keys.zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
+        known = dict(enumerate((_STATUS_OF[self._magnet], *divmod(counts, 256)), _STATUS))
         return [known.get(register + i, 0) for i in range(length)]
-
-    def _counts(self) -> int:
-        if self._magnet == "gone":
-            return 0
-        turned = self._keys.direction * self._angle() / (2.0 * math.pi)
-        return (self._keys.zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
 
 
 class Tca9548a(SimulatedChip):
@@ -231,13 +214,13 @@ class Tca9548a(SimulatedChip):
     is_logged = False  # It moves nothing, and hundreds of writes a second would fill the ledger.
 
     def __init__(self, channels: Mapping[int, SimulatedChip]) -> None:
-        self.channels = dict(channels)
+        self._channels = channels
         self._control = 0
 
     @property
     def open(self) -> list[SimulatedChip]:
         """Chips behind the open channels."""
-        return [chip for channel, chip in self.channels.items() if self._control >> channel & 1]
+        return [chip for channel, chip in self._channels.items() if self._control >> channel & 1]
 
     def read(self, register: int, length: int) -> list[int]:
         """Read the control register; sending the register byte writes it first."""
@@ -250,11 +233,7 @@ class Tca9548a(SimulatedChip):
 
 
 class ChannelsBehind(SimulatedChip):
-    """The chips behind a multiplexer, at their common address.
-
-    Args:
-        mux: The multiplexer.
-    """
+    """The chips behind a multiplexer, at their common address; they have no settings."""
 
     def __init__(self, mux: Tca9548a) -> None:
         self._mux = mux
@@ -265,28 +244,12 @@ class ChannelsBehind(SimulatedChip):
         Raises:
             OSError: If no channel is open, with the `errno` of the kernel's driver.
         """
-        data = [0xFF] * length
-        for chip in self._open_chips():
-            data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]
-        return data
-
-    def write(self, register: int, data: Sequence[int]) -> None:
-        """Write to all chips behind open channels.
-
-        Raises:
-            OSError: If no channel is open.
-        """
-        for chip in self._open_chips():
-            chip.write(register, data)
-
-    def _open_chips(self) -> list[SimulatedChip]:
         if not (chips := self._mux.open):
             raise OSError(errno.EREMOTEIO, "no chip answers")
-        return chips
-
-
-def _at_zero(joint: str) -> float:
-    return 0.0
+        data = [0xFF] * length
+        for chip in chips:
+            data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]
+        return data
 
 
 class SimulatedJoints(SimulatedSensor):
@@ -294,7 +257,8 @@ class SimulatedJoints(SimulatedSensor):
 
     Args:
         plan: The sensor.
-        world: World with these joints; in a world without joints all stand at zero.
+        world: World with these joints, whose `measured_angle` returns one reading of a joint's
+            angle, rad, with the noise of its encoder; in a world without it all stand at zero.
 
     Attributes:
         encoders: Encoders by joint.
@@ -305,13 +269,12 @@ class SimulatedJoints(SimulatedSensor):
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
         keys = As5600Keys.of(plan.settings)
-        measured = world.measured_angle if isinstance(world, JointWorld) else _at_zero
+        measured: Callable[[str], float] = getattr(world, "measured_angle", lambda _: 0.0)
         self.encoders: dict[str, SimulatedAs5600] = {}
         for name, joint in keys.rows.items():
             measured(name)  # Raises for an unknown joint.
             self.encoders[name] = SimulatedAs5600(joint, partial(measured, name))
-        behind = {keys.rows[name].channel: chip for name, chip in self.encoders.items()}
-        mux = Tca9548a(behind)
+        mux = Tca9548a({keys.rows[name].channel: chip for name, chip in self.encoders.items()})
         super().__init__({(keys.bus, keys.mux): mux, (keys.bus, ADDRESS): ChannelsBehind(mux)})
 
 

@@ -35,8 +35,7 @@ class CpuTemperature:
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "temperature" in degrees Celsius, updated once a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
-            self._celsius = self._measure()
-            self._read_ns = now_ns
+            self._celsius, self._read_ns = self._measure(), now_ns
         return {"temperature": self._celsius}
 
     def close(self) -> None:

@@ -25,21 +25,8 @@ _STANDS_AFTER_S: Final = 0.5
 # A count has four edges; whole counts even out their unequal lengths.
 _EDGES_PER_COUNT: Final = 4
 
-# Step of the position from one state of the channels, (a, b), to the next. With two channels it is
-# forward when a leads: 00, 10, 11, 01; missing are no change, and two at once, which leaves the
-# direction unknown. With one channel each rising edge counts.
-_STEPS_OF_TWO: Final = {
-    (0b00, 0b10): 1,
-    (0b10, 0b11): 1,
-    (0b11, 0b01): 1,
-    (0b01, 0b00): 1,
-    (0b10, 0b00): -1,
-    (0b11, 0b10): -1,
-    (0b01, 0b11): -1,
-    (0b00, 0b01): -1,
-}
-
-_STEPS_OF_ONE: Final = {(0, 1): 1, (1, 1): 1}
+# Levels of the channels, a and b, as the wheel rolls forward: a leads.
+_FORWARD: Final = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 class EncoderKeys(Keys, frozen=True, kw_only=True):
@@ -73,26 +60,25 @@ class Encoder:
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = EncoderKeys.of(plan.settings)
         self._two_channels = keys.b != NO_PIN
-        self._steps = _STEPS_OF_TWO if self._two_channels else _STEPS_OF_ONE
         edges_per_count = _EDGES_PER_COUNT if self._two_channels else 1
         self._edge_m = keys.count_m / edges_per_count
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
-        self._state = 0
+        self._levels = [0, 0]  # A missing channel stays low.
         self._edges: deque[tuple[float, int]] = deque(maxlen=edges_per_count + 1)
         self._count = 0
         self._count_read = 0
         self._last_edge_ns = 0
         self._speed = 0.0
         self._sign = 1.0
-        pins = [keys.b, keys.a] if self._two_channels else [keys.a]
+        pins = [keys.a, keys.b] if self._two_channels else [keys.a]
         with device_errors(f"Sensor {plan.name!r}"):
             factory = hardware.pin_factory()
             self._inputs = [
-                EdgeInput(pin, "up", factory, partial(self._changed, 1 << i))
-                for i, pin in enumerate(pins)
+                EdgeInput(pin, "up", factory, partial(self._changed, channel))
+                for channel, pin in enumerate(pins)
             ]
             with self._lock:
-                self._state = sum(one.level << i for i, one in enumerate(self._inputs))
+                self._levels[: len(pins)] = [one.level for one in self._inputs]
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "speed" in m/s, positive forward."""
@@ -102,7 +88,9 @@ class Encoder:
             self._sign = math.copysign(1.0, direction)
         if count != self._count_read:
             self._count_read, self._last_edge_ns = count, now_ns
-            self._speed = self._speed_from(edges)
+            self._speed = 0.0
+            if len(edges) > 1 and (took_s := edges[-1][0] - edges[0][0]) > 0.0:
+                self._speed = sum(step for _, step in edges[1:]) * self._edge_m / took_s
         else:
             # The next edge is not here yet, which bounds the speed.
             since_s = (now_ns - self._last_edge_ns) / 1e9
@@ -118,27 +106,21 @@ class Encoder:
         for one in self._inputs:
             one.close()
 
-    def _speed_from(self, edges: list[tuple[float, int]]) -> float:
-        if len(edges) < 2 or edges[-1][0] <= edges[0][0]:
-            return 0.0
-        moved_m = sum(step for _, step in edges[1:]) * self._edge_m
-        return moved_m / (edges[-1][0] - edges[0][0])
-
-    def _changed(self, bit: int, at_s: float, level: int) -> None:
+    def _changed(self, channel: int, at_s: float, level: int) -> None:
         with self._lock:
-            before, self._state = self._state, self._state & ~bit | bit * level
-            step = self._steps.get((before, self._state))
-            if step is not None:
-                self._add(at_s, step)
-
-    def _add(self, at_s: float, step: int) -> None:
-        # Edges before a reversal or a stop do not count towards the current speed.
-        if self._edges:
-            before_s, before_step = self._edges[-1]
-            if step != before_step or at_s - before_s > _STANDS_AFTER_S:
-                self._edges.clear()
-        self._edges.append((at_s, step))
-        self._count += 1
+            before = _FORWARD.index((self._levels[0], self._levels[1]))
+            self._levels[channel] = level
+            turned = _FORWARD.index((self._levels[0], self._levels[1])) - before
+            step = (0, 1, 0, -1)[turned % 4] if self._two_channels else level
+            if not step:
+                return  # The same level again, or the falling edge of a single channel.
+            # Edges before a reversal or a stop do not count towards the current speed.
+            if self._edges:
+                before_s, before_step = self._edges[-1]
+                if step != before_step or at_s - before_s > _STANDS_AFTER_S:
+                    self._edges.clear()
+            self._edges.append((at_s, step))
+            self._count += 1
 
 
 class SimulatedEncoder(SimulatedSensor):
@@ -152,7 +134,7 @@ class SimulatedEncoder(SimulatedSensor):
     def __init__(self, plan: SensorPlan, world: World) -> None:
         keys = EncoderKeys.of(plan.settings)
         self._pins = (keys.a, keys.b)
-        self._states = ((0,), (1,)) if keys.b == NO_PIN else ((0, 0), (1, 0), (1, 1), (0, 1))
+        self._states = ((0,), (1,)) if keys.b == NO_PIN else _FORWARD
         self._edge_m = keys.count_m / len(self._states)
         # The distance rolled before power-on makes no edges.
         self._travelled = world.inputs().travelled_m

@@ -82,7 +82,14 @@ class Hcsr04:
         if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
             self._pinged_ns = now_ns
             self._unanswered += 1
-            self._ping()
+            with device_errors(self._name):
+                self._trigger.on()
+                # Spin: the shortest sleep takes several times as long, and the guard waits for it.
+                if self._trigger_ns:
+                    end_ns = time.perf_counter_ns() + self._trigger_ns
+                    while time.perf_counter_ns() < end_ns:
+                        pass
+                self._trigger.off()
         if self._unanswered > _MOST_MISSED:
             self._distance_m = None
             raise RobotError(f"{self._name} receives no echo: check its wires and its 5 V supply.")
@@ -92,16 +99,6 @@ class Hcsr04:
         """Close the pins."""
         self._trigger.close()
         self._echo.close()
-
-    def _ping(self) -> None:
-        with device_errors(self._name):
-            self._trigger.on()
-            # Spin: the shortest sleep takes several times as long, and the guard waits for it.
-            if self._trigger_ns:
-                end_ns = time.perf_counter_ns() + self._trigger_ns
-                while time.perf_counter_ns() < end_ns:
-                    pass
-            self._trigger.off()
 
     def _changed(self, at_s: float, level: int) -> None:
         with self._lock:

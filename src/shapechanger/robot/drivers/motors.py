@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from typing import Annotated, Any, Final
 
@@ -68,14 +68,37 @@ class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
 
 
 class _DutyMotor:
-    """Bidirectional motor on two pins; see `OutputDriver`."""
+    """Bidirectional motor on two pins; see `OutputDriver`.
 
-    def __init__(self, plan: OutputPlan, duty: Duty, first: Pin, second: Pin) -> None:
+    Args:
+        plan: The output.
+        hardware: Its pins.
+        hz: Frequency of the PWM of each pin, Hz; 0 for a plain output. The inputs of the motor are
+            the last two, after a pin that enables them.
+    """
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware, hz: Mapping[Pin, int]) -> None:
+        from gpiozero import DigitalOutputDevice, PWMOutputDevice  # A twin's worlds need no pins.
+
+        *_, first, second = hz
         self._name = f"Output {plan.name!r} on GPIO{first} and GPIO{second}"
-        self._duty = duty
+        self._duty = _DutyKeys.of(plan.settings).duty
         self._written: float | None = None
-        self._opened = ExitStack()
-        self._is_closed = False
+        devices: list[Any] = []
+        with device_errors(self._name), ExitStack() as undo:
+            factory = hardware.pin_factory()
+            for pin, pwm_hz in hz.items():
+                if pwm_hz:
+                    device = PWMOutputDevice(pin, frequency=pwm_hz, pin_factory=factory)
+                else:
+                    device = DigitalOutputDevice(pin, pin_factory=factory)
+                devices.append(device)
+                undo.callback(device.close)
+                undo.callback(device.off)  # A plain output would keep its level.
+            *self._enables, self._first, self._second = devices
+            self.write(0.0, 0)
+            undo.callback(self.release)
+            self._opened = undo.pop_all()
 
     def write(self, value: float, now_ns: int) -> float:
         """Write a speed and return the applied one; see `OutputDriver.write`."""
@@ -85,27 +108,26 @@ class _DutyMotor:
             written, self._written = self._written, None
             with device_errors(self._name):
                 self._drive(drive, written)
+                for enable in self._enables:
+                    enable.on()
             self._written = drive
         return math.copysign(self._duty.size_at(abs(drive)), drive) if drive else 0.0
 
     def release(self) -> None:
-        """Set the speed to zero, and disable a bridge that can be disabled."""
+        """Disable a bridge that can be disabled, and set the speed to zero."""
         self._written = None
-        with device_errors(self._name):
-            self._stop()
+        with device_errors(self._name), ExitStack() as stack:
+            stack.callback(self._drive, 0.0, None)
+            for enable in self._enables:
+                enable.off()
 
     def close(self) -> None:
-        """Set all inputs low; see `LowAtOncePin.close` for the pins afterwards."""
-        if not self._is_closed:
-            self._is_closed = True
-            with device_errors(self._name), self._opened:
-                self.release()
+        """Set all inputs low, once; see `LowAtOncePin.close` for the pins afterwards."""
+        with device_errors(self._name):
+            self._opened.close()
 
     def _drive(self, drive: float, written: float | None) -> None:
         """Set a signed duty; `written` is the previous one, or None if that is in doubt."""
-        raise NotImplementedError
-
-    def _stop(self) -> None:
         raise NotImplementedError
 
 
@@ -113,93 +135,57 @@ class HBridge(_DutyMotor):
     """Motor on an H-bridge with two inputs, such as L298N, DRV8833 or TB6612FNG.
 
     One input turns the motor forward, the other backward, each with PWM. They are never on
-    together: `Motor` turns one off before it turns the other on, and on a Pi `LowAtOncePin` makes
-    that immediate. Some boards have a third input that enables both. A released motor coasts.
+    together: one is turned off before the other is turned on, and on a Pi `LowAtOncePin` makes that
+    immediate. Some boards have a third input that enables both. A released motor coasts.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
-        from gpiozero import DigitalOutputDevice, Motor  # A twin's worlds need no gpiozero.
-
         keys = HBridgeKeys.of(plan.settings)
-        super().__init__(plan, keys.duty, keys.forward, keys.backward)
-        with device_errors(self._name), ExitStack() as undo:
-            factory = hardware.pin_factory()
-            self._enable: Any = None
-            if keys.enable != NO_PIN:
-                # Not the one of `Motor`, which would be on before the first write.
-                self._enable = DigitalOutputDevice(keys.enable, pin_factory=factory)
-                undo.callback(self._enable.close)
-            self._motor = Motor(keys.forward, keys.backward, pin_factory=factory)
-            undo.callback(self._motor.close)
-            for device in (self._motor.forward_device, self._motor.backward_device):
-                device.frequency = keys.pwm_hz
-            self.write(0.0, 0)
-            self._opened = undo.pop_all()
+        enable = {} if keys.enable == NO_PIN else {keys.enable: 0}
+        pwm = {keys.forward: keys.pwm_hz, keys.backward: keys.pwm_hz}
+        super().__init__(plan, hardware, enable | pwm)
 
     def _drive(self, drive: float, written: float | None) -> None:
+        forward, backward = self._first, self._second
         if drive:
-            self._motor.value = drive
-        else:
-            self._set_low()
-        if self._enable is not None:
-            self._enable.on()
-
-    def _stop(self) -> None:
-        with ExitStack() as stack:
-            stack.callback(self._set_low)
-            if self._enable is not None:
-                self._enable.off()
-
-    def _set_low(self) -> None:
-        # Unlike in `Motor.stop`, one input goes low even if the other fails.
-        with ExitStack() as stack:
-            stack.callback(self._motor.backward_device.off)
-            self._motor.forward_device.off()
+            rests, turns = (backward, forward) if drive > 0.0 else (forward, backward)
+            rests.off()
+            turns.value = abs(drive)
+            return
+        with ExitStack() as stack:  # One input goes low even if the other fails.
+            stack.callback(backward.off)
+            forward.off()
 
 
 class PhaseEnable(_DutyMotor):
     """Motor on a driver with direction and speed inputs, such as DRV8835 in phase/enable mode.
 
-    The speed is zero while the direction changes: `PhaseEnableMotor` ensures that, and on a Pi
-    `LowAtOncePin` makes it immediate. Such drivers brake when released, and cannot coast.
+    The speed is zero while the direction changes, and on a Pi `LowAtOncePin` makes that immediate.
+    Such drivers brake when released, and cannot coast.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
-        from gpiozero import PhaseEnableMotor
-
         keys = PhaseEnableKeys.of(plan.settings)
-        super().__init__(plan, keys.duty, keys.phase, keys.enable)
-        with device_errors(self._name), ExitStack() as undo:
-            factory = hardware.pin_factory()
-            self._motor = PhaseEnableMotor(keys.phase, keys.enable, pin_factory=factory)
-            undo.callback(self._motor.close)
-            # A plain output would keep its level.
-            undo.callback(self._motor.phase_device.off)
-            self._motor.enable_device.frequency = keys.pwm_hz
-            self.write(0.0, 0)
-            self._opened = undo.pop_all()
+        super().__init__(plan, hardware, {keys.phase: 0, keys.enable: keys.pwm_hz})
 
     def _drive(self, drive: float, written: float | None) -> None:
-        # gpiozero turns the motor off before each new speed, also in the same direction, which
-        # would make it stutter.
-        if written is not None and drive * written > 0.0:
-            self._motor.enable_device.value = abs(drive)
-        else:
-            self._motor.value = drive
-
-    def _stop(self) -> None:
-        self._motor.stop()
+        phase, enable = self._first, self._second
+        if written is None or drive * written <= 0.0:  # Otherwise the motor would stutter.
+            enable.off()
+            if drive:
+                phase.value = drive < 0.0
+        if drive:
+            enable.value = abs(drive)
 
 
 def _wired_hbridge(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
     keys = HBridgeKeys.of(plan.settings)
 
-    def state(levels: Levels) -> WiredOutput:
+    def drive(levels: Levels) -> float:
         enabled = 1.0 if keys.enable == NO_PIN else duty(levels, keys.enable)
-        drive = duty(levels, keys.forward) - duty(levels, keys.backward)
-        return _turning(keys.duty, drive * enabled, rest)
+        return (duty(levels, keys.forward) - duty(levels, keys.backward)) * enabled
 
-    return state
+    return lambda levels: _turning(keys.duty, drive(levels), rest)
 
 
 def _wired_phase_enable(
@@ -207,12 +193,11 @@ def _wired_phase_enable(
 ) -> Callable[[Levels], WiredOutput]:
     keys = PhaseEnableKeys.of(plan.settings)
 
-    def state(levels: Levels) -> WiredOutput:
+    def drive(levels: Levels) -> float:
         # A phase that is high part of the time turns the motor back and forth.
-        sign = 1.0 - 2.0 * duty(levels, keys.phase)
-        return _turning(keys.duty, duty(levels, keys.enable) * sign, rest)
+        return duty(levels, keys.enable) * (1.0 - 2.0 * duty(levels, keys.phase))
 
-    return state
+    return lambda levels: _turning(keys.duty, drive(levels), rest)
 
 
 def _turning(duty: Duty, drive: float, rest: float) -> WiredOutput:

@@ -75,7 +75,7 @@ class SimulatedSwitch(SimulatedSensor):
         self._open = int(keys.pull == "up")
         self._pressed = False
         self.held = False
-        super().__init__(levels=self._levels())
+        super().__init__(levels=dict.fromkeys(keys.pins, self._open))
 
     def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
         """Return the edges of a push or its end."""
@@ -83,10 +83,7 @@ class SimulatedSwitch(SimulatedSensor):
         if pressed == self._pressed:
             return []
         self._pressed = pressed
-        return [Edge(end_ns, pin, level) for pin, level in self._levels().items()]
-
-    def _levels(self) -> dict[int, int]:
-        return dict.fromkeys(self._pins, self._open ^ self._pressed)
+        return [Edge(end_ns, pin, self._open ^ pressed) for pin in self._pins]
 
 
 SWITCH: Final = SensorChip(measures="bump", keys=SwitchKeys, open=Switch, simulate=SimulatedSwitch)
