@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.pulse import PulseRange
+from shapechanger.robot.drivers.pulse import ServoKeys
 from shapechanger.robot.setup.calibration import (
     motor_changes,
     pulse_changes,
@@ -33,7 +33,7 @@ def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
     low_us, high_us = (wide.settings[key] for key in ("left_us", "right_us"))
     assert sorted((low_us, high_us)) == [600, 2400]
     assert (low_us < high_us) == (left_us < right_us)
-    pulses = PulseRange(low_us, 1500.0, high_us)
+    pulses = ServoKeys(over="lgpio", left_us=low_us, right_us=high_us)
     assert pulse_changes(wide, (-0.5, 0.1, 0.4)) == {
         "output.steer.left_us": round(pulses.width_us(-0.5)),
         "output.steer.centre_us": round(pulses.width_us(0.1)),

@@ -125,34 +125,28 @@ def device_errors(device: str) -> Generator[None]:
 
 def _kinds() -> tuple[type[BaseException], ...]:
     """Return the errors of the kernel, and of gpiozero and lgpio if they are loaded."""
-    names = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
-    loaded = [(sys.modules.get(module), name) for module, name in names]
-    own = tuple(getattr(module, name) for module, name in loaded if module is not None)
-    return (OSError, ImportError, *own)
+    theirs = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
+    loaded = ((sys.modules.get(module), name) for module, name in theirs)
+    return (OSError, ImportError, *(getattr(module, name) for module, name in loaded if module))
 
 
 class OutputDriver(Protocol):
     """Driver of one motor, servo or controller."""
 
     def write(self, value: float, now_ns: int) -> float:
-        """Write a value.
+        """Write a value, and return the applied one.
 
         Args:
             value: From -1, full left or backward, to 1, full right or forward; 0 is rest.
             now_ns: Monotonic time, ns, for controllers with sequences.
-
-        Returns:
-            The applied value.
         """
         ...
 
     def release(self) -> None:
         """Release the output: no torque, no pulse."""
-        ...
 
     def close(self) -> None:
         """Set the safest level and close the pins."""
-        ...
 
 
 class SensorDriver(Protocol):
@@ -172,7 +166,6 @@ class SensorDriver(Protocol):
 
     def close(self) -> None:
         """Close the pins."""
-        ...
 
 
 class PulseChannel(Protocol):
@@ -184,11 +177,9 @@ class PulseChannel(Protocol):
 
     def release(self) -> None:
         """Stop the pulses."""
-        ...
 
     def close(self) -> None:
         """Stop the pulses and close."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,8 +279,8 @@ class Chips(Mapping[str, _Chip]):
 
     Args:
         kind: Class of the chips.
-        own: MODULE:NAME of each of ours, by the name of its driver; other packages cannot replace
-            one.
+        own: MODULE:NAME of each of ours in this package, by the name of its driver; other packages
+            cannot replace one.
     """
 
     def __init__(self, kind: type[_Chip], own: Mapping[str, str]) -> None:
@@ -298,7 +289,7 @@ class Chips(Mapping[str, _Chip]):
 
     def __getitem__(self, name: str) -> _Chip:
         if name in self._own:
-            return load(self._own[name])
+            return load(f"shapechanger.robot.drivers.{self._own[name]}")
         if isinstance(chip := _others().get(name), self._kind):
             return chip
         raise KeyError(name)
@@ -311,19 +302,17 @@ class Chips(Mapping[str, _Chip]):
         return sum(1 for _ in self)
 
 
-_HERE: Final = "shapechanger.robot.drivers"
-
 SENSORS: Final = Chips(
     SensorChip,
     {
-        "encoder": f"{_HERE}.encoder:ENCODER",
-        "switch": f"{_HERE}.switch:SWITCH",
-        "hcsr04": f"{_HERE}.hcsr04:HCSR04",
-        "mpu6050": f"{_HERE}.mpu6050:MPU6050",
-        "ina219": f"{_HERE}.ina219:INA219",
-        "cpu_temperature": f"{_HERE}.cpu_temperature:CPU_TEMPERATURE",
-        "bus_servo": f"{_HERE}.servos.output:TENDONS",
-        "as5600": f"{_HERE}.as5600:AS5600",
+        "encoder": "encoder:ENCODER",
+        "switch": "switch:SWITCH",
+        "hcsr04": "hcsr04:HCSR04",
+        "mpu6050": "mpu6050:MPU6050",
+        "ina219": "ina219:INA219",
+        "cpu_temperature": "cpu_temperature:CPU_TEMPERATURE",
+        "bus_servo": "servos.output:TENDONS",
+        "as5600": "as5600:AS5600",
     },
 )
 """Kinds of sensors."""
@@ -331,11 +320,11 @@ SENSORS: Final = Chips(
 OUTPUTS: Final = Chips(
     OutputChip,
     {
-        "hbridge": f"{_HERE}.motors:HBRIDGE",
-        "phase_enable": f"{_HERE}.motors:PHASE_ENABLE",
-        "servo": f"{_HERE}.pulse:SERVO",
-        "esc": f"{_HERE}.pulse:ESC",
-        "bus_servo": f"{_HERE}.servos.output:BUS_SERVO",
+        "hbridge": "motors:HBRIDGE",
+        "phase_enable": "motors:PHASE_ENABLE",
+        "servo": "pulse:SERVO",
+        "esc": "pulse:ESC",
+        "bus_servo": "servos.output:BUS_SERVO",
     },
 )
 """Kinds of outputs."""
@@ -343,9 +332,9 @@ OUTPUTS: Final = Chips(
 PULSES: Final = Chips(
     PulseSource,
     {
-        "pca9685": f"{_HERE}.pca9685:PCA9685",
-        "lgpio": f"{_HERE}.pulse:LGPIO",
-        "sysfs": f"{_HERE}.pulse:SYSFS",
+        "pca9685": "pca9685:PCA9685",
+        "lgpio": "pulse:LGPIO",
+        "sysfs": "pulse:SYSFS",
     },
 )
 """Sources of pulses."""

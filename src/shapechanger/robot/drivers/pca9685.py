@@ -7,6 +7,7 @@ input.
 
 from __future__ import annotations
 
+import struct
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -42,7 +43,7 @@ _TOTEM_POLE: Final = 0x04  # MODE2, OUTDRV; outputs change at the stop of a tran
 
 _OSCILLATOR_MHZ: Final = 25.0  # Internal oscillator; boards deviate, so calibrate the widths.
 _STEPS: Final = 4096
-_NO_PULSE: Final = 0x1000  # Bit 4 of OFF_H: no pulses.
+_FULL: Final = 0x1000  # Bit 4 of ON_H and OFF_H: always on, always off. Off wins.
 _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section 7.3.1.1).
 
 # Unchanged pulses are not rewritten; the chip is polled now and then, because it sleeps after a
@@ -74,11 +75,6 @@ class Pca9685Keys(I2cKeys, frozen=True, kw_only=True):
             yield Claim("output_enable", f"GPIO{self.output_enable}", board)
 
 
-def prescale_for(hz: float) -> int:
-    """Return the prescaler for a frequency: round(25 MHz / (4096 hz)) - 1, section 7.3.5."""
-    return round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1
-
-
 class Pca9685(I2cDevice):
     """One chip, shared by its channels within the process.
 
@@ -100,7 +96,7 @@ class Pca9685(I2cDevice):
         self.output_enable = keys.output_enable
         self.steps: dict[int, int | None] = {}
         self._wakes_up_s = _WAKE_UP_S if hardware.clock.is_real else 0.0
-        self._prescale = prescale_for(hz)
+        self._prescale = round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1  # Section 7.3.5.
         self.step_us = (self._prescale + 1) / _OSCILLATOR_MHZ
         self._must_start = False
         self._unchanged = 0
@@ -118,7 +114,7 @@ class Pca9685(I2cDevice):
             self._start()
             if self._enable is not None:
                 # Pulses left by a dead process must not return with the first pulse.
-                self.write_registers(_ALL_OFF_H, _NO_PULSE >> 8)
+                self.write_registers(_ALL_OFF_H, _FULL >> 8)
             self._opened = undo.pop_all()
 
     def send(self, channel: int, steps: int) -> None:
@@ -137,7 +133,7 @@ class Pca9685(I2cDevice):
         """Stop the pulses of a channel; after the last one, disable the outputs."""
         self.steps[channel] = None
         with ExitStack() as stack:
-            stack.callback(self._write, channel, _NO_PULSE)
+            stack.callback(self._write, channel, _FULL)
             if not self._sends():
                 self._switch(False)  # First, because a hanging bus takes a second to fail.
 
@@ -152,7 +148,7 @@ class Pca9685(I2cDevice):
         asleep = mode & _SLEEP or prescale != self._prescale
         if asleep:
             # No pulses first, so that none restart with the oscillator.
-            self.write_registers(_ALL_OFF_H, _NO_PULSE >> 8)
+            self.write_registers(_ALL_OFF_H, _FULL >> 8)
             self.write_registers(_MODE1, _AUTO_INCREMENT | _SLEEP)
             self.write_registers(_PRESCALE, self._prescale)
         self.write_registers(_MODE2, _TOTEM_POLE)
@@ -170,7 +166,7 @@ class Pca9685(I2cDevice):
             self._switch(self._sends() and None not in self.steps.values())
 
     def _sends(self) -> bool:
-        return any(steps not in (None, _NO_PULSE) for steps in self.steps.values())
+        return any(steps not in (None, _FULL) for steps in self.steps.values())
 
     def _switch(self, on: bool) -> None:
         if self._enable is not None:
@@ -240,7 +236,6 @@ _LAST_LED: Final = 0x45
 _FIRST_ALL_LED: Final = 0xFA
 _MIN_PRESCALE: Final = 3
 _RESTART: Final = 0x80
-_FULL: Final = 0x10  # Bit 4 of ON_H and OFF_H: always on, always off. Off wins.
 
 
 class SimulatedPca9685(SimulatedChip):
@@ -254,7 +249,7 @@ class SimulatedPca9685(SimulatedChip):
         # Section 7.3, table 4: after power-on it sleeps, with all channels fully off.
         self._registers[_MODE1] = 0x11
         self._registers[0x01:0x06] = bytes((0x04, 0xE2, 0xE4, 0xE8, 0xE0))
-        self._registers[_CHANNEL_0 + 3 : _LAST_LED + 1 : 4] = bytes([_FULL]) * _CHANNELS
+        self._registers[_CHANNEL_0 + 3 : _LAST_LED + 1 : 4] = bytes([_FULL >> 8]) * _CHANNELS
         self._registers[_PRESCALE] = 0x1E
         self._halted: set[int] = set()  # Channels that wait for RESTART after a sleep.
 
@@ -263,25 +258,23 @@ class SimulatedPca9685(SimulatedChip):
         """Pulses of all channels; 0 us for a channel that is off."""
         period_s = _STEPS * (self._registers[_PRESCALE] + 1) / (_OSCILLATOR_MHZ * 1e6)
         hz = 1.0 / period_s
-        return [
-            Pulse(self._counts(channel) / _STEPS * period_s * 1e6, hz)
-            for channel in range(_CHANNELS)
-        ]
+        counts = map(self._counts, range(_CHANNELS))
+        return [Pulse(on / _STEPS * period_s * 1e6, hz) for on in counts]
 
     def read(self, register: int, length: int) -> list[int]:
         """Read bytes from a register on; without auto-increment all of that register."""
-        return [self._registers[at] for at in self._addressed(register, length)]
+        step = self._step
+        return [self._registers[(register + step * i) % 256] for i in range(length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, starting at a register."""
-        # Auto-increment is as MODE1 had it when the transfer began.
-        for at, byte in zip(self._addressed(register, len(data)), data, strict=True):
-            self._write_byte(at, byte)
+        """Write bytes from a register on; without auto-increment all to that register."""
+        step = self._step  # As it was when the transfer began.
+        for i, byte in enumerate(data):
+            self._write_byte((register + step * i) % 256, byte)
 
-    def _addressed(self, register: int, length: int) -> list[int]:
-        if self._registers[_MODE1] & _AUTO_INCREMENT:
-            return [(register + i) % 256 for i in range(length)]
-        return [register] * length
+    @property
+    def _step(self) -> int:
+        return int(bool(self._registers[_MODE1] & _AUTO_INCREMENT))
 
     def _write_byte(self, at: int, byte: int) -> None:
         if at == _MODE1:
@@ -314,15 +307,10 @@ class SimulatedPca9685(SimulatedChip):
         """Return for how many counts of a period a channel is on."""
         if self._registers[_MODE1] & _SLEEP or channel in self._halted:
             return 0
-        at = _CHANNEL_0 + 4 * channel
-        on_low, on_high, off_low, off_high = self._registers[at : at + 4]
-        if off_high & _FULL:
+        on, off = struct.unpack_from("<2H", self._registers, _CHANNEL_0 + 4 * channel)
+        if off & _FULL:
             return 0
-        if on_high & _FULL:
-            return _STEPS
-        on = (on_high & 0x0F) << 8 | on_low
-        off = (off_high & 0x0F) << 8 | off_low
-        return (off - on) % _STEPS
+        return _STEPS if on & _FULL else (off - on) % _STEPS
 
 
 def _pulse_of(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:

@@ -6,9 +6,8 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal, cast
 
 from msgspec import Meta
 
@@ -40,14 +39,15 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
         hz: Pulses per second; equal for all channels of a chip.
     """
 
-    widths: ClassVar[tuple[str, str, str]]  # Keys of the widths at -1, 0 and 1.
+    widths: ClassVar[tuple[str, str, str]]
+    """Keys of the widths at -1, 0 and 1; that at 1 is the smaller one for a turned servo."""
 
     over: str
     hz: Annotated[int, Meta(ge=40, le=400)] = 50
 
     def __post_init__(self) -> None:
         """Refuse an empty range of pulses, or a pulse that is longer than its period."""
-        first, middle, last = (getattr(self, key) for key in self.widths)
+        first, middle, last = self._widths_us()
         low, high = sorted((first, last))
         if not low < middle < high:
             ends = f"{self.widths[0]} and {self.widths[2]}, {low} and {high}"
@@ -55,46 +55,26 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
         if high * self.hz >= 1_000_000:
             raise KeyMistake("hz", f"leaves no time for a pulse of {high} µs")
 
-
-@dataclass(frozen=True, slots=True)
-class PulseRange:
-    """Pulse widths at -1, 0 and 1, with linear interpolation.
-
-    Attributes:
-        low_us: Width at -1: left, or backward.
-        middle_us: Width at 0: centre, or neutral.
-        high_us: Width at 1: right, or forward. Smaller than `low_us` where a servo is mounted the
-            other way round.
-    """
-
-    low_us: float
-    middle_us: float
-    high_us: float
-
-    def __post_init__(self) -> None:
-        if (self.low_us - self.middle_us) * (self.high_us - self.middle_us) >= 0.0:
-            raise RobotError(
-                f"A middle of {self.middle_us} us must lie between {self.low_us} us and "
-                f"{self.high_us} us."
-            )
-
-    @classmethod
-    def of(cls, output: OutputPlan) -> PulseRange:
-        """Return the pulse widths of a servo or a controller."""
-        chip = OUTPUTS[output.driver]
-        return cls(*(getattr(chip.keys.of(output.settings), key) for key in chip.pulses))
-
     def width_us(self, value: float) -> float:
         """Return the width for a value, which is clipped to -1 to 1."""
-        end_us = self.high_us if value > 0.0 else self.low_us
-        return self.middle_us + (end_us - self.middle_us) * min(abs(value), 1.0)
+        low_us, middle_us, high_us = self._widths_us()
+        end_us = high_us if value > 0.0 else low_us
+        return middle_us + (end_us - middle_us) * min(abs(value), 1.0)
 
     def value(self, width_us: float) -> float:
         """Return the value of a width."""
-        up = (width_us - self.middle_us) / (self.high_us - self.middle_us)
-        if up >= 0.0:
-            return up
-        return -(width_us - self.middle_us) / (self.low_us - self.middle_us)
+        low_us, middle_us, high_us = self._widths_us()
+        up = (width_us - middle_us) / (high_us - middle_us)
+        return up if up >= 0.0 else -(width_us - middle_us) / (low_us - middle_us)
+
+    def _widths_us(self) -> tuple[int, int, int]:
+        low, middle, high = self.widths
+        return getattr(self, low), getattr(self, middle), getattr(self, high)
+
+
+def pulsed_keys(output: OutputPlan) -> PulsedKeys:
+    """Return the keys of a servo or a controller."""
+    return cast("PulsedKeys", OUTPUTS[output.driver].keys.of(output.settings))
 
 
 class _WholeMicroseconds:
@@ -227,7 +207,7 @@ class _PulsedOutput:
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         self._name = f"Output {plan.name!r}"
-        self._pulses = PulseRange.of(plan)
+        self._keys = pulsed_keys(plan)
         with device_errors(self._name):
             self._channel = PULSES[plan.settings["over"]].open(plan, hardware)
 
@@ -244,8 +224,8 @@ class _PulsedOutput:
     def _send(self, value: float) -> float:
         """Send the pulse of a value, and return the value of the applied pulse."""
         with device_errors(self._name):
-            width_us = self._channel.write_us(self._pulses.width_us(value))
-        return self._pulses.value(width_us)
+            width_us = self._channel.write_us(self._keys.width_us(value))
+        return self._keys.value(width_us)
 
 
 def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
@@ -256,15 +236,16 @@ def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], Wi
         raise RobotError(
             f"Output {plan.name!r}: the twin has no servos over {over!r}; it has them over {has}."
         )
-    pulse_us, pulses = pulse_of(plan, duty), PulseRange.of(plan)
-    tolerance = _DEAD_BAND_US / abs(pulses.high_us - pulses.middle_us)
+    pulse_us, keys = pulse_of(plan, duty), pulsed_keys(plan)
+    middle_us = keys.width_us(0.0)
+    tolerance = _DEAD_BAND_US / abs(keys.width_us(1.0) - middle_us)
 
     def state(levels: Levels) -> WiredOutput:
         if not (us := pulse_us(levels)):
             return WiredOutput(None, True)
-        if stands_still and abs(us - pulses.middle_us) <= _DEAD_BAND_US:
+        if stands_still and abs(us - middle_us) <= _DEAD_BAND_US:
             return WiredOutput(0.0, True)
-        value = max(-1.0, min(1.0, pulses.value(us)))
+        value = max(-1.0, min(1.0, keys.value(us)))
         return WiredOutput(value, not stands_still and abs(value - rest) <= tolerance)
 
     return state

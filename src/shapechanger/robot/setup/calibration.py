@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from typing import Any, Final, Literal
 
+from msgspec.structs import replace
+
 from shapechanger.contract.plan import GuardPlan, OutputPlan
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, As5600
-from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.drivers.pulse import PulseRange
+from shapechanger.robot.drivers.chip import OUTPUTS, KeyMistake
+from shapechanger.robot.drivers.pulse import pulsed_keys
 from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
 from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_settings
 from shapechanger.robot.guard.outputs import Switches
@@ -33,7 +35,7 @@ def widest_pulses(output: OutputPlan) -> dict[str, int]:
 def reading(output: OutputPlan, value: float) -> str:
     """Describe a servo, controller or motor at a value, -1 to 1, in the unit of its settings."""
     if OUTPUTS[output.driver].pulses:
-        return f"{PulseRange.of(output).width_us(value):.0f} µs"
+        return f"{pulsed_keys(output).width_us(value):.0f} µs"
     return f"duty {abs(value) * output.settings['full']:.2f}"
 
 
@@ -44,10 +46,14 @@ def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
         output: The output, with the settings for jogging.
         found: Values of its low end, middle and high end, -1 to 1.
     """
-    keys, jogged = OUTPUTS[output.driver].pulses, PulseRange.of(output)
+    jogged = pulsed_keys(output)
     widths = [round(jogged.width_us(value)) for value in found]
-    PulseRange(*map(float, widths))  # Checks the order.
-    return {f"output.{output.name}.{key}": us for key, us in zip(keys, widths, strict=True)}
+    changes = dict(zip(jogged.widths, widths, strict=True))
+    with translate_errors(
+        KeyMistake, to=lambda error: RobotError(f"{error.key} of {output.name} {error}.")
+    ):
+        replace(jogged, **changes)  # Checks the order.
+    return {f"output.{output.name}.{key}": us for key, us in changes.items()}
 
 
 def motor_changes(
