@@ -168,18 +168,35 @@ class SensorDriver(Protocol):
         """Close the pins."""
 
 
-class PulseChannel(Protocol):
-    """Source of the pulses of one servo."""
+class PulseChannel:
+    """Source of the pulses of one servo, in whole microseconds, sent only when they change.
+
+    A kind defines `_pulse`, or has other steps and its own `write_us` and `release`.
+    """
+
+    _width_us: int | None = None
 
     def write_us(self, width_us: float) -> float:
         """Send pulses of this width from now on, and return the applied width."""
-        ...
+        self._send(round(width_us))
+        return float(round(width_us))
 
     def release(self) -> None:
         """Stop the pulses."""
+        self._send(0)
 
     def close(self) -> None:
         """Stop the pulses and close."""
+        self.release()
+
+    def _send(self, width_us: int) -> None:
+        if width_us != self._width_us:
+            self._width_us = None  # A failed write may still have taken effect.
+            self._pulse(width_us)
+            self._width_us = width_us
+
+    def _pulse(self, width_us: int) -> None:
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)

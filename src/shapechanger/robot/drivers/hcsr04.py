@@ -53,8 +53,6 @@ class Hcsr04:
         self._trigger_ns = _TRIGGER_NS if hardware.clock.is_real else 0
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._rise: float | None = None
-        self._echo_s: float | None = None
-        self._answered = False  # Whether the line has changed since the last read.
         self._distance_m: float | None = None
         self._pinged_ns: int | None = None
         self._unanswered = 0  # Pings since the line changed.
@@ -72,16 +70,10 @@ class Hcsr04:
         Raises:
             RobotError: If three consecutive pings had no echo, so that the last distance is old.
         """
-        with self._lock:
-            echo_s, self._echo_s = self._echo_s, None
-            answered, self._answered = self._answered, False
-        if echo_s is not None:
-            self._distance_m = min(echo_s * _SOUND_M_PER_S / 2.0, self._max_m)
-        if answered:
-            self._unanswered = 0
         if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
             self._pinged_ns = now_ns
-            self._unanswered += 1
+            with self._lock:
+                self._unanswered += 1
             with device_errors(self._name):
                 self._trigger.on()
                 # Spin: the shortest sleep takes several times as long, and the guard waits for it.
@@ -90,10 +82,11 @@ class Hcsr04:
                     while time.perf_counter_ns() < end_ns:
                         pass
                 self._trigger.off()
-        if self._unanswered > _MOST_MISSED:
+        with self._lock:
+            if self._unanswered <= _MOST_MISSED:
+                return {} if self._distance_m is None else {"distance": self._distance_m}
             self._distance_m = None
-            raise RobotError(f"{self._name} receives no echo: check its wires and its 5 V supply.")
-        return {} if self._distance_m is None else {"distance": self._distance_m}
+        raise RobotError(f"{self._name} receives no echo: check its wires and its 5 V supply.")
 
     def close(self) -> None:
         """Close the pins."""
@@ -102,11 +95,12 @@ class Hcsr04:
 
     def _changed(self, at_s: float, level: int) -> None:
         with self._lock:
-            self._answered = True
+            self._unanswered = 0
             if level:
                 self._rise = at_s
             elif self._rise is not None:
-                self._echo_s = self._ticks_diff(at_s, self._rise)
+                echo_s = self._ticks_diff(at_s, self._rise)
+                self._distance_m = min(echo_s * _SOUND_M_PER_S / 2.0, self._max_m)
                 self._rise = None
 
 

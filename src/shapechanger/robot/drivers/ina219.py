@@ -5,7 +5,6 @@ Registers: Texas Instruments, INA219 data sheet, SBOS448G, section 8.6.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Final
 
 from msgspec import Meta
@@ -21,8 +20,7 @@ if TYPE_CHECKING:  # Only a twin has a world.
 
 _CONFIGURATION: Final = 0x00
 _BUS_VOLTAGE: Final = 0x02
-_AT_POWER_ON: Final = 0x399F  # Configuration: 32 V, continuously.
-_RESET: Final = 0x8000  # Bit of the configuration.
+_CONTINUOUS_32_V: Final = 0x399F  # Also the value at power-on.
 _CONVERSION_READY: Final = 0x2  # Bit of the bus voltage.
 _V_PER_STEP: Final = 0.004
 _STATUS_BITS: Final = 3  # Below the voltage: two flags and one unused bit.
@@ -42,7 +40,7 @@ class Ina219(I2cDevice):
         super().__init__(f"Sensor {plan.name!r}", Ina219Keys.of(plan.settings), hardware)
         self._read_ns: int | None = None
         self._volts = 0.0
-        self.write_registers(_CONFIGURATION, *_AT_POWER_ON.to_bytes(2))
+        self.write_registers(_CONFIGURATION, *_CONTINUOUS_32_V.to_bytes(2))
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the voltage of the "battery" in V, updated ten times a second."""
@@ -54,7 +52,7 @@ class Ina219(I2cDevice):
 
 
 class SimulatedIna219(SimulatedChip):
-    """INA219: voltage of the battery, in registers of 16 bits; the current is not simulated.
+    """INA219: voltage of the battery, in registers of 16 bits; no other one is simulated.
 
     Args:
         world: What it measures.
@@ -62,21 +60,14 @@ class SimulatedIna219(SimulatedChip):
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._configuration = _AT_POWER_ON
 
     def read(self, register: int, length: int) -> list[int]:
         """Read one register; its two bytes repeat."""
-        word = self._configuration if register == _CONFIGURATION else 0
+        word = 0
         if register == _BUS_VOLTAGE:
             steps = round(self._world.inputs().battery_v / _V_PER_STEP)
             word = min(steps, 0x1FFF) << _STATUS_BITS | _CONVERSION_READY
         return [word >> 8 if i % 2 == 0 else word & 0xFF for i in range(length)]
-
-    def write(self, register: int, data: Sequence[int]) -> None:
-        """Write the configuration; the chip accepts only whole registers."""
-        if register == _CONFIGURATION and len(data) == 2:
-            word = data[0] << 8 | data[1]
-            self._configuration = _AT_POWER_ON if word & _RESET else word
 
 
 INA219: Final = SensorChip(

@@ -94,9 +94,7 @@ class Mpu6050(I2cDevice):
 
 
 _GYRO_ZOUT_L: Final = 0x48
-_RESET: Final = 0x80  # PWR_MGMT_1.
-_SLEEP: Final = 0x40
-
+_SLEEP: Final = 0x40  # PWR_MGMT_1.
 _LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)  # Section 4.17.
 _LSB_PER_DEG_PER_S: Final = (131.0, 65.5, 32.8, 16.4)  # Section 4.19.
 _ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
@@ -112,7 +110,8 @@ class SimulatedMpu6050(SimulatedChip):
     def __init__(self, world: World) -> None:
         self._world = world
         self._registers = bytearray(128)
-        self._wake_up()
+        self._registers[_PWR_MGMT_1] = _SLEEP
+        self._registers[_WHO_AM_I] = _IDENTITY
 
     def read(self, register: int, length: int) -> list[int]:
         """Read bytes, starting at a register."""
@@ -122,17 +121,9 @@ class SimulatedMpu6050(SimulatedChip):
 
     def write(self, register: int, data: Sequence[int]) -> None:
         """Write bytes, starting at a register."""
-        for i, byte in enumerate(data):
-            at = (register + i) % 128
-            if at == _PWR_MGMT_1 and byte & _RESET:
-                self._wake_up()
-            elif at != _WHO_AM_I:
-                self._registers[at] = byte
-
-    def _wake_up(self) -> None:
-        self._registers[:] = bytes(128)
-        self._registers[_PWR_MGMT_1] = _SLEEP
-        self._registers[_WHO_AM_I] = _IDENTITY
+        for at, byte in enumerate(data, register):
+            if at % 128 != _WHO_AM_I:
+                self._registers[at % 128] = byte
 
     def _measure(self) -> None:
         if self._registers[_PWR_MGMT_1] & _SLEEP:

@@ -18,7 +18,7 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import Claim, PulseSource, device_errors
+from shapechanger.robot.drivers.chip import Claim, PulseChannel, PulseSource, device_errors
 from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, i2c_claims
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin
 from shapechanger.robot.drivers.simulation import (
@@ -187,8 +187,8 @@ class Pca9685(I2cDevice):
 _OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 
 
-class Pca9685Channel:
-    """One channel, opened without pulses; see `PulseChannel`.
+class Pca9685Channel(PulseChannel):
+    """One channel, opened without pulses.
 
     Raises:
         RobotError: If the chip does not respond, the channel is used twice, or another channel of
@@ -216,7 +216,7 @@ class Pca9685Channel:
             self._opened = undo.pop_all()
 
     def write_us(self, width_us: float) -> float:
-        """Send pulses of this width, rounded to steps; see `PulseChannel.write_us`."""
+        """Send pulses of this width, rounded to steps, and return the applied width."""
         step_us = self._chip.step_us
         steps = min(max(round(width_us / step_us), 0), _STEPS - 1)
         self._chip.send(self._channel, steps)

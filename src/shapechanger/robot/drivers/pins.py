@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 HIGHEST_BCM: Final = 27
 """Largest BCM number on the header; the smallest is 0."""
@@ -49,19 +49,16 @@ def bcm(written: object) -> int:
     Raises:
         ValueError: If there is no such pin; the message is a reason after a comma, or empty.
     """
-    if type(written) is int:
-        number = written
-    elif isinstance(written, str) and (match := _WRITTEN.fullmatch(written)):
-        number = int(match[2])
+    number = written
+    if isinstance(written, str) and (match := _WRITTEN.fullmatch(written)):
+        number = place = int(match[2])
         if match[1] == "BOARD":
-            if number in _POWER_OF_BOARD:
-                raise ValueError(f"and {written} is {_POWER_OF_BOARD[number]}")
-            if number not in BCM_OF_BOARD:
+            if place in _POWER_OF_BOARD:
+                raise ValueError(f"and {written} is {_POWER_OF_BOARD[place]}")
+            if place not in BCM_OF_BOARD:
                 raise ValueError("and the header has the places 1 to 40")
-            number = BCM_OF_BOARD[number]
-    else:
-        raise ValueError
-    if not 0 <= number <= HIGHEST_BCM:
+            number = BCM_OF_BOARD[place]
+    if type(number) is not int or not 0 <= number <= HIGHEST_BCM:
         raise ValueError
     return number
 
@@ -71,22 +68,17 @@ class EdgeInput:
 
     Args:
         pin: BCM number.
-        pull: Direction of the internal pull resistor.
+        pull: Direction of the internal pull resistor, "up" or "down".
         factory: Pin factory of gpiozero.
         changed: Receives the time, s, on its own clock, and the new level. lgpio calls it from
             its own thread.
     """
 
     def __init__(
-        self,
-        pin: int,
-        pull: Literal["up", "down"],
-        factory: Any,
-        changed: Callable[[float, int], None],
+        self, pin: int, pull: str, factory: Any, changed: Callable[[float, int], None]
     ) -> None:
         from gpiozero import InputDevice  # A twin's worlds need no gpiozero.
 
-        self._active = 0 if pull == "up" else 1
         self._changed = changed
         self._device = InputDevice(pin, pull_up=pull == "up", pin_factory=factory)
         # gpiozero's devices do not pass the timestamp on; their pins do.
@@ -96,7 +88,7 @@ class EdgeInput:
     @property
     def level(self) -> int:
         """Current level, 0 or 1."""
-        return self._active if self._device.is_active else 1 - self._active
+        return int(self._device.pin.state)
 
     def close(self) -> None:
         """Close the pin."""

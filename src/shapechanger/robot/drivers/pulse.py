@@ -20,6 +20,7 @@ from shapechanger.robot.drivers.chip import (
     KeyMistake,
     Keys,
     OutputChip,
+    PulseChannel,
     PulseSource,
     device_errors,
 )
@@ -77,34 +78,6 @@ def pulsed_keys(output: OutputPlan) -> PulsedKeys:
     return cast("PulsedKeys", OUTPUTS[output.driver].keys.of(output.settings))
 
 
-class _WholeMicroseconds:
-    """Channel with pulses of whole microseconds, sent when they change; see `PulseChannel`."""
-
-    _width_us: int | None = None
-
-    def write_us(self, width_us: float) -> float:
-        """Send pulses of this width; see `PulseChannel.write_us`."""
-        self._send(round(width_us))
-        return float(round(width_us))
-
-    def release(self) -> None:
-        """Stop the pulses; the pin stays low."""
-        self._send(0)
-
-    def close(self) -> None:
-        """Stop the pulses."""
-        self._send(0)
-
-    def _send(self, width_us: int) -> None:
-        if width_us != self._width_us:
-            self._width_us = None  # A failed write may still have taken effect.
-            self._pulse(width_us)
-            self._width_us = width_us
-
-    def _pulse(self, width_us: int) -> None:
-        raise NotImplementedError
-
-
 class _LgpioKeys(Keys, frozen=True, kw_only=True):
     """Pulses directly on a pin.
 
@@ -115,7 +88,7 @@ class _LgpioKeys(Keys, frozen=True, kw_only=True):
     pin: Pin
 
 
-class _PinChannel(_WholeMicroseconds):
+class _PinChannel(PulseChannel):
     """Pulses on a pin, by its factory."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
@@ -155,38 +128,35 @@ class _SysfsKeys(Keys, frozen=True, kw_only=True):
         yield Claim("channel", f"channel {self.channel} of PWM chip {self.chip}")
 
 
-class SysfsPwm(_WholeMicroseconds):
-    """One channel of the PWM hardware; see `PulseChannel`."""
+class SysfsPwm(PulseChannel):
+    """One channel of the PWM hardware."""
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         keys = _SysfsKeys.of(plan.settings)
         chip = _ROOT / f"pwmchip{keys.chip}"
-        self._name = f"Channel {keys.channel} of {chip}"
         self._folder = chip / f"pwm{keys.channel}"
-        with device_errors(self._name):
-            if not self._folder.exists():
-                (chip / "export").write_text(f"{keys.channel}\n")
-            period_ns, deadline = 1_000_000_000 // plan.settings["hz"], time.monotonic() + _EXPORT_S
-            while True:
-                try:
-                    self._write("period", period_ns)
-                    break
-                except (PermissionError, FileNotFoundError):
-                    if time.monotonic() >= deadline:
-                        raise
-                    time.sleep(0.01)
-            self._send(0)
-            self._write("enable", 1)
+        if not self._folder.exists():
+            (chip / "export").write_text(f"{keys.channel}\n")
+        period_ns, deadline = 1_000_000_000 // plan.settings["hz"], time.monotonic() + _EXPORT_S
+        while True:
+            try:
+                self._write("period", period_ns)
+                break
+            except (PermissionError, FileNotFoundError):
+                if time.monotonic() >= deadline:
+                    raise
+                time.sleep(0.01)
+        self._send(0)
+        self._write("enable", 1)
 
     def close(self) -> None:
         """Stop the pulses and disable the channel."""
-        with device_errors(self._name), ExitStack() as stack:
+        with ExitStack() as stack:
             stack.callback(self._write, "enable", 0)
             self._send(0)
 
     def _pulse(self, width_us: int) -> None:
-        with device_errors(self._name):
-            self._write("duty_cycle", width_us * 1000)
+        self._write("duty_cycle", width_us * 1000)
 
     def _write(self, file: str, number: int) -> None:
         (self._folder / file).write_text(f"{number}\n")
@@ -358,11 +328,21 @@ class Esc(_PulsedOutput):
             self._neutral_since_ns = now_ns
         if now_ns - self._neutral_since_ns < self._arm_ns:
             return self._send(0.0)
-        if value < 0.0:
-            return self._backward(value, now_ns)
-        self._backward_since_ns = None
-        if value > 0.0:
-            self._reverses = False  # After forward motion it brakes first.
+        if value >= 0.0:
+            self._backward_since_ns = None
+            self._reverses = self._reverses and value == 0.0  # After driving forward it brakes.
+        elif self._reverse == "none":
+            return self._send(0.0)
+        elif self._reverse == "double" and not self._reverses:
+            if self._backward_since_ns is None:
+                self._backward_since_ns = now_ns
+            since_ns = now_ns - self._backward_since_ns
+            if since_ns < self._brake_ns:
+                self._send(value)
+                return 0.0  # It brakes and does not reverse.
+            if since_ns < 2 * self._brake_ns:
+                return self._send(0.0)
+            self._reverses = True
         return self._send(value)
 
     def release(self) -> None:
@@ -370,22 +350,6 @@ class Esc(_PulsedOutput):
         self._neutral_since_ns = self._backward_since_ns = None
         self._reverses = False
         super().release()
-
-    def _backward(self, value: float, now_ns: int) -> float:
-        if self._reverse == "none":
-            return self._send(0.0)
-        if self._reverse == "direct" or self._reverses:
-            return self._send(value)
-        if self._backward_since_ns is None:
-            self._backward_since_ns = now_ns
-        since_ns = now_ns - self._backward_since_ns
-        if since_ns < self._brake_ns:
-            self._send(value)
-            return 0.0  # It brakes and does not reverse.
-        if since_ns < 2 * self._brake_ns:
-            return self._send(0.0)
-        self._reverses = True
-        return self._send(value)
 
     def _send(self, value: float) -> float:
         # Neutral reads as 0, even if the pulse steps do not hit it exactly.
@@ -425,17 +389,15 @@ class SpeedController:
             now_ns: Time, ns.
         """
         if value is None:
-            self._neutral_since_ns = None
             self._armed = self._braked = self._reverses = False
-            return 0.0
-        if value == 0.0:
+        elif value == 0.0:
             if self._neutral_since_ns is None:
                 self._neutral_since_ns = now_ns
             self._armed = self._armed or now_ns - self._neutral_since_ns >= self._arm_ns
             self._reverses = self._reverses or self._braked
             return 0.0
         self._neutral_since_ns = None
-        if not self._armed:
+        if value is None or not self._armed:
             return 0.0
         if value > 0.0:
             self._braked = self._reverses = False
