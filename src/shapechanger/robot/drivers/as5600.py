@@ -176,12 +176,7 @@ _STATUS_OF: Final = {
 
 
 class SimulatedAs5600(SimulatedChip):
-    """AS5600: magnetic encoder of a joint.
-
-    Args:
-        keys: Keys of the joint.
-        angle: Reads the measured angle, rad.
-    """
+    """AS5600: magnetic encoder of a joint, with what reads its angle, rad."""
 
     def __init__(self, keys: JointKeys, angle: Callable[[], float]) -> None:
         self._keys = keys
@@ -255,16 +250,11 @@ class ChannelsBehind(SimulatedChip):
 class SimulatedJoints(SimulatedSensor):
     """A multiplexer and the encoders behind it.
 
-    Args:
-        plan: The sensor.
-        world: World with these joints, whose `measured_angle` returns one reading of a joint's
-            angle, rad, with the noise of its encoder; in a world without it all stand at zero.
+    `measured_angle` of the world returns one reading of a joint's angle, rad, with the noise of its
+    encoder, and raises RobotError for a joint of which it has none. Without it all stand at zero.
 
     Attributes:
         encoders: Encoders by joint.
-
-    Raises:
-        RobotError: If the world has other joints.
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:

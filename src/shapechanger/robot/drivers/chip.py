@@ -37,20 +37,21 @@ if TYPE_CHECKING:  # The guard loads neither.
     from shapechanger.layout import Feature
 
 _GROUP: Final = "shapechanger.drivers"
-_PRINTABLE: Final = r"\A(?=.*\S)[\x20-\x7e\xa0-\U0010ffff]+\Z"
 
-_TEXT: Final = "a text of 1 to {} characters that can be printed"
 
-Text = Annotated[
-    str,
-    Meta(min_length=1, max_length=64, pattern=_PRINTABLE, description=_TEXT.format(64)),
-]
+def _printable(longest: int) -> Meta:
+    return Meta(
+        min_length=1,
+        max_length=longest,
+        pattern=r"\A(?=.*\S)[\x20-\x7e\xa0-\U0010ffff]+\Z",
+        description=f"a text of 1 to {longest} characters that can be printed",
+    )
+
+
+Text = Annotated[str, _printable(64)]
 """A name, as long as names in messages may be; see `shapechanger.robot.link.messages`."""
 
-FilePath = Annotated[
-    str,
-    Meta(min_length=1, max_length=4096, pattern=_PRINTABLE, description=_TEXT.format(4096)),
-]
+FilePath = Annotated[str, _printable(4096)]
 """Path of a file or a device."""
 
 
@@ -68,11 +69,11 @@ class KeyMistake(ValueError):
 
 
 class Claim(NamedTuple):
-    """Something that only one key of a profile may use: a pin, a channel or an address.
+    """Something that only one key of a profile may use.
 
     Attributes:
         key: Name of the key that claims it.
-        what: The pin, channel or address.
+        what: A pin, a channel or an address.
         group: Users of one group may share it; "" for exclusive use.
         use: What it is used for, as the end of a sentence; may be empty.
     """
@@ -109,11 +110,7 @@ class Keys(msgspec.Struct, frozen=True):
 
 @contextmanager
 def device_errors(device: str) -> Generator[None]:
-    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError`.
-
-    Args:
-        device: Description of the device, such as "The motor on GPIO22 and GPIO27".
-    """
+    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError` about a device."""
     try:
         yield
     except _kinds() as error:
@@ -261,13 +258,13 @@ class PulseSource:
     Attributes:
         keys: Its keys in a profile.
         open: Opens the channel of an output, without sending any pulses.
-        pulse_of: Reads the width of its pulses on a twin, µs; None for a source that no twin has.
+        pulse_us: Reads the width of its pulses on a twin, µs; None for a source that no twin has.
         chips: Its chips on I2C buses.
     """
 
     keys: type[Keys]
     open: Callable[[OutputPlan, Hardware], PulseChannel]
-    pulse_of: Callable[[OutputPlan, DutyOf], Callable[[Levels], float]] | None = None
+    pulse_us: Callable[[OutputPlan, DutyOf, Levels], float] | None = None
     chips: Callable[[OutputPlan], I2cChips] = lambda plan: {}
 
 
@@ -296,11 +293,10 @@ class Chips(Mapping[str, _Chip]):
 
     Args:
         kind: Class of the chips.
-        own: MODULE:NAME of each of ours in this package, by the name of its driver; other packages
-            cannot replace one.
+        **own: MODULE:NAME of each of ours, in this folder; other packages cannot replace one.
     """
 
-    def __init__(self, kind: type[_Chip], own: Mapping[str, str]) -> None:
+    def __init__(self, kind: type[_Chip], **own: str) -> None:
         self._kind = kind
         self._own = own
 
@@ -321,37 +317,28 @@ class Chips(Mapping[str, _Chip]):
 
 SENSORS: Final = Chips(
     SensorChip,
-    {
-        "encoder": "encoder:ENCODER",
-        "switch": "switch:SWITCH",
-        "hcsr04": "hcsr04:HCSR04",
-        "mpu6050": "mpu6050:MPU6050",
-        "ina219": "ina219:INA219",
-        "cpu_temperature": "cpu_temperature:CPU_TEMPERATURE",
-        "bus_servo": "servos.output:TENDONS",
-        "as5600": "as5600:AS5600",
-    },
+    encoder="encoder:ENCODER",
+    switch="switch:SWITCH",
+    hcsr04="hcsr04:HCSR04",
+    mpu6050="mpu6050:MPU6050",
+    ina219="ina219:INA219",
+    cpu_temperature="cpu_temperature:CPU_TEMPERATURE",
+    bus_servo="servos.output:TENDONS",
+    as5600="as5600:AS5600",
 )
 """Kinds of sensors."""
 
 OUTPUTS: Final = Chips(
     OutputChip,
-    {
-        "hbridge": "motors:HBRIDGE",
-        "phase_enable": "motors:PHASE_ENABLE",
-        "servo": "pulse:SERVO",
-        "esc": "pulse:ESC",
-        "bus_servo": "servos.output:BUS_SERVO",
-    },
+    hbridge="motors:HBRIDGE",
+    phase_enable="motors:PHASE_ENABLE",
+    servo="pulse:SERVO",
+    esc="pulse:ESC",
+    bus_servo="servos.output:BUS_SERVO",
 )
 """Kinds of outputs."""
 
 PULSES: Final = Chips(
-    PulseSource,
-    {
-        "pca9685": "pca9685:PCA9685",
-        "lgpio": "pulse:LGPIO",
-        "sysfs": "pulse:SYSFS",
-    },
+    PulseSource, pca9685="pca9685:PCA9685", lgpio="pulse:LGPIO", sysfs="pulse:SYSFS"
 )
 """Sources of pulses."""

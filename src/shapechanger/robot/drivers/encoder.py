@@ -65,8 +65,7 @@ class Encoder:
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._levels = [0, 0]  # A missing channel stays low.
         self._edges: deque[tuple[float, int]] = deque(maxlen=edges_per_count + 1)
-        self._count = 0
-        self._count_read = 0
+        self._has_new = False  # Edges since the last read.
         self._last_edge_ns = 0
         self._speed = 0.0
         self._sign = 1.0
@@ -83,12 +82,12 @@ class Encoder:
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "speed" in m/s, positive forward."""
         with self._lock:
-            edges, count = list(self._edges), self._count
+            edges = list(self._edges)
+            has_new, self._has_new = self._has_new, False
         if direction != 0.0:
             self._sign = math.copysign(1.0, direction)
-        if count != self._count_read:
-            self._count_read, self._last_edge_ns = count, now_ns
-            self._speed = 0.0
+        if has_new:
+            self._last_edge_ns, self._speed = now_ns, 0.0
             if len(edges) > 1 and (took_s := edges[-1][0] - edges[0][0]) > 0.0:
                 self._speed = sum(step for _, step in edges[1:]) * self._edge_m / took_s
         else:
@@ -120,16 +119,11 @@ class Encoder:
                 if step != before_step or at_s - before_s > _STANDS_AFTER_S:
                     self._edges.clear()
             self._edges.append((at_s, step))
-            self._count += 1
+            self._has_new = True
 
 
 class SimulatedEncoder(SimulatedSensor):
-    """A wheel encoder; forward, channel a leads.
-
-    Args:
-        plan: The sensor.
-        world: The world, in which the wheel rolls.
-    """
+    """A wheel encoder; forward, channel a leads."""
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
         keys = EncoderKeys.of(plan.settings)

@@ -115,10 +115,6 @@ _FARTHEST_M: Final = 4.0
 class SimulatedHcsr04(SimulatedSensor):
     """An HC-SR04, which answers a ping at the falling edge of its trigger.
 
-    Args:
-        plan: The sensor.
-        world: What it measures.
-
     Attributes:
         override_m: Distance to measure, m; None for the truth.
         dead: Whether it does not answer at all.

@@ -101,11 +101,7 @@ _ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
 
 
 class SimulatedMpu6050(SimulatedChip):
-    """MPU-6050: acceleration and rate of turn, with x ahead, y to the left and z up.
-
-    Args:
-        world: What it measures.
-    """
+    """MPU-6050: acceleration and rate of turn, with x ahead, y to the left and z up."""
 
     def __init__(self, world: World) -> None:
         self._world = world

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Annotated, Any, Final
 from weakref import WeakValueDictionary
@@ -239,10 +239,7 @@ _RESTART: Final = 0x80
 
 
 class SimulatedPca9685(SimulatedChip):
-    """PCA9685: 16 PWM channels, which continue when the process that set them has ended.
-
-    Comments name sections of the data sheet.
-    """
+    """PCA9685: 16 PWM channels, which continue when the process that set them has ended."""
 
     def __init__(self) -> None:
         self._registers = bytearray(256)
@@ -313,22 +310,17 @@ class SimulatedPca9685(SimulatedChip):
         return _STEPS if on & _FULL else (off - on) % _STEPS
 
 
-def _pulse_of(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
+def _pulse_us(plan: OutputPlan, duty: DutyOf, levels: Levels) -> float:
     keys = Pca9685Keys.of(plan.settings)
-    channel = PwmChannel(keys.bus, keys.address, keys.channel)
-
-    def pulse_us(levels: Levels) -> float:
-        if keys.output_enable != NO_PIN and duty(levels, keys.output_enable) > 0.0:
-            return 0.0
-        return levels.channels.get(channel, NO_PULSE).us
-
-    return pulse_us
+    if keys.output_enable != NO_PIN and duty(levels, keys.output_enable) > 0.0:
+        return 0.0
+    return levels.channels.get(PwmChannel(keys.bus, keys.address, keys.channel), NO_PULSE).us
 
 
 PCA9685: Final = PulseSource(
     keys=Pca9685Keys,
     open=Pca9685Channel,
-    pulse_of=_pulse_of,
+    pulse_us=_pulse_us,
     chips=lambda plan: {(plan.settings["bus"], plan.settings["address"]): SimulatedPca9685()},
 )
 """A board with 16 channels of pulses."""

@@ -99,12 +99,11 @@ class _PinChannel(PulseChannel):
         self._factory.pulse(self._pin, width_us, self._hz)
 
 
-def _pulse_on_pin(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
-    pin = plan.settings["pin"]
-    return lambda levels: levels.pulses.get(pin, NO_PULSE).us
+def _pulse_us(plan: OutputPlan, duty: DutyOf, levels: Levels) -> float:
+    return levels.pulses.get(plan.settings["pin"], NO_PULSE).us
 
 
-LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_of=_pulse_on_pin)
+LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_us=_pulse_us)
 """Pulses on a pin, by lgpio."""
 
 
@@ -200,18 +199,16 @@ class _PulsedOutput:
 
 def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
     """Return what reads an output's state from its pulses; see `OutputChip.wire`."""
-    over, stands_still = plan.settings["over"], OUTPUTS[plan.driver].drives
-    if (pulse_of := PULSES[over].pulse_of) is None:
-        has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_of)
-        raise RobotError(
-            f"Output {plan.name!r}: the twin has no servos over {over!r}; it has them over {has}."
-        )
-    pulse_us, keys = pulse_of(plan, duty), pulsed_keys(plan)
+    keys, stands_still = pulsed_keys(plan), OUTPUTS[plan.driver].drives
+    if (pulse_us := PULSES[keys.over].pulse_us) is None:
+        has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_us)
+        over = f"over {keys.over!r}; it has them over {has}"
+        raise RobotError(f"Output {plan.name!r}: the twin has no servos {over}.")
     middle_us = keys.width_us(0.0)
     tolerance = _DEAD_BAND_US / abs(keys.width_us(1.0) - middle_us)
 
     def state(levels: Levels) -> WiredOutput:
-        if not (us := pulse_us(levels)):
+        if not (us := pulse_us(plan, duty, levels)):
             return WiredOutput(None, True)
         if stands_still and abs(us - middle_us) <= _DEAD_BAND_US:
             return WiredOutput(0.0, True)
@@ -366,9 +363,6 @@ class SpeedController:
 
     With `reverse` "double" the first backward pulses after driving forward brake; only those after
     another neutral drive backward.
-
-    Args:
-        plan: Its output.
     """
 
     def __init__(self, plan: OutputPlan) -> None:

@@ -130,7 +130,7 @@ I2cChips = Mapping[tuple[int, int], SimulatedChip]
 
 
 class SimulatedSensor:
-    """A sensor at a twin's board; a kind overrides what it has.
+    """A sensor at a twin's board; a kind, made of its plan and the world, overrides what it has.
 
     Attributes:
         chips: Its chips on I2C buses.

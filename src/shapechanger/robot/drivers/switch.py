@@ -61,10 +61,6 @@ class Switch:
 class SimulatedSwitch(SimulatedSensor):
     """Bumper switches to ground (pull "up") or to 3.3 V, all pressed at once.
 
-    Args:
-        plan: The sensor.
-        world: Not used: their state is in its readings.
-
     Attributes:
         held: Whether something outside the world presses them.
     """
