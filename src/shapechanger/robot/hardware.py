@@ -32,7 +32,7 @@ class Clock:
         return time.monotonic_ns()
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        """Wait in the guard for a readable descriptor or a time.
+        """Wait in the guard for a readable descriptor or a time, ns.
 
         Args:
             readable: File descriptors.
@@ -54,19 +54,14 @@ class Clock:
     def keep_alive(self, beat: Callable[[], object]) -> None:
         """Let a call to the hardware send heartbeats while a twin's board is held up.
 
-        A busy machine, or a world that is laid out, holds up a board as no hardware is. On a robot
-        this does nothing: a guard that hangs in a bus is silent, and must be replaced.
-
-        Args:
-            beat: Sends a heartbeat if one is due.
+        `beat` sends one if it is due. On a robot this does nothing: a guard that hangs in a bus is
+        silent, and must be replaced.
         """
 
     async def sleep(self, seconds: float) -> int | None:
-        """Let `seconds` pass in the daemon.
+        """Let `seconds` pass in the daemon, and return when the newest frame was captured, ns.
 
-        Returns:
-            Capture time of the newest frame that the camera's driver was sent by the end, ns, so
-            that the daemon can wait for it; None where frames arrive in their own time.
+        The daemon can wait for that frame. None where frames arrive in their own time.
         """
         import asyncio  # Imported here, because the guard does not need it.
 
@@ -140,9 +135,7 @@ class Hardware:
     def servo_port(self, settings: Any, open_port: Callable[[Any], Any]) -> Any:
         """Open the port of a servo bus, a `ServoPort` for `BusSettings`, both of `drivers.servos`.
 
-        Args:
-            settings: The bus.
-            open_port: Opens a serial port of this machine.
+        `open_port` opens a serial port of this machine.
         """
         return open_port(settings)
 

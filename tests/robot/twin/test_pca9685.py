@@ -77,19 +77,12 @@ def test_the_prescale_is_read_only_while_awake() -> None:
     assert chip.read(0xFE, 1) == [121]
 
 
-def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
-    """After a sleep, channels stay off until RESTART is written, as in the data sheet."""
+def test_a_sleeping_chip_sends_no_pulses() -> None:
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0x06, [0, 0, 51, 1])
     chip.write(0x00, [0x31])
     assert chip.pulses[0].us == 0.0
-    chip.write(0x00, [0x21])
-    assert chip.pulses[0].us == 0.0
-    assert chip.read(0x00, 1) == [0xA1]
-    chip.write(0x00, [0xA1])
-    assert chip.pulses[0].us > 0.0
-    assert chip.read(0x00, 1) == [0x21]
 
 
 def test_without_auto_increment_a_block_lands_in_one_register() -> None:

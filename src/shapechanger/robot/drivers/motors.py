@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from typing import Annotated, Any, Final
 
 from msgspec import Meta
@@ -54,6 +55,11 @@ class HBridgeKeys(_DutyKeys, frozen=True, kw_only=True):
     backward: Pin
     enable: OptionalPin = NO_PIN
 
+    def drive(self, duty: Callable[[Pin], float]) -> float:
+        """Return the signed duty of the motor from those of the pins, -1 to 1."""
+        enabled = 1.0 if self.enable == NO_PIN else duty(self.enable)
+        return (duty(self.forward) - duty(self.backward)) * enabled
+
 
 class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
     """Keys of a driver in phase/enable mode.
@@ -65,6 +71,11 @@ class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
 
     phase: Pin
     enable: Pin
+
+    def drive(self, duty: Callable[[Pin], float]) -> float:
+        """Return the signed duty of the motor from those of the pins, -1 to 1."""
+        # A phase that is high part of the time turns the motor back and forth.
+        return duty(self.enable) * (1.0 - 2.0 * duty(self.phase))
 
 
 class _DutyMotor:
@@ -178,31 +189,15 @@ class PhaseEnable(_DutyMotor):
             enable.value = abs(drive)
 
 
-def _wired_hbridge(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
-    keys = HBridgeKeys.of(plan.settings)
+def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    keys = (HBridgeKeys if plan.driver == "hbridge" else PhaseEnableKeys).of(plan.settings)
 
-    def drive(levels: Levels) -> float:
-        enabled = 1.0 if keys.enable == NO_PIN else duty(levels, keys.enable)
-        return (duty(levels, keys.forward) - duty(levels, keys.backward)) * enabled
+    def state(levels: Levels) -> WiredOutput:
+        drive = keys.drive(partial(duty, levels))
+        value = math.copysign(keys.duty.size_at(abs(drive)), drive)
+        return WiredOutput(value, abs(value - rest) <= (0.01 if rest else 0.0))
 
-    return lambda levels: _turning(keys.duty, drive(levels), rest)
-
-
-def _wired_phase_enable(
-    plan: OutputPlan, rest: float, duty: DutyOf
-) -> Callable[[Levels], WiredOutput]:
-    keys = PhaseEnableKeys.of(plan.settings)
-
-    def drive(levels: Levels) -> float:
-        # A phase that is high part of the time turns the motor back and forth.
-        return duty(levels, keys.enable) * (1.0 - 2.0 * duty(levels, keys.phase))
-
-    return lambda levels: _turning(keys.duty, drive(levels), rest)
-
-
-def _turning(duty: Duty, drive: float, rest: float) -> WiredOutput:
-    value = math.copysign(duty.size_at(abs(drive)), drive)
-    return WiredOutput(value, abs(value - rest) <= (0.01 if rest else 0.0))
+    return state
 
 
 _OFF: Final = WiredOutput(0.0, True)
@@ -212,7 +207,7 @@ _LIT_ENABLE: Final = ("enable", " enable", 1.0)
 HBRIDGE: Final = OutputChip(
     keys=HBridgeKeys,
     open=HBridge,
-    wire=_wired_hbridge,
+    wire=_wired,
     unpowered=_OFF,
     lights=(("forward", " forward", 1.0), ("backward", " backward", -1.0), _LIT_ENABLE),
 )
@@ -221,7 +216,7 @@ HBRIDGE: Final = OutputChip(
 PHASE_ENABLE: Final = OutputChip(
     keys=PhaseEnableKeys,
     open=PhaseEnable,
-    wire=_wired_phase_enable,
+    wire=_wired,
     unpowered=_OFF,
     lights=(_LIT_ENABLE, ("phase", " backward", -1.0)),
 )

@@ -97,7 +97,6 @@ _GYRO_ZOUT_L: Final = 0x48
 _SLEEP: Final = 0x40  # PWR_MGMT_1.
 _LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)  # Section 4.17.
 _LSB_PER_DEG_PER_S: Final = (131.0, 65.5, 32.8, 16.4)  # Section 4.19.
-_ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
 
 
 class SimulatedMpu6050(SimulatedChip):
@@ -129,7 +128,7 @@ class SimulatedMpu6050(SimulatedChip):
         per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]
         x, y = (a / _STANDARD_GRAVITY * per_g for a in (seen.acceleration_x, seen.acceleration_y))
         yaw = math.degrees(seen.yaw_rate) * per_rate
-        values = (x, y, per_g, _ROOM_TEMPERATURE, 0.0, 0.0, yaw)
+        values = (x, y, per_g, 0.0, 0.0, 0.0, yaw)
         words = [max(-32768, min(32767, round(value))) for value in values]
         _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *words)
 

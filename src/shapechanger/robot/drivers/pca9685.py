@@ -232,82 +232,54 @@ class Pca9685Channel(PulseChannel):
 
 
 _CHANNELS: Final = 16
-_LAST_LED: Final = 0x45
+_END: Final = _CHANNEL_0 + 4 * _CHANNELS
 _FIRST_ALL_LED: Final = 0xFA
-_MIN_PRESCALE: Final = 3
-_RESTART: Final = 0x80
 
 
 class SimulatedPca9685(SimulatedChip):
-    """PCA9685: 16 PWM channels, which continue when the process that set them has ended."""
+    """PCA9685: 16 PWM channels, which continue when the process that set them has ended.
+
+    Unlike at the chip, channels that were on before a sleep go on after it without a RESTART.
+    """
 
     def __init__(self) -> None:
         self._registers = bytearray(256)
         # Section 7.3, table 4: after power-on it sleeps, with all channels fully off.
         self._registers[_MODE1] = 0x11
         self._registers[0x01:0x06] = bytes((0x04, 0xE2, 0xE4, 0xE8, 0xE0))
-        self._registers[_CHANNEL_0 + 3 : _LAST_LED + 1 : 4] = bytes([_FULL >> 8]) * _CHANNELS
+        self._registers[_CHANNEL_0 + 3 : _END : 4] = bytes([_FULL >> 8]) * _CHANNELS
         self._registers[_PRESCALE] = 0x1E
-        self._halted: set[int] = set()  # Channels that wait for RESTART after a sleep.
 
     @property
     def pulses(self) -> list[Pulse]:
         """Pulses of all channels; 0 us for a channel that is off."""
         period_s = _STEPS * (self._registers[_PRESCALE] + 1) / (_OSCILLATOR_MHZ * 1e6)
-        hz = 1.0 / period_s
-        counts = map(self._counts, range(_CHANNELS))
-        return [Pulse(on / _STEPS * period_s * 1e6, hz) for on in counts]
+        pulses: list[Pulse] = []
+        for on, off in struct.iter_unpack("<2H", self._registers[_CHANNEL_0:_END]):
+            counts = _STEPS if on & _FULL else (off - on) % _STEPS
+            if off & _FULL or self._registers[_MODE1] & _SLEEP:
+                counts = 0
+            pulses.append(Pulse(counts / _STEPS * period_s * 1e6, 1.0 / period_s))
+        return pulses
 
     def read(self, register: int, length: int) -> list[int]:
         """Read bytes from a register on; without auto-increment all of that register."""
-        step = self._step
-        return [self._registers[(register + step * i) % 256] for i in range(length)]
+        return [self._registers[at] for at in self._addressed(register, length)]
 
     def write(self, register: int, data: Sequence[int]) -> None:
         """Write bytes from a register on; without auto-increment all to that register."""
-        step = self._step  # As it was when the transfer began.
-        for i, byte in enumerate(data):
-            self._write_byte((register + step * i) % 256, byte)
+        # Auto-increment is as MODE1 had it when the transfer began.
+        for at, byte in zip(self._addressed(register, len(data)), data, strict=True):
+            if _FIRST_ALL_LED <= at <= _ALL_OFF_H:
+                first = _CHANNEL_0 + at - _FIRST_ALL_LED
+                self._registers[first:_END:4] = bytes([byte]) * _CHANNELS
+            # Section 7.3.5: the prescaler is written only while it sleeps.
+            elif at != _PRESCALE or self._registers[_MODE1] & _SLEEP:
+                self._registers[at] = byte
 
-    @property
-    def _step(self) -> int:
-        return int(bool(self._registers[_MODE1] & _AUTO_INCREMENT))
-
-    def _write_byte(self, at: int, byte: int) -> None:
-        if at == _MODE1:
-            self._write_mode1(byte)
-        elif at == _PRESCALE:
-            if self._registers[_MODE1] & _SLEEP:  # Section 7.3.5: only while it sleeps.
-                self._registers[at] = max(byte, _MIN_PRESCALE)
-        elif _FIRST_ALL_LED <= at <= _ALL_OFF_H:
-            first = _CHANNEL_0 + at - _FIRST_ALL_LED
-            self._registers[first : _LAST_LED + 1 : 4] = bytes([byte]) * _CHANNELS
-            self._halted.clear()
-        else:
-            self._registers[at] = byte
-            if _CHANNEL_0 <= at <= _LAST_LED:
-                self._halted.discard((at - _CHANNEL_0) // 4)
-
-    def _write_mode1(self, byte: int) -> None:
-        before = self._registers[_MODE1]
-        after = byte & ~_RESTART
-        if byte & _SLEEP and not before & _SLEEP:
-            # Section 7.3.1.1: channels that were on stop until RESTART is written as 1.
-            self._halted = {c for c in range(_CHANNELS) if self._counts(c)}
-        if byte & _RESTART and not byte & _SLEEP:
-            self._halted.clear()
-        if self._halted:
-            after |= _RESTART
-        self._registers[_MODE1] = after
-
-    def _counts(self, channel: int) -> int:
-        """Return for how many counts of a period a channel is on."""
-        if self._registers[_MODE1] & _SLEEP or channel in self._halted:
-            return 0
-        on, off = struct.unpack_from("<2H", self._registers, _CHANNEL_0 + 4 * channel)
-        if off & _FULL:
-            return 0
-        return _STEPS if on & _FULL else (off - on) % _STEPS
+    def _addressed(self, register: int, length: int) -> list[int]:
+        step = int(bool(self._registers[_MODE1] & _AUTO_INCREMENT))
+        return [(register + step * i) % 256 for i in range(length)]
 
 
 def _pulse_us(plan: OutputPlan, duty: DutyOf, levels: Levels) -> float:
