@@ -41,6 +41,7 @@ UNKNOWN = (
     b"\x1b^wasdep\x1b\\",
     b"\x1bXwasdep\x1b\\",
     b"\x1b(w",
+    b"\x1b(A",
     # Controls of eight bits, raw and as UTF-8.
     b"\x9b1;5D",
     b"\x9b[A",

@@ -11,7 +11,6 @@ import sys
 import termios
 import time
 import tty
-from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -72,11 +71,10 @@ class HeldKeys:
             return False
         action, value = DIRECTIONS[key]
         held = self._held.get(action)
-        repeats = held is not None and held.value == value and now_s <= held.until_s
-        until_s = now_s + (REPEAT_HOLD_S if repeats else FIRST_HOLD_S)
-        # The first repeat may come long before the first hold ends: never shorten it.
-        if repeats and held is not None:
-            until_s = max(until_s, held.until_s)
+        until_s = now_s + FIRST_HOLD_S
+        if held is not None and held.value == value and now_s <= held.until_s:
+            # The first repeat may come long before the first hold ends: never shorten it.
+            until_s = max(now_s + REPEAT_HOLD_S, held.until_s)
         for other in self._held.values():
             if now_s <= other.until_s:  # Its own repeats may stop here, because this key started.
                 other.until_s = max(other.until_s, other.pressed_s + FIRST_HOLD_S)
@@ -113,8 +111,12 @@ REST_WAIT_S: Final = 0.5
 """Time that a sequence waits for its next character, s. Later characters are keys again, because
 Alt+[ looks like the beginning of a sequence that never ends."""
 
-_ARROWS: Final = {"A": "up", "B": "down", "C": "right", "D": "left"}
 _ESCAPE: Final = "\x1b"
+_ARROWS: Final = {
+    f"{_ESCAPE}{kind}{letter}": key
+    for kind in "[O"
+    for letter, key in {"A": "up", "B": "down", "C": "right", "D": "left"}.items()
+}
 _NAMES: Final = {" ": "space", "\x00": "space", "\r": "enter", "\n": "enter"}  # NUL: Ctrl+Space.
 # Control strings: DCS, SOS, OSC, PM and APC. Only an OSC may end with BEL (xterm's "ctlseqs").
 _STRINGS: Final = frozenset("PX]^_")
@@ -123,18 +125,29 @@ _STRINGS: Final = frozenset("PX]^_")
 _TAILS: Final = {"[": 1, "M": 3, "t": 2, "T": 6}
 # Escape and Space where a program has left kitty's protocol or xterm's modifyOtherKeys enabled;
 # ":3" is a release.
-_STOP_CODES: Final = re.compile(r"(27|32)(?:;(?!\d*:3)[\d:;]*)?u|27;\d+;(27|32)~")
+_STOP_CODES: Final = re.compile(
+    rf"{_ESCAPE}[\[O](?:(27|32)(?:;(?!\d*:3)[\d:;]*)?u|27;\d+;(27|32)~)"
+)
+_PASTES: Final = {f"{_ESCAPE}[200~": True, f"{_ESCAPE}[201~": False}  # Begin and end.
+_LONGEST: Final = 64  # Of a longer sequence only the begin and the last character count.
 
 
 class NoTerminal(ShapechangerError, RuntimeError):
     """No terminal to read keys from."""
 
 
-def _skip(count: int) -> Generator[None, str, str]:
-    """Take characters that mean nothing."""
-    for _ in range(count):
-        yield
-    return OTHER
+def _is_whole(text: str) -> bool:
+    """Return whether a sequence, from its escape character on, has its last character."""
+    kind, rest = text[1:2], text[2:]
+    if not text.startswith(_ESCAPE):  # A character of another encoding.
+        return bool(kind)
+    if kind in _STRINGS:
+        return kind == "]" and rest.endswith("\x07")
+    if kind not in "[O" and not " " <= kind <= "/":
+        return True  # Alt and a key, or the end of a string.
+    if kind == "[" and rest[:1] in _TAILS:
+        return len(rest) > _TAILS[rest[0]]
+    return "@" <= rest[-1:] <= "~"
 
 
 class KeyParser:
@@ -151,22 +164,18 @@ class KeyParser:
     def __init__(self) -> None:
         # A byte that is not UTF-8 becomes a lone surrogate.
         self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
-        self._rest: Generator[None, str, str] | None = None  # Takes a sequence, returns its key.
-        self._is_alone = False  # Only the escape character of the sequence has come.
-        self._is_string = False
-        self._begun_s = 0.0
-        self._last_s = 0.0
-        self._is_reported = False  # The sequence was reported as Escape: its rest is nothing.
+        self._text = ""  # Sequence that has begun.
+        self._is_reported = False  # It was reported as Escape: its rest is nothing.
         self._is_pasted = False
+        self._last_s = 0.0
 
     @property
     def due_s(self) -> float:
         """Time at which `expire` returns keys, s; infinity if nothing is pending."""
-        if self._rest is None:
+        if not self._text:
             return math.inf
-        if self._is_alone and not self._is_reported:
-            return self._begun_s + ESCAPE_WAIT_S
-        return self._last_s + REST_WAIT_S
+        is_alone = self._text == _ESCAPE and not self._is_reported
+        return self._last_s + (ESCAPE_WAIT_S if is_alone else REST_WAIT_S)
 
     def feed(self, data: bytes, now_s: float) -> list[str]:
         """Parse input.
@@ -180,11 +189,14 @@ class KeyParser:
             "enter" and `OTHER`.
         """
         keys = self.expire(now_s)
-        for char in self._decoder.decode(data):
-            key = self._key(char, now_s)
+        text = self._decoder.decode(data)
+        for char in text:
+            key = self._key(char)
             if key is not None:
                 keys.append(OTHER if self._is_pasted and key not in STOPS else key)
-        self._last_s = now_s
+        # Half a character does not delay Escape.
+        if text or self._is_reported or self._text != _ESCAPE:
+            self._last_s = now_s
         return keys
 
     def expire(self, now_s: float) -> list[str]:
@@ -194,81 +206,45 @@ class KeyParser:
             now_s: Present time, s.
         """
         keys: list[str] = []
-        if self._is_alone and not self._is_reported and now_s >= self.due_s:
+        if self._text == _ESCAPE and not self._is_reported and now_s >= self.due_s:
             keys.append("escape")
             self._is_reported = True
             self._is_pasted = False  # The end of the pasted text was lost.
-        if self._rest is not None and now_s >= self.due_s:
-            if not self._is_reported:
-                keys.append(OTHER)
-            self._begin(None, now_s)
+        if now_s >= self.due_s:
+            keys += [] if self._is_reported else [OTHER]
+            self._text = ""
         return keys
 
-    def _key(self, char: str, now_s: float) -> str | None:
+    def _key(self, char: str) -> str | None:
         """Advance by one character, and return the key that it completes."""
         code = ord(char) - 0xDC00 if "\udc80" <= char <= "\udcff" else ord(char)
         is_byte = code != ord(char)
         if char in {" ", "\x00"}:
-            if self._is_alone:
-                self._step(" ")
+            self._text += " " if self._text == _ESCAPE else ""
             return "space"
         if char == _ESCAPE:
-            was_alone = self._is_alone and not self._is_reported
-            self._begin(self._sequence(), now_s, is_alone=True)
-            self._is_reported = was_alone
-            return "escape" if was_alone else None
+            self._is_reported = self._text == _ESCAPE and not self._is_reported
+            self._text = _ESCAPE
+            return "escape" if self._is_reported else None
         if 0x80 <= code < 0xA0:  # C1 controls: ESC and a character of seven bits.
-            if self._is_string and code != 0x9C:
+            if self._text[1:2] in _STRINGS and code != 0x9C:
                 return None
-            introducer = chr(code - 0x40)
+            self._text, introducer = "", chr(code - 0x40)
             if not is_byte or introducer in {"[", "O", "\\", *_STRINGS}:
-                self._begin(self._sequence(), now_s)
-                return self._step(introducer)
-            self._begin(None, now_s)
-        if is_byte and self._rest is None:
+                self._text, self._is_reported, char = _ESCAPE, False, introducer
+        if not self._text:
+            if not is_byte:
+                return _NAMES.get(char, char.lower() if "!" <= char <= "~" else OTHER)
             # A character of another encoding, whose second byte may be a letter's.
-            return self._begin(_skip(1), now_s)
-        return self._step(char)
-
-    def _begin(
-        self, rest: Generator[None, str, str] | None, now_s: float, *, is_alone: bool = False
-    ) -> None:
-        """Begin a sequence, or end one."""
-        self._rest, self._begun_s = rest, now_s
-        self._is_alone, self._is_string, self._is_reported = is_alone, False, False
-        if rest is not None:
-            next(rest)
-
-    def _step(self, char: str) -> str | None:
-        """Advance by one character that begins no sequence."""
-        if self._rest is None:
-            return _NAMES.get(char, char.lower() if "!" <= char <= "~" else OTHER)
-        self._is_alone = False
-        try:
-            self._rest.send(char)
-        except StopIteration as end:
-            key = None if self._is_reported else end.value
-            self._begin(None, 0.0)
-            return key
-        return None
-
-    def _sequence(self) -> Generator[None, str, str]:
-        """Take the characters after an escape character, and return their key."""
-        kind = yield
-        if kind in _STRINGS:
-            self._is_string = True
-            while (yield) != "\x07" or kind != "]":
-                pass
-            return OTHER
-        if kind not in "[O" and not " " <= kind <= "/":
-            return OTHER  # Alt and a key, or the end of a string.
-        text = ""
-        while not "@" <= text[-1:] <= "~":
-            text += yield
-            if kind == "[" and text in _TAILS:
-                return (yield from _skip(_TAILS[text]))
-        if text in {"200~", "201~"} and kind == "[":
-            self._is_pasted = text == "200~"
+            self._text, self._is_reported = char, False
+            return None
+        text = self._text = self._text[:_LONGEST] + char
+        if not _is_whole(text):
+            return None
+        self._text = ""
+        self._is_pasted = _PASTES.get(text, self._is_pasted)
+        if self._is_reported:
+            return None
         if stop := _STOP_CODES.fullmatch(text):
             return "escape" if "27" in stop.groups() else "space"
         return _ARROWS.get(text, OTHER)
