@@ -18,7 +18,7 @@ from shapechanger.errors import LinkError, RenderError, RobotRefused, StaleObser
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.known_robots import known_names, recall
-from shapechanger.robot.client.observations import RobotSpaces, StepMeter, View
+from shapechanger.robot.client.observations import RobotSpaces, View
 from shapechanger.robot.client.operator import Preparation, Takeover, interruption
 from shapechanger.robot.link.messages import Observation, Pace, Role, Welcome
 
@@ -31,6 +31,8 @@ LATE: Final = 0.5
 _WAYS_TO_RESET: Final = ("operator", "person", "routine")
 _LOCKSTEP_S: Final = 10.0  # Time limit of a step in lockstep, where a robot waits for the env.
 _NS_PER_S: Final = 1e9
+# Names of each quantity of the reward in the state; the first one that is measured counts.
+_QUANTITIES: Final = {"speed": ("speed",), "collision": ("collision", "bump"), "stall": ("stall",)}
 
 
 class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
@@ -153,7 +155,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._pace: Pace = pace
         self._role: Role = role
         self._interventions = interventions
-        self._takeover = Takeover(allowed=interventions)
         self._on_reset = on_reset
         self.render_mode = render_mode
         with ExitStack() as opened:
@@ -163,7 +164,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             wide, high = size or welcome.image_size or (160, 120)
             self._spaces = RobotSpaces(welcome, (int(wide), int(high)), image, state)
             self._reward = DriveReward.from_weights({**welcome.reward, **(reward or {})})
-            self._meter = StepMeter(self._spaces)
             if pace == "realtime" and welcome.clock == "twin":
                 raise RobotRefused(
                     f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so "
@@ -180,9 +180,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         if pace == "lockstep":
             self._patience_s = _LOCKSTEP_S
         self._period_s = 1.0 / welcome.control_hz
-        self._ends = 0.0  # Time at which the current step ends, s.
         self._last: Received | None = None
-        self._missed = 0
         self._has_stepped = False
 
     @property
@@ -214,8 +212,11 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             self._client = ready.connect(self._connect)
             self._spaces.reconnect()
         robot = self._client
-        if self._on_reset == "routine":
-            ready.require_routine(robot)
+        if self._on_reset == "routine" and not robot.welcome.reset:  # Before it moves.
+            raise RobotRefused(
+                f"The profile of {robot.welcome.robot} has no reset routine: add [[reset]] tables "
+                "to it, or let its operator put it back with on_reset='operator'."
+            )
         ready.take(robot)
         # An armed robot must not be carried, nor may the last command stay in force. Arming it then
         # confirms that it is at the start.
@@ -228,7 +229,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             ready.play(robot)
         self._last = received = ready.first(robot, self._spaces)
         view = self._spaces.view(received)
-        self._meter.start(received.message)
+        self._touches = False
+        self._reward_of(received.message, received.message)  # What it touches now does not count.
         self._takeover = Takeover(allowed=self._interventions)
         self._missed, self._has_stepped = 0, False
         robot.events()  # Drop events from before the episode.
@@ -248,8 +250,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             )
         values = self._spaces.values(action)
         if not self._has_stepped:
-            self._ends = time.monotonic() + self._period_s
-            self._has_stepped = True
+            self._ends, self._has_stepped = time.monotonic() + self._period_s, True
         sent_at = time.monotonic()
         try:
             seq = self._takeover.act(robot, values, last.message)
@@ -258,8 +259,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         except LinkError as failure:
             self._last = None
             view = self._spaces.view(last)
-            measured = self._meter.measure(last.message, last.message, bumped=False)
-            terms = dict.fromkeys(self._reward.terms(*measured), 0.0)
+            terms = dict.fromkeys(self._reward_of(last.message, last.message)[0], 0.0)
             info = self._info(last, view, truncated_because=str(failure), reward_terms=terms)
             info |= terms | {"events": (), "refused": "", "latency": {}, "frame_repeated": True}
             return view.observation, 0.0, False, True, info
@@ -268,8 +268,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._missed += late and self._pace == "realtime"
         events = robot.events()
         bumped = any(event.name == "bump" for event in events)
-        measured = self._meter.measure(last.message, received.message, bumped)
-        terms = self._reward.terms(*measured)
+        terms, terminated = self._reward_of(last.message, received.message, bumped)
         is_lent = self._takeover.goes_on(received.message)
         because = "" if is_lent else interruption(received.message)
         info = self._info(received, view, truncated_because=because, reward_terms=terms) | terms
@@ -277,7 +276,6 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         info["refused"] = robot.refusal(seq)
         info["latency"] = latencies(last.message, seq, sent_at, received, self.welcome.clock)
         self._last = received
-        terminated = self._reward.ends(measured[1])
         truncated = not terminated and bool(because)
         return view.observation, sum(terms.values()), terminated, truncated, info
 
@@ -332,6 +330,21 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
                 found = robot.observation(found.message.seq, left_s)
         return found
 
+    def _reward_of(
+        self, before: Observation, seen: Observation, bumped: bool = False
+    ) -> tuple[dict[str, float], bool]:
+        """Return the terms of a step's reward, and whether the episode ends."""
+        speed, touches, stall = (
+            self._spaces.quantity(seen, *names)[0] for names in _QUANTITIES.values()
+        )
+        hits = bool(touches) or bumped
+        collided = None if touches is None else hits and not self._touches
+        self._touches = hits
+        dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
+        stalled = None if stall is None else bool(stall)
+        terms = self._reward.terms(speed, collided, stalled, dt_s)
+        return terms, self._reward.ends(collided)
+
     def _info(self, received: Received, view: View, **facts: Any) -> dict[str, Any]:
         message = received.message
         info = facts | {
@@ -340,13 +353,15 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             "armed": message.armed,
             "emergency": message.emergency,
             "absent": view.absent,
-            "reward_sources": self._meter.sources(message),
+            "reward_sources": {
+                name: self._spaces.quantity(message, *names)[1]
+                for name, names in _QUANTITIES.items()
+            },
             "deadline_missed": self._missed,
             "captured_ns": message.captured_ns,
             "decided_ns": message.command_ns,
         }
-        by_person = self._takeover.action(message) if self._role == "program" else None
-        if by_person is not None:
+        if self._role == "program" and (by_person := self._takeover.action(message)):
             info["intervene_action"] = np.array(by_person, np.float32)
         if self._spaces.has_image:
             on_robot_s = (message.sent_ns - message.captured_ns) / _NS_PER_S
@@ -391,21 +406,12 @@ def latencies(
     """
     seen = received.message
     known = {"capture_to_send": (seen.sent_ns - seen.captured_ns) / _NS_PER_S}
-    if seen.applied_seq != seq or not seen.mine:
+    if seen.applied_seq != seq or not seen.mine or seen.command_ns is None:
         return known
-    if seen.command_ns is not None:
+    known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
+    if clock == "real":
         on_robot_s = (seen.sent_ns - seen.command_ns) / _NS_PER_S
-        if clock == "real":
-            known["round_trip"] = received.received_at - sent_at - on_robot_s
-        known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
-        if seen.applied_ns is not None:
-            known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
-    return known
-    if seen.command_ns is not None:
-        on_robot = (seen.sent_ns - seen.command_ns) / _NS_PER_S
-        if clock == "real":
-            known["round_trip"] = received.received_at - sent_at - on_robot
-        known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
-    if seen.command_ns is not None and seen.applied_ns is not None:
+        known["round_trip"] = received.received_at - sent_at - on_robot_s
+    if seen.applied_ns is not None:
         known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
     return known

@@ -21,7 +21,6 @@ IMAGE: Final = "camera/image"
 
 _ABSENT: Final = "absent"
 _BRIGHTEST: Final = 255
-_NS_PER_S: Final = 1e9
 
 
 def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -89,7 +88,6 @@ class RobotSpaces:
         self._has_state = state or not self.has_image
         self.action_layout = Layout.from_json(welcome.action_layout)
         self.action_space = _box(self.action_layout)
-        self._action_range = self.action_layout.low, self.action_layout.high
         self._state_layout = Layout.from_json(welcome.state_layout)
         self._places = self._state_layout.slices
         space: gym.Space[Any] = _box(self._state_layout)
@@ -118,7 +116,7 @@ class RobotSpaces:
                 f"An action of this robot is {len(self.action_layout)} finite numbers "
                 f"({', '.join(self.action_layout.names)}), got {array.tolist()}."
             )
-        return tuple(np.clip(array, *self._action_range).tolist())
+        return tuple(np.clip(array, self.action_layout.low, self.action_layout.high).tolist())
 
     @property
     def rest(self) -> tuple[float, ...]:
@@ -190,40 +188,3 @@ class RobotSpaces:
 
 def _box(layout: Layout) -> gym.spaces.Box[np.float32]:
     return gym.spaces.Box(layout.low.astype(np.float32), layout.high.astype(np.float32))
-
-
-class StepMeter:
-    """Measures one robot's steps, one after another."""
-
-    def __init__(self, spaces: RobotSpaces) -> None:
-        self._spaces = spaces
-        self._touched = False
-
-    def start(self, seen: Observation) -> None:
-        """Begin an episode; an obstacle that is touched already does not count as a collision."""
-        self._touched = bool(self._touches(seen)[0])
-
-    def measure(
-        self, before: Observation, seen: Observation, bumped: bool
-    ) -> tuple[float | None, bool | None, bool | None, float]:
-        """Return the quantities of a step, as `DriveReward.terms` takes them."""
-        speed, _ = self._spaces.quantity(seen, "speed")
-        stall, _ = self._spaces.quantity(seen, "stall")
-        touches, _ = self._touches(seen)
-        hits = bool(touches) or bumped
-        collided = None if touches is None else hits and not self._touched
-        self._touched = hits
-        dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
-        return speed, collided, None if stall is None else bool(stall), dt_s
-
-    def sources(self, seen: Observation) -> dict[str, str]:
-        """Return the source of each quantity of the reward."""
-        return {
-            "speed": self._spaces.quantity(seen, "speed")[1],
-            "collision": self._touches(seen)[1],
-            "stall": self._spaces.quantity(seen, "stall")[1],
-        }
-
-    def _touches(self, seen: Observation) -> tuple[float | None, str]:
-        """Return whether the robot touches something, 0 or 1, and the source."""
-        return self._spaces.quantity(seen, "collision", "bump")

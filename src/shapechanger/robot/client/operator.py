@@ -6,6 +6,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
@@ -18,26 +19,28 @@ _POLL_S: Final = 0.05  # Period of checks for a person's actions.
 _LOG_AFTER_S: Final = 2.0  # Shorter waits are not logged.
 _NS_PER_S: Final = 1e9
 
-_HAND_OVER: Final = "P in `shapechanger robot drive` lets a waiting program drive."
-
 _log = logging.getLogger(__name__)
 
 
+@dataclass(slots=True)
 class Preparation:
-    """Steps of one reset, with one time limit for all of them."""
+    """Steps of one reset, with one time limit for all of them.
 
-    def __init__(
-        self, timeout_s: float, on_waiting: Callable[[str], object] | None, known_as: str
-    ) -> None:
-        self._timeout_s = timeout_s
-        self._on_waiting = on_waiting
-        self._known_as = known_as
-        self._since = time.monotonic()
-        self._reported: set[str] = set()
+    Attributes:
+        timeout_s: Time limit, s.
+        on_waiting: Called with a sentence that describes each wait; None to log longer ones.
+        known_as: Name of the known robot; "" for an address.
+    """
+
+    timeout_s: float
+    on_waiting: Callable[[str], object] | None
+    known_as: str
+    _since: float = field(default_factory=time.monotonic)
+    _reported: set[str] = field(default_factory=set[str])
 
     @property
     def _left_s(self) -> float:
-        return self._since + self._timeout_s - time.monotonic()
+        return self._since + self.timeout_s - time.monotonic()
 
     def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
         """Connect, with retries."""
@@ -47,8 +50,8 @@ class Preparation:
             except RobotRefused:
                 raise
             except LinkError as error:
-                if not self._wait("The robot does not answer."):
-                    raise LinkError(f"{error} Gave up after {self._timeout_s:.0f} s.") from None
+                failure = LinkError(f"{error} Gave up after {self.timeout_s:.0f} s.")
+                self._wait("The robot does not answer.", failure)
 
     def take(self, robot: RobotClient) -> None:
         """Take control, once no other client has it."""
@@ -56,26 +59,25 @@ class Preparation:
             try:
                 return robot.take()
             except RobotRefused as refusal:
-                if not self._wait(str(refusal), _HAND_OVER):
-                    raise
+                hint = "P in `shapechanger robot drive` lets a waiting program drive."
+                self._wait(str(refusal), refusal, hint)
 
     def disarm(self, robot: RobotClient) -> None:
         """Disarm the robot, so that a person can put it back."""
+        name = robot.welcome.robot
         robot.disarm()
         while robot.ask().message.armed:
-            if not self._wait(f"{robot.welcome.robot} is still armed."):
-                raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
+            self._wait(f"{name} is still armed.", RobotRefused(f"{name} does not disarm."))
 
     def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
         """Arm the robot if that is allowed, or wait for a person; we then have control."""
         name = robot.welcome.robot
         because = "It waits for a person"
-        first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "
+        first = "" if self.known_as else f"`shapechanger robot remember {name} …` once, then "
         how = (
-            f"{first}`shapechanger robot drive {self._known_as or name}` in another terminal, and "
+            f"{first}`shapechanger robot drive {self.known_as or name}` in another terminal, and "
             "there P, which arms it for the program"
         )
-        waits_for = f"{name} waits for its operator: put it at the start and arm it: {how}."
         while True:
             seen = robot.ask().message
             if not seen.mine and self._left_s >= 0.0:
@@ -91,20 +93,13 @@ class Preparation:
                     continue
                 except RobotRefused as refusal:
                     because = str(refusal).rstrip(".")
-            if not self._wait(waits_for):
-                stopped = f" ({seen.stop_reason.rstrip('.')})" if seen.stop_reason else ""
-                raise RobotRefused(
-                    f"{name} was not armed within {self._timeout_s:.0f} s. {because}{stopped}. "
-                    f"To arm it, {how}; `reset_timeout_s` says how long to wait for that."
-                )
-
-    def require_routine(self, robot: RobotClient) -> None:
-        """Check that the robot has a reset routine, before it moves."""
-        if not robot.welcome.reset:
-            raise RobotRefused(
-                f"The profile of {robot.welcome.robot} has no reset routine: add [[reset]] tables "
-                "to it, or let its operator put it back with on_reset='operator'."
+            stopped = f" ({seen.stop_reason.rstrip('.')})" if seen.stop_reason else ""
+            failure = RobotRefused(
+                f"{name} was not armed within {self.timeout_s:.0f} s. {because}{stopped}. "
+                f"To arm it, {how}; `reset_timeout_s` says how long to wait for that."
             )
+            start = f"{name} waits for its operator: put it at the start and arm it: {how}."
+            self._wait(start, failure)
 
     def play(self, robot: RobotClient) -> None:
         """Run the reset routine of the robot's profile."""
@@ -136,20 +131,19 @@ class Preparation:
             is_paced = robot.pace == "lockstep"
             seen = robot.exchange(spaces.rest, seen) if is_paced else robot.ask()
 
-    def _wait(self, sentence: str, hint: str = "") -> bool:
-        """Wait a moment. Return False after the time limit."""
-        if sentence not in self._reported:
-            if self._on_waiting is not None:
-                self._reported.add(sentence)
-                self._on_waiting(sentence)
-            elif self._timeout_s - self._left_s > _LOG_AFTER_S:
-                self._reported.add(sentence)
+    def _wait(self, sentence: str, failure: LinkError, hint: str = "") -> None:
+        """Report the wait once, and wait a moment; raise the failure after the time limit."""
+        waited_s = self.timeout_s - self._left_s
+        if sentence not in self._reported and (self.on_waiting or waited_s > _LOG_AFTER_S):
+            self._reported.add(sentence)
+            if self.on_waiting:
+                self.on_waiting(sentence)
+            else:
                 words = f"{sentence} {hint}".rstrip()
                 _log.warning("%s (Waiting for up to %.0f s more.)", words, max(0.0, self._left_s))
         if self._left_s < 0.0:
-            return False
+            raise failure from None
         time.sleep(_POLL_S)
-        return True
 
 
 class Takeover:
@@ -184,11 +178,9 @@ class Takeover:
         """
         if not self._allowed or seen.emergency:
             return False
-        if seen.mine and seen.armed:
-            self._waits = False
-        elif seen.holder_role == "person" or not seen.holder:
-            self._waits = True
-        return self._waits and (seen.mine or seen.holder_role == "person" or not seen.holder)
+        is_lent = seen.holder_role == "person" or not seen.holder
+        self._waits = not (seen.mine and seen.armed) and (self._waits or is_lent)
+        return self._waits and (seen.mine or is_lent)
 
     @staticmethod
     def action(seen: Observation) -> tuple[float, ...] | None:
