@@ -12,7 +12,6 @@ from typing import Any
 
 from shapechanger.errors import MissingExtra
 from shapechanger.robot.link.address import SERVICE, Address
-from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import VERSION
 
@@ -137,7 +136,7 @@ def _service(card: RobotCard, host: str, port: int, fingerprint: bytes) -> Servi
             "id": card.robot,
             "body": card.body,
             "v": str(VERSION),
-            "fp": fingerprint_hex(fingerprint),
+            "fp": fingerprint.hex(),
         },
         server=f"{socket.gethostname().partition('.')[0]}.local.",
     )

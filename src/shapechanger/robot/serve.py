@@ -34,7 +34,6 @@ from shapechanger.robot.daemon.credentials import (
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.running import ServePlan
 from shapechanger.robot.link.address import Address, is_loopback, parse_address
-from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -266,4 +265,4 @@ def make_known(robot: KnownRobot) -> str:
 def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:
     """Return a robot as its clients know it."""
     key = credentials.key_file.read_text().strip()
-    return KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))
+    return KnownRobot(name, address, key, credentials.fingerprint.hex())

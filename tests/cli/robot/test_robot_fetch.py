@@ -148,7 +148,7 @@ def test_edits_of_both_sides_survive(
     assert Counter(mine) - Counter(lines) == Counter()
     assert len(read_episode(local).steps) == 12
     before = files(local)
-    assert fetch_episode(robot, episode.name, data).came == 0
+    assert fetch_episode(robot, episode.name, data)[0] == 0
     assert files(local) == before
 
 

@@ -21,7 +21,6 @@ from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import Credentials, make_credentials
 from shapechanger.robot.link import messages as m
 from shapechanger.robot.link.authentication import (
-    fingerprint_hex,
     is_proof,
     new_key,
     new_nonce,
@@ -125,7 +124,7 @@ class Robot:
     @property
     def fingerprint(self) -> str:
         assert self._credentials is not None
-        return fingerprint_hex(self._credentials.fingerprint)
+        return self._credentials.fingerprint.hex()
 
     @property
     def known(self) -> KnownRobot:

@@ -17,7 +17,6 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
-from shapechanger.robot.link.authentication import fingerprint_hex
 from tests.robot.client.robot import STATE, eventually
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Running, running
@@ -38,7 +37,7 @@ class Served:
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
         made = make_credentials(folder, "test car")
-        self.known_at = fingerprint_hex(made.fingerprint)
+        self.known_at = made.fingerprint.hex()
         self.key = load_credentials(folder).key_file.read_text().strip()
         self._plan = car_plan(
             certificate=str(made.certificate),

@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
 from shapechanger.robot.link.authentication import (
-    NONCE_BYTES,
-    fingerprint_hex,
     fingerprint_of,
     fingerprint_short,
     is_proof,
@@ -40,7 +38,7 @@ def test_a_proof_is_bound_to_all_its_inputs(
 
 @given(proof=st.binary(max_size=64))
 def test_random_bytes_do_not_verify(proof: bytes) -> None:
-    assert not is_proof(proof, b"k" * 16, b"n" * NONCE_BYTES, b"", "program")
+    assert not is_proof(proof, b"k" * 16, b"n" * 32, b"", "program")
 
 
 def test_keys_and_nonces_are_unique() -> None:
@@ -79,7 +77,7 @@ def test_an_invalid_key_is_an_error(text: str, words: str) -> None:
 @given(certificate=st.binary(max_size=64))
 def test_a_fingerprint_round_trips(certificate: bytes) -> None:
     fingerprint = fingerprint_of(certificate)
-    text = fingerprint_hex(fingerprint)
+    text = fingerprint.hex()
     pairs = ":".join(text[i : i + 2] for i in range(0, len(text), 2)).upper()
     assert parse_fingerprint(text) == parse_fingerprint(pairs) == fingerprint
 

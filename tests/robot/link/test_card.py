@@ -22,7 +22,9 @@ def test_every_shipped_robot_has_a_card_that_a_client_reads(kind: str) -> None:
     profile = load_profile(find_profile(kind))
     card = card_of(profile)
     assert msgspec.json.decode(json.dumps(msgspec.to_builtins(card)), type=RobotCard) == card
-    welcome = decode_robot_message(encode(Welcome.of(card, 7, can_record=True)))
+    welcome = decode_robot_message(
+        encode(Welcome(**msgspec.structs.asdict(card), session=7, can_record=True))
+    )
     assert isinstance(welcome, Welcome)
     assert (welcome.session, welcome.can_record) == (7, True)
     assert all(
@@ -52,14 +54,15 @@ def test_a_twin_may_be_armed_by_anyone_and_needs_no_pictures() -> None:
     profile = load_profile(find_profile("lab-car"))
     card = card_of(profile, arming="anyone", clock="twin", pictures=False)
     assert (card.arming, card.clock, card.image_size) == ("anyone", "twin", None)
-    assert not card.has_geometry
+    assert (card.camera_pitch_deg, card.camera_fovy_deg) == (None, None)
 
 
 @pytest.mark.parametrize(
     "missing", ["deadline_ms", "control_hz", "arming", "max_observation_age_ms"]
 )
 def test_a_welcome_without_a_limit_is_refused(missing: str) -> None:
-    fields = msgspec.to_builtins(Welcome.of(card_of(load_profile(find_profile("car"))), 1))
+    card = card_of(load_profile(find_profile("car")))
+    fields = msgspec.to_builtins(card) | {"kind": "welcome", "session": 1}
     del fields[missing]
     with pytest.raises(LinkError, match=missing):
         decode_robot_message(msgspec.msgpack.encode(fields))

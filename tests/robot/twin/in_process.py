@@ -163,7 +163,7 @@ class InProcessRobot:
         self._tick_ns = round(1e9 / self._plan.tick_hz)
         self._period_ns = round(1e9 / profile.control_hz)
         card = card_of(profile, arming="anyone", clock="twin", pictures=pictures)
-        self.welcome = Welcome.of(card, _SESSION)
+        self.welcome = Welcome(**msgspec.structs.asdict(card), session=_SESSION)
         self._guard: Guard | None = None
         # Numbers images through all starts.
         self._hub = SessionHub(DaemonPlan(card=card), lambda: self.now_ns, self._send)

@@ -14,7 +14,7 @@ from shapechanger.cli.console import say
 from shapechanger.errors import MissingExtra, UnknownName
 from shapechanger.robot.client.known_robots import console_address
 from shapechanger.robot.daemon.credentials import Credentials, credentials_folder, load_credentials
-from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
+from shapechanger.robot.link.authentication import fingerprint_short
 from shapechanger.robot.serve import robot_at
 
 
@@ -65,7 +65,7 @@ def shown_credentials(credentials: Credentials) -> str:
     fingerprint = credentials.fingerprint
     return (
         f"key          {key}\n"
-        f"fingerprint  {fingerprint_hex(fingerprint)}\n"
+        f"fingerprint  {fingerprint.hex()}\n"
         f"in short     {fingerprint_short(fingerprint)}"
     )
 
@@ -75,5 +75,5 @@ def how_to_remember(name: str, credentials: Credentials) -> str:
     return (
         "On the workstation, with the key from above:\n"
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "
-        f"--fingerprint {fingerprint_hex(credentials.fingerprint)}"
+        f"--fingerprint {credentials.fingerprint.hex()}"
     )

@@ -159,14 +159,14 @@ class FetchEpisodes:
                     say(f"{episode.id} is still being recorded: fetch it later.")
                     continue
                 try:
-                    fetched = fetch_episode(robot, episode.id, self.out)
+                    came, own = fetch_episode(robot, episode.id, self.out)
                 except (DemosError, RobotRefused) as error:
                     failed += 1
                     say(f"{episode.id}: {error}", stderr=True)
                     continue
-                news = f"{fetched.came} lines came" if fetched.came else "nothing new"
-                if fetched.own:
-                    news += f", and {counted(fetched.own, 'edit')} made here stay"
+                news = f"{came} lines came" if came else "nothing new"
+                if own:
+                    news += f", and {counted(own, 'edit')} made here stay"
                 say(f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}")
                 if read_header(self.out / episode.id)[1] is None:
                     say(f"  it is incomplete: shapechanger demos repair {self.out / episode.id}")

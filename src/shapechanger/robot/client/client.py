@@ -56,8 +56,8 @@ def _own_name() -> str:
 class RobotClient(Inbox):
     """Connection to a robot, made by `connect` and kept by its own thread.
 
-    All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
-    the robot refuses.
+    All methods may be called from any thread. They raise `RobotRefused` if the robot refuses, and
+    `LinkError` if the link is lost or no answer arrives in time.
 
     Attributes:
         welcome: Description of the robot.
@@ -187,7 +187,7 @@ class RobotClient(Inbox):
         """
         seq = next(self._numbers)
         ttl_ms = self.welcome.deadline_ms if ttl_ms is None else ttl_ms
-        floats = tuple(float(value) for value in values)
+        floats = tuple(map(float, values))
         self._post(
             messages.Command(seq=seq, answers=answers, values=floats, ttl_ms=ttl_ms, scale=scale)
         )
@@ -206,8 +206,7 @@ class RobotClient(Inbox):
             The number of the suggestion, for `refusal`.
         """
         seq = next(self._numbers)
-        floats = tuple(float(value) for value in values)
-        self._post(messages.Suggest(seq=seq, answers=answers, values=floats))
+        self._post(messages.Suggest(seq=seq, answers=answers, values=tuple(map(float, values))))
         return seq
 
     def acknowledge(self) -> None:
@@ -216,11 +215,7 @@ class RobotClient(Inbox):
         self._post(messages.Acknowledge(seq=newest.message.seq if newest else 0))
 
     def ask(self) -> Received:
-        """Ask for a new observation, and wait for it.
-
-        Raises:
-            LinkError: If none arrives in time, or the link is lost.
-        """
+        """Ask for a new observation, and wait for it."""
         newest = self.newest
         self.acknowledge()
         return self.observation(newest.message.seq if newest else 0)
@@ -231,9 +226,6 @@ class RobotClient(Inbox):
         Args:
             values: One number for each action of the robot, in the order of its action layout.
             seen: The observation that the command answers.
-
-        Raises:
-            LinkError: If none arrives in time, or the link is lost.
         """
         self.command(values, answers=seen.message.seq)
         return self.observation(seen.message.seq)
@@ -260,9 +252,8 @@ class RobotClient(Inbox):
         Raises:
             RobotRefused: If the robot cannot record, for example on a full disk, or records
                 already.
-            LinkError: If it does not answer in time.
         """
-        return self._ask_disk(
+        return self._ask(
             messages.Record(on=on, name=name),
             messages.RecorderState,
             lambda state: state.recording == on and bool(state.episode),
@@ -271,10 +262,8 @@ class RobotClient(Inbox):
     def mark(self, text: str = "") -> messages.RecorderState:
         """Mark the newest step of the episode being recorded; raises as `record` does."""
         before = self.recorder.marks if self.recorder else 0
-        return self._ask_disk(
-            messages.Mark(text=text),
-            messages.RecorderState,
-            lambda state: state.marks > before,
+        return self._ask(
+            messages.Mark(text=text), messages.RecorderState, lambda state: state.marks > before
         )
 
     def undo(self, seconds: float = 5.0) -> messages.RecorderState:
@@ -284,11 +273,8 @@ class RobotClient(Inbox):
             seconds: How far back, s, above 0.
         """
         before = self.recorder.dropped if self.recorder else 0
-        return self._ask_disk(
-            messages.Undo(seconds=seconds),
-            messages.RecorderState,
-            lambda state: state.dropped > before,
-        )
+        undo = messages.Undo(seconds=seconds)
+        return self._ask(undo, messages.RecorderState, lambda state: state.dropped > before)
 
     def run_policy(self, name: str) -> messages.PolicyState:
         """Start a policy on board instead of the running one; only as a person.
@@ -298,13 +284,9 @@ class RobotClient(Inbox):
 
         Raises:
             RobotRefused: If there is no such policy on board, or it runs already.
-            LinkError: If the robot does not answer in time.
         """
-        return self._ask_disk(
-            messages.RunPolicy(policy=name),
-            messages.PolicyState,
-            lambda state: state.running == name,
-        )
+        request = messages.RunPolicy(policy=name)
+        return self._ask(request, messages.PolicyState, lambda state: state.running == name)
 
     def browse(self, before: str = "") -> messages.Recordings:
         """List the episodes on the robot, newest first.
@@ -314,9 +296,8 @@ class RobotClient(Inbox):
 
         Raises:
             RobotRefused: If the robot has no folder for recordings.
-            LinkError: If it does not answer in time.
         """
-        return self._ask_disk(messages.Browse(before=before), messages.Recordings)
+        return self._ask(messages.Browse(before=before), messages.Recordings)
 
     def fetch(self, episode: str, first: int = 0, count: int = 1_000) -> messages.Piece:
         """Read a part of an episode on the robot's disk; raises as `browse` does.
@@ -327,7 +308,7 @@ class RobotClient(Inbox):
             count: Most lines to read; fewer are sent where the message would be too large.
         """
         request = messages.Fetch(episode=episode, first=first, count=count)
-        return self._ask_disk(request, messages.Piece)
+        return self._ask(request, messages.Piece)
 
     def judge(self, episode: str, first: int, last: int, *, keep: bool) -> messages.EpisodeSummary:
         """Keep or drop steps of an episode; only as a person.
@@ -343,10 +324,9 @@ class RobotClient(Inbox):
 
         Raises:
             RobotRefused: If there are no such steps, or the episode is being recorded.
-            LinkError: If the robot does not answer in time.
         """
         request = messages.Judge(episode=episode, first=first, last=last, keep=keep)
-        return self._ask_disk(request, messages.Recordings).episodes[0]
+        return self._ask(request, messages.Recordings).episodes[0]
 
     def ping(self) -> tuple[float, int]:
         """Measure the round trip.
@@ -398,28 +378,22 @@ class RobotClient(Inbox):
         self.check()
         self._call(self._enqueue, message)
 
-    def _ask_disk(
-        self,
-        message: ClientMessage,
-        kind: type[_Answer],
-        accepts: Callable[[_Answer], bool] = lambda _: True,
-    ) -> _Answer:
-        """Ask a question about recordings, of which a robot answers one at a time."""
-        # A field out of range is an error before anything is sent.
-        messages.decode_client_message(messages.encode(message))
-        with self._asking:
-            return self._ask(message, kind, accepts, _DISK_S)
-
     def _ask(
         self,
         message: ClientMessage,
         kind: type[_Answer],
         accepts: Callable[[_Answer], bool] = lambda _: True,
-        timeout_s: float | None = None,
     ) -> _Answer:
-        with self.request(kind, accepts) as request:
+        """Send a request, and wait for its answer; a robot reads its disk for one at a time."""
+        # A field out of range is an error before anything is sent.
+        messages.decode_client_message(messages.encode(message))
+        is_prompt = kind in (messages.Lease, messages.Pong)
+        with (
+            contextlib.nullcontext() if is_prompt else self._asking,
+            self.request(kind, accepts) as request,
+        ):
             self._post(message)
-            return self.answered(request, timeout_s)
+            return self.answered(request, None if is_prompt else _DISK_S)
 
     # In the connection's thread.
 
@@ -433,17 +407,16 @@ class RobotClient(Inbox):
         self._posted.set()
 
     def _run(self) -> None:
-        failure: LinkError | None = None
         try:
             asyncio.run(self._exchange())
         except LinkError as error:
-            failure = error
+            self.fail(error)
         except BaseException as error:
-            failure = LinkError(f"The link to the robot failed: {error!r}.")
+            self.fail(LinkError(f"The link to the robot failed: {error!r}."))
             raise
         finally:
             # Waiting callers must not block indefinitely.
-            self.fail(failure or LinkError("The connection was closed: make a new one."))
+            self.fail(LinkError("The connection was closed: make a new one."))
 
     async def _exchange(self) -> None:
         """Connect, receive and send until `_stop` is set."""

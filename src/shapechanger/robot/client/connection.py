@@ -19,7 +19,7 @@ from shapechanger.errors import LinkError, MissingExtra, RobotRefused, StaleObse
 from shapechanger.robot.client.known_robots import KnownRobot, parse_trust
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import Address, parse_address
-from shapechanger.robot.link.authentication import fingerprint_hex, make_proof, parse_key
+from shapechanger.robot.link.authentication import make_proof, parse_key
 from shapechanger.robot.link.messages import (
     Challenge,
     Event,
@@ -140,8 +140,8 @@ def _explained(error: Exception, address: Address, timeout_s: float) -> LinkErro
     match error:
         case aiohttp.ServerFingerprintMismatch():
             return RobotRefused(
-                f"{address} shows the fingerprint\n  {fingerprint_hex(error.got)}\nand not\n"
-                f"  {fingerprint_hex(error.expected)}\nEither the robot was set up again, or the "
+                f"{address} shows the fingerprint\n  {error.got.hex()}\nand not\n"
+                f"  {error.expected.hex()}\nEither the robot was set up again, or the "
                 "connection is intercepted. Compare it with the one that `shapechanger robot key "
                 "NAME` shows on the robot before you trust it."
             )

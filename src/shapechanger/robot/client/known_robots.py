@@ -27,7 +27,6 @@ from shapechanger.errors import LinkError, UnknownName, translate_errors
 from shapechanger.files import cannot_write, read_text, write_atomic
 from shapechanger.robot.link.address import Address, parse_address
 from shapechanger.robot.link.authentication import (
-    fingerprint_hex,
     fingerprint_of,
     fingerprint_short,
     parse_fingerprint,
@@ -160,7 +159,7 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
     ):
         shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
     fingerprint = fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
-    digits = fingerprint_hex(fingerprint)
+    digits = fingerprint.hex()
     return LinkError(
         f"The robot at {address} is not trusted yet. Its fingerprint is\n"
         f"  {digits}  (in short {fingerprint_short(fingerprint)})\n"

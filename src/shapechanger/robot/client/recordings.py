@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 from shapechanger.demos.episodes import Episode
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode, lock, write_all
@@ -50,23 +50,14 @@ def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[Episo
     return [episode for episode in found if not wanted or episode.id in wanted]
 
 
-class Fetched(NamedTuple):
-    """Result of a download.
-
-    Attributes:
-        came: Number of new lines of the robot.
-        own: Number of marks and edits that were made here, and are kept.
-    """
-
-    came: int
-    own: int
-
-
-def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
+def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
     """Download one episode, or the new part of it.
 
     An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
     here are kept after the robot's, so that they override these.
+
+    Returns:
+        Number of new lines of the robot, and of marks and edits that were made here.
     """
     here, part = data / name, data / f".{name}.fetching"
     folder = here if is_episode(here) else part
@@ -107,7 +98,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
         raise cannot_write(folder, error) from error
     finally:
         os.close(fd)
-    return Fetched(len(_without(theirs, edits)), len(own))
+    return len(_without(theirs, edits)), len(own)
 
 
 def _without(lines: Sequence[bytes], others: Sequence[bytes]) -> list[bytes]:
@@ -200,7 +191,9 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
             f"{robot.welcome.robot} starts from its present place.\n"
             "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )
-        if not _agreed(robot, terminal):
+        while not (keys := terminal.keys(0.5)):
+            robot.acknowledge()  # Keeps the link alive meanwhile.
+        if keys != ["e"]:
             say("cancelled; nothing was played")
             return
         try:
@@ -234,14 +227,6 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
             f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so no one "
             "could stop it in time: serve it with `--clock real`."
         )
-
-
-def _agreed(robot: RobotClient, terminal: Terminal) -> bool:
-    """Return whether the person confirms with E; any other key declines."""
-    while True:
-        robot.acknowledge()  # Keeps the link alive meanwhile.
-        if keys := terminal.keys(0.5):
-            return keys == ["e"]
 
 
 def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:

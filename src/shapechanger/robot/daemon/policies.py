@@ -23,7 +23,6 @@ from shapechanger.errors import UnknownName
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.running import run_normally
 from shapechanger.robot.link.address import Address
-from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.messages import PolicyState
 
 _log = logging.getLogger(__name__)
@@ -76,7 +75,7 @@ class PolicyRunner:
             "name": self._plan.card.robot,
             "address": str(Address("127.0.0.1" if host in _EVERYWHERE else host, port)),
             "key": Path(self._plan.key_file).read_text().strip() if self._plan.key_file else "",
-            "fingerprint": fingerprint_hex(fingerprint) if fingerprint else "insecure",
+            "fingerprint": fingerprint.hex() if fingerprint else "insecure",
         }
         if self._plan.policy and (refusal := self.run(self._plan.policy)):
             _log.warning("%s", refusal)

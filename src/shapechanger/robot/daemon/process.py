@@ -40,7 +40,7 @@ from shapechanger.robot.guard.channel import (
 from shapechanger.robot.guard.running import log_to_stderr, read_plan_fd, run_early
 from shapechanger.robot.hardware import Clock, connect
 from shapechanger.robot.link.address import Address, is_loopback
-from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
+from shapechanger.robot.link.authentication import fingerprint_short
 
 _log = logging.getLogger("shapechanger.robot.daemon")
 
@@ -285,7 +285,7 @@ class Daemon:
         plan = self._plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
         _log.info("%s listens at %s, %s.", plan.card.robot, Address(plan.host, port), secured)
-        ready = {"port": port, "fingerprint": fingerprint_hex(fingerprint)}
+        ready = {"port": port, "fingerprint": fingerprint.hex()}
         line = json.dumps(ready).encode() + b"\n"
         try:
             if self._ready_fd is not None:

@@ -22,7 +22,6 @@ from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
 from shapechanger.robot.daemon.session import Authenticator, ClientConnection, Session
 from shapechanger.robot.link.address import is_loopback, parse_address
-from shapechanger.robot.link.authentication import fingerprint_hex
 from shapechanger.robot.link.messages import VERSION
 
 _PRE_AUTH_TIMEOUT_S: Final = 3.0
@@ -311,7 +310,7 @@ class Server:
             {
                 "robot": self._hub.plan.card.robot,
                 "version": VERSION,
-                "certificate": fingerprint_hex(self._authenticator.certificate),
+                "certificate": self._authenticator.certificate.hex(),
                 "open": self._authenticator.is_open,
             }
         )

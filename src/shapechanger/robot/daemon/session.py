@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable
 from typing import Final
 
 import aiohttp
+import msgspec
 from aiohttp import WSMsgType, web
 
 from shapechanger.errors import LinkError, RobotRefused, ShapechangerError, translate_errors
@@ -125,8 +126,8 @@ class Session:
             client.post(recorded)
         if hub.plan.policies:
             client.post(hub.policies.state())
-        can_record = bool(hub.plan.recordings)
-        return messages.Welcome.of(hub.plan.card, client.session, can_record=can_record)
+        card, can_record = msgspec.structs.asdict(hub.plan.card), bool(hub.plan.recordings)
+        return messages.Welcome(**card, session=client.session, can_record=can_record)
 
     def receive(self, data: bytes) -> None:
         """Handle a message of the client."""

@@ -16,14 +16,9 @@ from typing import Final
 
 from shapechanger.errors import LinkError, translate_errors
 
-NONCE_BYTES: Final = 32
-"""Bytes of a nonce."""
-
 _KEY_BYTES: Final = 16  # 128 bits, which cannot be guessed.
 _KEY_CHARACTERS: Final = 26  # 16 bytes in base 32 (RFC 4648) without padding.
-_GROUP: Final = 4
 _PURPOSE: Final = b"shapechanger link 1"  # Keeps proofs apart from other uses of the key.
-_SHORT_CHARACTERS: Final = 16  # 80 bits in base 32: too many to forge a second certificate.
 
 # Characters outside base 32 that people write by mistake, and separators.
 _MISREAD: Final = str.maketrans({"0": "O", "1": "I", "8": "B", "-": "", " ": "", "\n": ""})
@@ -31,8 +26,13 @@ _MISREAD: Final = str.maketrans({"0": "O", "1": "I", "8": "B", "-": "", " ": "",
 
 def new_key() -> str:
     """Return a new random key: 26 letters and digits in groups of four."""
-    text = base64.b32encode(secrets.token_bytes(_KEY_BYTES)).decode().rstrip("=")
-    return "-".join(text[i : i + _GROUP] for i in range(0, len(text), _GROUP))
+    return _in_groups(secrets.token_bytes(_KEY_BYTES))
+
+
+def _in_groups(data: bytes) -> str:
+    """Return bytes in base 32 without padding, in groups of four."""
+    text = base64.b32encode(data).decode().rstrip("=")
+    return "-".join(text[i : i + 4] for i in range(0, len(text), 4))
 
 
 def parse_key(text: str) -> bytes:
@@ -53,8 +53,8 @@ def parse_key(text: str) -> bytes:
 
 
 def new_nonce() -> bytes:
-    """Return new random bytes."""
-    return secrets.token_bytes(NONCE_BYTES)
+    """Return 32 new random bytes."""
+    return secrets.token_bytes(32)
 
 
 def make_proof(key: bytes, nonce: bytes, certificate: bytes, role: str) -> bytes:
@@ -83,15 +83,9 @@ def fingerprint_of(certificate_der: bytes) -> bytes:
     return hashlib.sha256(certificate_der).digest()
 
 
-def fingerprint_hex(fingerprint: bytes) -> str:
-    """Return the fingerprint as 64 hexadecimal digits, for programs."""
-    return fingerprint.hex()
-
-
 def fingerprint_short(fingerprint: bytes) -> str:
     """Return the first 80 bits in groups of four, such as "K7QF-2MXA-…", for people to compare."""
-    text = base64.b32encode(fingerprint[:10]).decode()
-    return "-".join(text[i : i + _GROUP] for i in range(0, _SHORT_CHARACTERS, _GROUP))
+    return _in_groups(fingerprint[:10])  # 80 bits are too many to forge a second certificate.
 
 
 def parse_fingerprint(text: str) -> bytes:

@@ -60,11 +60,6 @@ class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
     camera_fovy_deg: float | None = None
     turning: tuple[float, float] | None = None
 
-    @property
-    def has_geometry(self) -> bool:
-        """Whether it is known how the camera looks, which policies with waypoints need."""
-        return None not in (self.camera_pitch_deg, self.camera_fovy_deg)
-
 
 def card_of(
     profile: Profile,

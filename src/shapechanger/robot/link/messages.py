@@ -275,11 +275,6 @@ class Welcome(RobotCard, RobotMessage, frozen=True, kw_only=True):
     session: int
     can_record: bool = False
 
-    @classmethod
-    def of(cls, card: RobotCard, session: int, *, can_record: bool = False) -> Welcome:
-        """Return the message of a card."""
-        return cls(**msgspec.structs.asdict(card), session=session, can_record=can_record)
-
 
 class Refused(RobotMessage, frozen=True):
     """Refusal of a message.

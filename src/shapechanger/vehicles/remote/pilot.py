@@ -81,7 +81,7 @@ def require_fit(
         card.require_layouts(actions, state)
     if card.eyes != "none" and robot.image_size is None:
         raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by images.")
-    if has_waypoints and not robot.has_geometry:
+    if has_waypoints and None in (robot.camera_pitch_deg, robot.camera_fovy_deg):
         raise RobotRefused(
             f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
             "which waypoints need: measure them with `shapechanger robot camera`."
