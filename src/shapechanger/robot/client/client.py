@@ -77,10 +77,10 @@ class RobotClient(Inbox):
         self._thread = threading.Thread(
             target=self._run, name=f"robot {robot.address}", daemon=True
         )
-        with contextlib.ExitStack() as opened, self.request(Welcome) as welcome:
+        with contextlib.ExitStack() as opened:
             opened.callback(self.close)  # Leave no thread behind, after Ctrl-C too.
             self._thread.start()
-            self.welcome = self.answered(welcome, threading.TIMEOUT_MAX)
+            self.welcome = self.answer(Welcome, timeout_s=threading.TIMEOUT_MAX)
             opened.pop_all()
 
     @classmethod
@@ -155,14 +155,14 @@ class RobotClient(Inbox):
         # Answer a new observation, but end only an emergency stop that was seen before the call.
         newest = self.ask()
         until_s = time.monotonic() + self._settings[2]
-        with self.request(messages.Refused) as refused:
-            self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
-            while time.monotonic() < until_s:
-                newest = self.ask()
-                if refused.answer is not None:
-                    raise RobotRefused(refused.answer.reason)
-                if newest.message.armed:
-                    return
+        heard = self.heard
+        self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
+        while time.monotonic() < until_s:
+            newest = self.ask()
+            if refused := self.said(messages.Refused, heard):
+                raise RobotRefused(refused.reason)
+            if newest.message.armed:
+                return
         reason = newest.message.stop_reason
         raise RobotRefused(f"The robot did not arm{f': {reason}' if reason else ''}.")
 
@@ -211,14 +211,13 @@ class RobotClient(Inbox):
 
     def acknowledge(self) -> None:
         """Ask for the next observation without a command."""
-        newest = self.newest
-        self._post(messages.Acknowledge(seq=newest.message.seq if newest else 0))
+        self._post(messages.Acknowledge(seq=self.seq))
 
     def ask(self) -> Received:
         """Ask for a new observation, and wait for it."""
-        newest = self.newest
+        seq = self.seq
         self.acknowledge()
-        return self.observation(newest.message.seq if newest else 0)
+        return self.observation(seq)
 
     def exchange(self, values: Sequence[float], seen: Received) -> Received:
         """Send a command, and wait for the next observation.
@@ -388,12 +387,10 @@ class RobotClient(Inbox):
         # A field out of range is an error before anything is sent.
         messages.decode_client_message(messages.encode(message))
         is_prompt = kind in (messages.Lease, messages.Pong)
-        with (
-            contextlib.nullcontext() if is_prompt else self._asking,
-            self.request(kind, accepts) as request,
-        ):
+        with contextlib.nullcontext() if is_prompt else self._asking:
+            heard = self.heard
             self._post(message)
-            return self.answered(request, None if is_prompt else _DISK_S)
+            return self.answer(kind, heard, accepts, None if is_prompt else _DISK_S)
 
     # In the connection's thread.
 

@@ -8,10 +8,10 @@ import os
 import socket
 import threading
 from collections import deque
-from collections.abc import AsyncGenerator, Callable, Generator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgspec
 
@@ -25,7 +25,6 @@ from shapechanger.robot.link.messages import (
     Event,
     Hello,
     Observation,
-    PolicyState,
     RecorderState,
     Refused,
     RobotMessage,
@@ -176,15 +175,6 @@ class Received:
     jpeg: bytes | None
 
 
-@dataclass(slots=True, eq=False)
-class Request(Generic[_M]):
-    """A request to the robot, until its answer arrives: a message of a kind, or a refusal."""
-
-    kind: type[_M]
-    accepts: Callable[[_M], bool]
-    answer: _M | Refused | None = None
-
-
 class Inbox:
     """Messages of a robot, for any number of calling threads.
 
@@ -193,15 +183,13 @@ class Inbox:
 
     Attributes:
         newest: The newest observation of any age; None before the first.
-        recorder: Last reported state of the robot's recorder, or None.
-        policies: Last report of the policies on board, or None.
+        heard: Number of messages so far.
         failure: Why the link is lost; None while it is up.
     """
 
     def __init__(self, clock: Callable[[], float], patience_s: float) -> None:
         self.newest: Received | None = None
-        self.recorder: RecorderState | None = None
-        self.policies: PolicyState | None = None
+        self.heard = 0
         self.failure: LinkError | None = None
         self._clock = clock
         self._patience_s = patience_s  # Default time limit of a wait.
@@ -209,11 +197,22 @@ class Inbox:
         self._changed = threading.Condition()
         self._events: deque[Event] = deque(maxlen=256)
         self._refusals: dict[int, str] = {}
-        self._requests: list[Request[Any]] = []
+        self._said: dict[type[RobotMessage], tuple[int, RobotMessage]] = {}
+
+    @property
+    def seq(self) -> int:
+        """Number of the newest observation; 0 before the first."""
+        return self.newest.message.seq if self.newest else 0
+
+    @property
+    def recorder(self) -> RecorderState | None:
+        """Last reported state of the robot's recorder; None before the first."""
+        return self.said(RecorderState)
 
     def put(self, message: RobotMessage) -> None:
         """Store a message that has just arrived."""
         with self._changed:
+            self.heard += 1
             match message:
                 case Observation():
                     self._observe(message)
@@ -224,11 +223,7 @@ class Inbox:
                 case Refused(seq=int(seq)):
                     self._refusals = {seq: message.reason}
                 case _:
-                    if isinstance(message, RecorderState):
-                        self.recorder = message
-                    elif isinstance(message, PolicyState):
-                        self.policies = message
-                    self._answer(message)
+                    self._said[type(message)] = self.heard, message
             self._changed.notify_all()
 
     def fail(self, failure: LinkError) -> None:
@@ -264,45 +259,47 @@ class Inbox:
             StaleObservation: If none arrives in time.
             LinkError: If the link is lost.
         """
-
-        def newer() -> Received | None:
-            newest = self.newest
-            return newest if newest is not None and newest.message.seq > newer_than else None
-
-        found = self.wait(newer, timeout_s)
+        limit_s = self._patience_s if timeout_s is None else timeout_s
+        found = self.wait(lambda: self.newest if self.seq > newer_than else None, limit_s)
         if found is not None:
             return found
         last = self.newest
         age = f"the last is {self._clock() - last.received_at:.2f} s old" if last else "none ever"
-        limit_s = self._patience_s if timeout_s is None else timeout_s
         raise StaleObservation(f"The robot sent no new observation within {limit_s:.2f} s ({age}).")
 
-    @contextmanager
-    def request(
-        self, kind: type[_M], accepts: Callable[[_M], bool] = lambda _: True
-    ) -> Generator[Request[_M]]:
-        """Expect the answer to a request that is sent within the block.
+    def said(self, kind: type[_M], since: int = 0) -> _M | None:
+        """Return the last message of a kind, if it came after message number `since`."""
+        number, message = self._said.get(kind, (0, None))
+        return message if isinstance(message, kind) and number > since else None
 
-        A message answers the oldest request that it fits; a refusal fits all of them.
+    def answer(
+        self,
+        kind: type[_M],
+        since: int = 0,
+        accepts: Callable[[_M], bool] = lambda _: True,
+        timeout_s: float | None = None,
+    ) -> _M:
+        """Wait for a message that answers a request, which was sent after message number `since`.
+
+        Args:
+            kind: Kind of answer.
+            since: `heard` before the request.
+            accepts: Whether a message of this kind is the answer.
+            timeout_s: Time limit, s; None for the link's, and then no refusal is expected.
         """
-        request = Request(kind, accepts)
-        with self._changed:
-            self._requests.append(request)
-        try:
-            yield request
-        finally:
-            with self._changed:
-                self._requests.remove(request)
 
-    def answered(self, request: Request[_M], timeout_s: float | None = None) -> _M:
-        """Wait for the answer to a request."""
-        answer = self.wait(lambda: request.answer, timeout_s)
-        if answer is None:
-            kind = request.kind.__name__
-            raise LinkError(f"The robot did not answer with a {kind!r} in time.")
-        if isinstance(answer, Refused):
-            raise RobotRefused(answer.reason)
-        return answer
+        def find() -> _M | Refused | None:
+            said = self.said(kind, since)
+            if said is not None and accepts(said):
+                return said
+            return None if timeout_s is None else self.said(Refused, since)
+
+        found = self.wait(find, timeout_s)
+        if isinstance(found, Refused):
+            raise RobotRefused(found.reason)
+        if found is None:
+            raise LinkError(f"The robot did not answer with a {kind.__name__!r} in time.")
+        return found
 
     def events(self) -> list[Event]:
         """Return the events since the last call, oldest first, at most 256."""
@@ -315,19 +312,10 @@ class Inbox:
         """Return the reason why the robot refused a command, or "" if it has not."""
         return self._refusals.get(seq, "")
 
-    def _answer(self, message: RobotMessage) -> None:
-        for request in self._requests:
-            fits = isinstance(message, request.kind) and request.accepts(message)
-            if request.answer is None and (fits or isinstance(message, Refused)):
-                request.answer = message
-                return
-
     def _observe(self, message: Observation) -> None:
         last = self.newest
-        if last is not None and message.seq <= last.message.seq:
-            raise LinkError(
-                f"Observation {message.seq} arrived after {last.message.seq}, as in a replay."
-            )
+        if message.seq <= self.seq:
+            raise LinkError(f"Observation {message.seq} arrived after {self.seq}, as in a replay.")
         jpeg = message.frame
         if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:
             jpeg = last.jpeg
