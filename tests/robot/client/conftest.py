@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import pty
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +14,7 @@ from typing import Any
 import pytest
 
 from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.teleop import Terminal
 from tests.robot.client.robot import Robot, eventually
 
 
@@ -48,3 +52,13 @@ def connect() -> Iterator[Callable[..., RobotClient]]:
             return stack.enter_context(RobotClient.connect(robot.known, **how))
 
         yield made
+
+
+@pytest.fixture
+def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[int, Terminal]]:
+    """A terminal at a pseudo-terminal, and the end at which to type."""
+    ours, theirs = pty.openpty()
+    with contextlib.ExitStack() as stack:
+        stack.callback(os.close, ours)
+        monkeypatch.setattr(sys, "stdin", stack.enter_context(os.fdopen(theirs)))
+        yield ours, stack.enter_context(Terminal())

@@ -1,8 +1,8 @@
-"""Keys that hold the robot's steering and throttle."""
+"""Keys that hold the robot's steering and throttle, and the terminal that reads them."""
 
 import os
-import pty
 import sys
+import termios
 
 import pytest
 
@@ -11,10 +11,13 @@ from shapechanger.robot.client.teleop import (
     FIRST_HOLD_S,
     REPEAT_HOLD_S,
     HeldKeys,
-    KeyParser,
     NoTerminal,
     Terminal,
 )
+
+W_FOR_1_S = [("w", 0.033 * n) for n in range(31)]
+LAST_S = W_FOR_1_S[-1][1]
+JUST = 1e-6
 
 
 @pytest.mark.parametrize(("key", "meaning"), DIRECTIONS.items())
@@ -26,45 +29,48 @@ def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) 
     assert (keys.value(action, 0.0), keys.value(other, 0.0)) == (value, 0.0)
 
 
-def test_a_press_expires() -> None:
+@pytest.mark.parametrize(
+    ("presses", "now_s", "throttle", "steering"),
+    [
+        # A press expires.
+        ([("w", 10.0)], 10.0 + FIRST_HOLD_S, 1.0, 0.0),
+        ([("w", 10.0)], 10.0 + FIRST_HOLD_S + JUST, 0.0, 0.0),
+        # A held key ends after its last repeat, and an early repeat does not shorten a press.
+        (W_FOR_1_S, LAST_S + 0.9 * REPEAT_HOLD_S, 1.0, 0.0),
+        (W_FOR_1_S, LAST_S + 1.1 * REPEAT_HOLD_S, 0.0, 0.0),
+        ([("w", 0.0), ("w", 0.03)], FIRST_HOLD_S, 1.0, 0.0),
+        # The opposite key takes over at once.
+        ([("w", 0.0), ("s", 0.1)], 0.1, -1.0, 0.0),
+        # A held key continues when another one is pressed, which does not extend its hold.
+        ([*W_FOR_1_S, ("a", LAST_S + 0.02)], LAST_S + FIRST_HOLD_S, 1.0, -1.0),
+        (
+            [*W_FOR_1_S, *(("a", LAST_S + 0.03 * n) for n in range(1, 60))],
+            LAST_S + FIRST_HOLD_S + JUST,
+            0.0,
+            -1.0,
+        ),
+        # Another key does not revive an expired one.
+        (
+            [("w", 0.0), ("w", 0.5), ("a", 0.5 + 1.2 * REPEAT_HOLD_S)],
+            0.5 + 1.2 * REPEAT_HOLD_S,
+            0.0,
+            -1.0,
+        ),
+    ],
+)
+def test_a_press_holds_until_its_time(
+    presses: list[tuple[str, float]], now_s: float, throttle: float, steering: float
+) -> None:
     keys = HeldKeys()
-    keys.press("w", 10.0)
-    assert keys.value("throttle", 10.0 + FIRST_HOLD_S) == 1.0
-    assert keys.value("throttle", 10.0 + FIRST_HOLD_S + 1e-6) == 0.0
-
-
-def test_a_held_key_ends_after_its_last_repeat() -> None:
-    keys = HeldKeys()
-    for n in range(20):
-        keys.press("up", n * 0.03 + (0.5 if n else 0.0))
-    last = 19 * 0.03 + 0.5
-    assert keys.value("throttle", last + 0.9 * REPEAT_HOLD_S) == 1.0
-    assert keys.value("throttle", last + 1.1 * REPEAT_HOLD_S) == 0.0
-
-
-def test_the_opposite_key_takes_over_at_once() -> None:
-    keys = HeldKeys()
-    keys.press("w", 0.0)
-    keys.press("s", 0.1)
-    assert keys.value("throttle", 0.1) == -1.0
+    for key, pressed_s in presses:
+        keys.press(key, pressed_s)
+    assert (keys.value("throttle", now_s), keys.value("steering", now_s)) == (throttle, steering)
+    keys.let_go()
+    assert (keys.value("throttle", now_s), keys.value("steering", now_s)) == (0.0, 0.0)
 
 
 def test_other_keys_are_ignored() -> None:
-    keys = HeldKeys()
-    assert not keys.press("x", 0.0)
-    keys.press("a", 0.0)
-    keys.let_go()
-    assert keys.value("steering", 0.0) == 0.0
-
-
-def test_arrow_keys_have_two_encodings() -> None:
-    assert KeyParser().feed(b"\x1b[A\x1bOBq\x1b[C\x1b[D", 0.0) == [
-        "up",
-        "down",
-        "q",
-        "right",
-        "left",
-    ]
+    assert not HeldKeys().press("x", 0.0)
 
 
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,47 +80,15 @@ def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
             Terminal()
 
 
-def test_the_terminal_is_unbuffered_and_restored(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    import termios
-
-    ours, theirs = pty.openpty()
-    with os.fdopen(theirs) as stdin:
-        monkeypatch.setattr(sys, "stdin", stdin)
-        before = termios.tcgetattr(theirs)
-        with Terminal() as terminal:
-            assert terminal.keys(0.0) == []
-            os.write(ours, b"w\x1b[A")
-            assert terminal.keys(5.0) == ["w", "up"]
-        assert termios.tcgetattr(theirs) == before
-    os.close(ours)
-
-
-def test_a_held_key_continues_when_another_is_pressed() -> None:
-    keys = HeldKeys()
-    for n in range(30):
-        keys.press("w", 0.03 * n)
-    last = 0.03 * 29
-    keys.press("a", last + 0.02)
-    assert keys.value("steering", last + 0.1) == -1.0
-    assert keys.value("throttle", last + FIRST_HOLD_S) == 1.0
-
-
-def test_another_key_does_not_extend_a_hold() -> None:
-    keys = HeldKeys()
-    for n in range(30):
-        keys.press("w", 0.03 * n)
-    last = 0.03 * 29
-    for n in range(60):
-        keys.press("a", last + 0.02 + 0.03 * n)
-    assert keys.value("throttle", last + FIRST_HOLD_S + 1e-6) == 0.0
-
-
-def test_another_key_does_not_revive_an_expired_one() -> None:
-    keys = HeldKeys()
-    keys.press("w", 0.0)
-    keys.press("w", 0.5)
-    assert keys.value("throttle", 0.5 + 1.1 * REPEAT_HOLD_S) == 0.0
-    keys.press("a", 0.5 + 1.2 * REPEAT_HOLD_S)
-    assert keys.value("throttle", 0.5 + 1.2 * REPEAT_HOLD_S) == 0.0
+def test_the_terminal_is_unbuffered_and_restored(typed: tuple[int, Terminal]) -> None:
+    keyboard, terminal = typed
+    inside = termios.tcgetattr(sys.stdin)
+    terminal.__exit__()
+    before = termios.tcgetattr(sys.stdin)
+    assert before[3] & termios.ECHO
+    assert not inside[3] & (termios.ECHO | termios.ICANON)
+    with terminal:
+        assert terminal.keys(0.0) == []
+        os.write(keyboard, b"w\x1b[A")
+        assert terminal.keys(5.0) == ["w", "up"]
+    assert termios.tcgetattr(sys.stdin) == before

@@ -1,11 +1,7 @@
 """Escape sequences of terminals: parsed whole, and never letters."""
 
-import contextlib
 import itertools
 import os
-import pty
-import sys
-from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
@@ -115,17 +111,6 @@ def test_a_held_escape_stops_at_once() -> None:
     assert now_s <= 2 * ESCAPE_WAIT_S
 
 
-@pytest.fixture
-def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[int, Terminal]]:
-    """A terminal at a pseudo-terminal, and the end at which to type."""
-    ours, theirs = pty.openpty()
-    with contextlib.ExitStack() as stack:
-        stack.callback(os.close, ours)
-        stdin = stack.enter_context(os.fdopen(theirs))
-        monkeypatch.setattr(sys, "stdin", stdin)
-        yield ours, stack.enter_context(Terminal())
-
-
 def test_a_read_split_anywhere_moves_nothing(typed: tuple[int, Terminal]) -> None:
     keyboard, terminal = typed
     for sequence in UNKNOWN:
@@ -139,13 +124,7 @@ def test_a_read_split_anywhere_moves_nothing(typed: tuple[int, Terminal]) -> Non
             assert orders(keys) == [], (sequence, place)
     assert orders(terminal.keys(REST_WAIT_S)) == []
     os.write(keyboard, b"\x1b")
-    assert terminal.keys(5.0) == ["escape"]
-
-
-def test_escape_is_a_key_after_a_moment(typed: tuple[int, Terminal]) -> None:
-    keyboard, terminal = typed
-    os.write(keyboard, b"\x1b")
-    assert terminal.keys(0.0) == []
+    assert terminal.keys(0.0) == []  # Escape is a key after a moment.
     assert terminal.keys(5.0) == ["escape"]
 
 
