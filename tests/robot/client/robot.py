@@ -110,7 +110,7 @@ class Robot:
         self._sockets: list[web.WebSocketResponse] = []
         self._now_ns = 10**9
         self._place = 0.0
-        self._values: tuple[float, ...] = tuple(0.0 for _ in self.actions)
+        self._values = self._rest = (0.0,) * len(self.actions)
         self._seq = 0
         self._frame_seq = 0
         self._started = threading.Event()
@@ -160,16 +160,12 @@ class Robot:
 
     def cut(self) -> None:
         """Cut every connection."""
+        self._loop.call_soon_threadsafe(self._abort)
 
-        def abort() -> None:
-            for socket in self._sockets:
-                transport = socket.get_extra_info("socket")
-                del transport
-                assert socket._req is not None
-                assert socket._req.transport is not None
+    def _abort(self) -> None:
+        for socket in self._sockets:
+            if socket._req is not None and socket._req.transport is not None:
                 socket._req.transport.abort()
-
-        self._loop.call_soon_threadsafe(abort)
 
     def send(self, message: Any) -> None:
         """Send a message to all clients."""
@@ -187,21 +183,14 @@ class Robot:
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)
         await runner.setup()
         assert self._credentials is not None
-        site = web.TCPSite(runner, "127.0.0.1", port, ssl_context=self._tls())
-        await site.start()
+        tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        tls.load_cert_chain(self._credentials.certificate, self._credentials.private_key)
+        await web.TCPSite(runner, "127.0.0.1", port, ssl_context=tls).start()
         self.port = runner.addresses[0][1]
         self._started.set()
         await self._stop.wait()
-        for socket in list(self._sockets):
-            if socket._req is not None and socket._req.transport is not None:
-                socket._req.transport.abort()
+        self._abort()
         await runner.cleanup()
-
-    def _tls(self) -> ssl.SSLContext:
-        assert self._credentials is not None
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(self._credentials.certificate, self._credentials.private_key)
-        return context
 
     async def _talk(self, request: web.Request) -> web.WebSocketResponse:
         socket = web.WebSocketResponse(compress=False)
@@ -221,12 +210,9 @@ class Robot:
         self.connections += 1
         self._sockets.append(socket)
         await self._send(socket, self._welcome())
-        try:
+        with contextlib.suppress(ConnectionError):
             await self._converse(socket, hello)
-        except ConnectionError:
-            pass
-        finally:
-            self._sockets.remove(socket)
+        self._sockets.remove(socket)
         return socket
 
     async def _converse(self, socket: web.WebSocketResponse, hello: m.Hello) -> None:
@@ -251,7 +237,7 @@ class Robot:
                     self.armed = self.armed or (mine and self.arm_by_itself)
                     if self.home_at_take:
                         self._place, self._frame_seq = 0.0, 0
-                        self._values = tuple(0.0 for _ in self.actions)
+                        self._values = self._rest
                 case m.Release():
                     mine, self.armed = False, False
                 case m.Disarm():
@@ -267,8 +253,13 @@ class Robot:
                     else:
                         self.armed, self.emergency = True, False
                 case m.Command() | m.Acknowledge():
-                    if isinstance(message, m.Command):
-                        await self._apply(socket, message)
+                    command = message if isinstance(message, m.Command) else None
+                    if command is not None:
+                        if self.refusal:
+                            refused = m.Refused(reason=self.refusal, seq=command.seq)
+                            await self._send(socket, refused)
+                        moves = self.armed and not self.emergency and not self.refusal
+                        self._values = command.values if moves else self._rest
                     if hello.pace == "realtime":
                         loop = asyncio.get_running_loop()
                         await asyncio.sleep(sent_s + 1.0 / self.control_hz - loop.time())
@@ -277,16 +268,9 @@ class Robot:
                     if self.garbage is not None:
                         await socket.send_bytes(self.garbage)
                         continue
-                    command = message if isinstance(message, m.Command) else None
                     seen = self._observe(hello, command, frame_sent, mine and not self.held_by)
                     frame_sent = seen.frame_seq
                     await self._send(socket, seen)
-
-    async def _apply(self, socket: web.WebSocketResponse, command: m.Command) -> None:
-        if self.refusal:
-            await self._send(socket, m.Refused(reason=self.refusal, seq=command.seq))
-        moves = self.armed and not self.emergency and not self.refusal
-        self._values = command.values if moves else tuple(0.0 for _ in self.actions)
 
     def _time_ns(self, hello: m.Hello) -> int:
         return self._now_ns if hello.pace == "lockstep" else time.monotonic_ns()
@@ -299,29 +283,21 @@ class Robot:
     @property
     def _speed(self) -> float:
         names = [feature.name for feature in self.actions]
-        if "throttle" not in names:
-            return 0.0
-        return FULL_SPEED * self._values[names.index("throttle")]
-
-    def _quantities(self) -> dict[str, float]:
-        touches = self._place >= WALL
-        return {
-            "speed": 0.0 if touches else self._speed,
-            "collision": float(touches),
-            "stall": float(touches and self._speed > 0.0),
-            "battery": 7.4,
-        }
+        return FULL_SPEED * dict(zip(names, self._values, strict=True)).get("throttle", 0.0)
 
     def _observe(
         self, hello: m.Hello, command: m.Command | None, frame_sent: int, mine: bool
     ) -> m.Observation:
         self._seq += 1
         now_ns = self._time_ns(hello)
-        quantities = self._quantities()
-        values = [
-            float("nan") if f.name in self.absent else quantities.get(f.name, 0.0)
-            for f in self.state
-        ]
+        touches = self._place >= WALL
+        quantities = {
+            "speed": 0.0 if touches else self._speed,
+            "collision": float(touches),
+            "stall": float(touches and self._speed > 0.0),
+            "battery": 7.4,
+            **dict.fromkeys(self.absent, float("nan")),
+        }
         frame = None
         if self.image_size is not None and hello.frames and frame_sent != self._frame_seq:
             frame = self.jpeg or picture(self.image_size, self._frame_seq)
@@ -333,7 +309,7 @@ class Robot:
             sent_ns=now_ns,
             frame=frame,
             frame_seq=self._frame_seq if self.image_size else 0,
-            state=tuple(values),
+            state=tuple(quantities.get(f.name, 0.0) for f in self.state),
             sources={
                 f.name: f.element.name
                 for f in self.state

@@ -49,3 +49,11 @@ def test_the_first_failure_counts() -> None:
     inbox.fail(LinkError("Second."))
     with pytest.raises(RobotRefused, match="First"):
         inbox.observation(0, 0.0)
+
+
+def test_an_old_observation_ends_the_link() -> None:
+    inbox = Inbox(lambda: 0.0, 1.0)
+    inbox.put(seen(10))
+    for seq in (10, 5):
+        with pytest.raises(LinkError, match="as in a replay"):
+            inbox.put(seen(seq))
