@@ -34,10 +34,7 @@ def scene(robot: RunningRobot) -> Iterator[Scene]:
     key = key_of(robot)
     before, pids = movements(robot), [robot.pid_of("guard"), robot.pid_of("daemon")]
     with Stranger(robot.port) as operator:
-        operator.enter(key, "person", name="Grace")
-        while not operator.take()["mine"]:
-            pass  # The client of the test before may still be leaving.
-        operator.arm()
+        operator.control(key, "Grace")
         made = Scene(robot, robot.port, key, operator)
         with made.stack:
             yield made

@@ -242,6 +242,13 @@ class Stranger:
         while not seen["armed"]:
             seen = self.observe()
 
+    def control(self, key: bytes, name: str) -> None:
+        """Enter as a person, take control once it is free, and arm."""
+        self.enter(key, "person", name=name)
+        while not self.take()["mine"]:
+            pass  # The client of the test before may still be leaving.
+        self.arm()
+
     def drive(self, seq: int, *values: float, **fields: Any) -> None:
         """Command in answer to a new observation."""
         self.send(

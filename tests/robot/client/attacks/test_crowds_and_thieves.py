@@ -113,10 +113,7 @@ def test_a_thief_of_the_key_stays_within_the_limits_of_the_guard(robot: RunningR
     key = key_of(robot)
     before = len(read_ledger(robot.ledger_path))
     with Stranger(robot.port) as thief:
-        thief.enter(key, "person", name="thief")
-        while not thief.take()["mine"]:
-            pass
-        thief.arm()
+        thief.control(key, "thief")
         for seq in itertools.count(1):
             thief.drive(seq, 1e6, 1e6, ttl_ms=60_000)
             if thief.expect("observation")["applied_seq"]:
@@ -132,10 +129,7 @@ def test_a_thief_of_the_key_stays_within_the_limits_of_the_guard(robot: RunningR
 def test_any_client_with_the_key_stops_a_thief(robot: RunningRobot) -> None:
     key = key_of(robot)
     with Stranger(robot.port) as thief, Stranger(robot.port) as program:
-        thief.enter(key, "person", name="thief")
-        while not thief.take()["mine"]:
-            pass
-        thief.arm()
+        thief.control(key, "thief")
         program.enter(key, name="watchdog")
         program.send("emergencystop", reason="nobody should drive")
         while not (seen := thief.observe())["emergency"]:
@@ -172,12 +166,10 @@ def test_no_log_contains_a_key_or_a_proof(robot: RunningRobot) -> None:
             client.hello(held, role, name="Lin\nguard: Armed.\x1b[2J")
             client.receive()
             secrets.append(client.proof)
-    with Stranger(robot.port) as client:
-        page = client.request("GET / HTTP/1.1", Connection="close") + client.rest()
-    with Stranger(robot.port) as client:
-        page += (
-            client.request("GET /console/robot.json HTTP/1.1", Connection="close") + client.rest()
-        )
+    page = ""
+    for path in ("/", "/console/robot.json"):
+        with Stranger(robot.port) as client:
+            page += client.request(f"GET {path} HTTP/1.1", Connection="close") + client.rest()
     log = robot.log_text()
     processes = [robot.supervisor.pid, robot.pid_of("guard"), robot.pid_of("daemon")]
     places = {f"/proc/{pid}/{name}" for pid in processes for name in ("cmdline", "environ")}
@@ -203,10 +195,7 @@ def test_an_honest_client_moves_the_robot(robot: RunningRobot) -> None:
     key = key_of(robot)
     before = movements(robot)
     with Stranger(robot.port) as operator:
-        operator.enter(key, "person", name="Grace")
-        while not operator.take()["mine"]:
-            pass
-        operator.arm()
+        operator.control(key, "Grace")
         for seq in itertools.count(1):
             operator.drive(seq, 0.0, 0.5)
             if operator.expect("observation")["applied_seq"]:

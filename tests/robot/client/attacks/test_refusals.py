@@ -85,31 +85,31 @@ def replayed_hello(scene: Scene) -> str:
     return stranger.refusal()
 
 
-@refused("must be a hello")
-def command_before_hello(scene: Scene) -> str:
+def before_hello(scene: Scene, kind: str, **fields: Any) -> str:
+    """Order without a hello: only clients with the key may even stop the robot."""
     stranger = scene.stranger()
     stranger.challenge()
-    stranger.send("command", seq=2**50, answers=scene.operator.seen["seq"], values=FULL)
-    return stranger.refusal()
-
-
-@refused("must be a hello")
-def emergency_stop_before_hello(scene: Scene) -> str:
-    """Only clients with the key may stop the robot over the network."""
-    stranger = scene.stranger()
-    stranger.challenge()
-    stranger.send("emergencystop", reason="nuisance")
+    stranger.send(kind, **fields)
     reason = stranger.refusal()
     assert not scene.operator.observe()["emergency"]
     return reason
 
 
+ATTACKS |= {
+    "command_before_hello": (
+        lambda scene: before_hello(
+            scene, "command", seq=2**50, answers=scene.operator.seen["seq"], values=FULL
+        ),
+        "must be a hello",
+    ),
+    "emergency_stop_before_hello": (
+        lambda scene: before_hello(scene, "emergencystop", reason="nuisance"),
+        "must be a hello",
+    ),
+}
+
+
 # Below the link.
-
-
-@refused("closed")
-def plain_http(scene: Scene) -> str:
-    return scene.stranger(version=None).upgrade() or "closed"
 
 
 @refused("closed")
@@ -132,7 +132,17 @@ def page_of(origin: str) -> Attack:
     return lambda scene: scene.stranger().upgrade(Origin=origin.format(scene.port + 1))
 
 
+def requested(text: str, **headers: str) -> Attack:
+    """Return an attack of one HTTP request, which may end without an answer."""
+    return lambda scene: scene.stranger().request(f"GET {text} HTTP/1.1", **headers) or "400"
+
+
+SMUGGLED: Final = {"Content_Length": "4", "Transfer_Encoding": "chunked"}
 ATTACKS |= {
+    "plain_http": (lambda scene: scene.stranger(version=None).upgrade() or "closed", "closed"),
+    "half_an_upgrade": (requested("/link", Upgrade="websocket"), "400"),
+    "smuggled_request": (requested("/healthz", **SMUGGLED), "400"),
+    "huge_header": (requested("/", X="x" * 2**20), "400"),
     "foreign_origin": (page_of("https://evil.example"), "403"),
     "null_origin": (page_of("null"), "403"),  # A local file, or a sandboxed frame.
     "origin_of_another_port": (page_of("https://127.0.0.1:{}"), "403"),
@@ -168,22 +178,6 @@ def methods(scene: Scene) -> str:
     }
     assert {status.split()[1] for status in found} == {"405"}, found
     return "".join(found)
-
-
-@refused("400")
-def half_an_upgrade(scene: Scene) -> str:
-    return scene.stranger().request("GET /link HTTP/1.1", Upgrade="websocket")
-
-
-@refused("400")
-def smuggled_request(scene: Scene) -> str:
-    headers = {"Content_Length": "4", "Transfer_Encoding": "chunked"}
-    return scene.stranger().request("GET /healthz HTTP/1.1", **headers)
-
-
-@refused("400")
-def huge_header(scene: Scene) -> str:
-    return scene.stranger().request("GET / HTTP/1.1", X="x" * 2**20) or "400"
 
 
 # Frames and messages, without and with the key.
@@ -319,25 +313,24 @@ def repeated(scene: Scene, **fields: object) -> str:
     return operator.refusal()
 
 
-@refused("ms are allowed")
-def answer_to_an_old_observation(scene: Scene) -> str:
-    """Delay a command until nobody knows what the robot sees."""
+def too_late(scene: Scene, kind: str, **fields: object) -> str:
+    """Answer an observation so late that nobody knows what the robot sees."""
     operator = scene.operator
+    if kind == "arm":
+        operator.send("disarm")
     seen = operator.observe()
     settle(scene.robot, scene.key, 450_000_000)
-    operator.send("command", seq=7, answers=seen["seq"], values=FULL)
+    operator.send(kind, answers=seen["seq"], **fields)
     return operator.refusal()
 
 
-@refused("Not armed.")
-def late_request_to_arm(scene: Scene) -> str:
-    """Arm with an observation that is old."""
-    operator = scene.operator
-    operator.send("disarm")
-    seen = operator.observe()
-    settle(scene.robot, scene.key, 450_000_000)
-    operator.send("arm", answers=seen["seq"])
-    return operator.refusal()
+ATTACKS |= {
+    "answer_to_an_old_observation": (
+        lambda scene: too_late(scene, "command", seq=7, values=FULL),
+        "ms are allowed",
+    ),
+    "late_request_to_arm": (lambda scene: too_late(scene, "arm"), "Not armed."),
+}
 
 
 UNUSABLE: Final[dict[str, tuple[dict[str, Any], str]]] = {
