@@ -66,7 +66,8 @@ def test_vehicles_are_filmed_from_outside(tmp_path: Path) -> None:
     """Their envs render what the robot sees, not the robot."""
     source, target = driven(env_ref("CarWaypoint")), driven(env_ref("TankWaypoint"))
     whole = cast("Any", learner_settings("waypoint")).clone
-    clone = msgspec.structs.replace(whole, fewest_steps=1, most_steps=1)
+    small = {"channels": (4, 8), "features": 8, "batch": 8}
+    clone = msgspec.structs.replace(whole, fewest_steps=1, most_steps=1, **small)
     changes = {"budgets": [20], "episode_steps": 20, "eval_episodes": 1, "eval_steps": 20}
     _, settings = resolve_learner("waypoint", {**changes, "clone": msgspec.to_builtins(clone)})
     plan = make_plan(

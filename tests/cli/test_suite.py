@@ -288,30 +288,3 @@ def test_another_suite_in_the_folder_is_refused(
     assert code == 2
     assert "holds another study, which differs in seed" in errors
     assert counting.done == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["suite", "run", "vehicles", "--seeds", "1"], "at least 2 seeds"),
-        (["suite", "run", "vehicles", "--steps", "5"], "smaller than one evaluation"),
-        (["suite", "run", "vehicles", "--seed", "-1"], "A seed is a whole number from 0"),
-        (["suite", "run", "vehicles", "--workers", "0"], "at least one worker"),
-    ],
-)
-def test_mistakes_give_one_sentence(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Exit code 2, no traceback, and no file is written."""
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    message = capsys.readouterr().err
-    assert stop.value.code == 2
-    assert words in message
-    assert message.count("\n") == 1
-    assert not list(tmp_path.iterdir())

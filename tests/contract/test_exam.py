@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -88,39 +87,27 @@ _SEEING: dict[str, MakeEnv] = {
     "image and state": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, state=True),
     "random light": partial(gym.make, "shapechanger/Car-v1", size=_SMALL, randomise=True),
 }
-# They differ from the car by body and world, which the exam without images covers.
-_LONG = [name for name in _SEEING if name.split("/")[-1].startswith(("Tank", "Truck"))]
+# The others differ from these by body and world, which the exam without images covers.
+_QUICK = ("shapechanger/BoatWaypoint-v1", "image and state", "random light")
 
 
-@pytest.mark.parametrize("promise", PROMISES, ids=lambda promise: promise.__name__)
 @pytest.mark.parametrize("make", _ALL.values(), ids=_ALL.keys())
-def test_an_env_keeps_its_promise(make: MakeEnv, promise: Callable[[MakeEnv], None]) -> None:
-    """Each check holds for each env and body."""
-    promise(make)
+def test_an_env_keeps_its_promises(make: MakeEnv) -> None:
+    assert len(list(examine(make))) == len(PROMISES)
 
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-@pytest.mark.parametrize("promise", PROMISES, ids=lambda promise: promise.__name__)
 @pytest.mark.parametrize(
     "make",
     [
-        pytest.param(make, id=name, marks=[pytest.mark.slow] if name in _LONG else [])
+        pytest.param(make, id=name, marks=[] if name in _QUICK else [pytest.mark.slow])
         for name, make in _SEEING.items()
     ],
 )
-def test_an_env_with_images_keeps_its_promise(
-    make: MakeEnv, promise: Callable[[MakeEnv], None]
-) -> None:
+def test_an_env_with_images_keeps_its_promises(make: MakeEnv) -> None:
     """Image observations are deterministic and not shared."""
-    promise(make)
-
-
-def test_examine_runs_every_check() -> None:
-    """One result is yielded per check that passes."""
-    kept = list(examine(_MAKERS["shapechanger/InvertedPendulum-v1"]))
-    assert len(kept) == len(PROMISES)
-    assert kept[0] == "Passes Gymnasium's `check_env`."
+    assert len(list(examine(make))) == len(PROMISES)
 
 
 # As in Gymnasium, the pendulum's forces are from -3 to 3.
@@ -148,8 +135,9 @@ def test_envs_can_be_vectorized(env_id: str) -> None:
         envs.close()
 
 
-@pytest.mark.parametrize("mode", ["sync", "async"])
-@pytest.mark.parametrize("env_id", VEHICLE_ENVS)
+@pytest.mark.parametrize(
+    ("env_id", "mode"), [("shapechanger/Car-v1", "async"), ("shapechanger/Boat-v1", "sync")]
+)
 def test_vehicles_can_be_vectorized(env_id: str, mode: str) -> None:
     """In the same process, and in subprocesses."""
     _play(gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, image=False))

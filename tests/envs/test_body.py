@@ -270,14 +270,6 @@ def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
     assert env.standing_height == small
 
 
-def test_a_pole_changes_its_length_too() -> None:
-    """Families without a trunk can change their body too."""
-    with gym.make("shapechanger/InvertedPendulum-v1") as env:
-        env.reset(seed=0, options={"body": "BigInvertedPendulum"})
-        big = _compiled(_model("shapechanger/BigInvertedPendulum-v1"))
-        assert _compiled(env.unwrapped.model) == big
-
-
 def test_a_new_body_starts_from_rest(ant: Any) -> None:
     """No state of the old body's episode remains."""
     for _ in range(10):

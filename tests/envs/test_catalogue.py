@@ -64,34 +64,3 @@ def test_an_episode_is_truncated_at_its_limit() -> None:
         env.reset(seed=0)
         ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(3)]
     assert ends == [(False, False), (False, False), (False, True)]
-
-
-@pytest.mark.parametrize(
-    ("env_id", "factor"),
-    [("InvertedPendulum", 1.0), ("SmallInvertedPendulum", 0.5), ("BigInvertedPendulum", 2.0)],
-)
-def test_poles_have_their_lengths(env_id: str, factor: float) -> None:
-    """Poles are 0.6 m times the factor, with a lean of 1 mm."""
-    model = _model(f"shapechanger/{env_id}-v1")
-    (pole,) = (g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name == "pole")
-    length = 2.0 * model.geom_size[pole, 1]
-    assert length == pytest.approx(np.hypot(factor * 0.6, 0.001), rel=1e-12)
-    centre = model.body("pole").ipos
-    np.testing.assert_allclose(centre, [0.0005, 0.0, factor * 0.3], atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("env_id", "lengths"),
-    [
-        ("Ant", {"shank_4": 1.0, "shank_1": 1.0, "shank_2": 1.0, "shank_3": 1.0}),
-        ("BigAnt", {"shank_4": 2.0, "shank_1": 2.0, "shank_2": 2.0, "shank_3": 2.0}),
-        ("AmputatedAnt", {"shank_4": 0.25, "shank_1": 1.0, "shank_2": 1.0, "shank_3": 1.0}),
-    ],
-)
-def test_shanks_have_their_lengths(env_id: str, lengths: dict[str, float]) -> None:
-    """Shanks are 0.4 m along x and along y, times the factor."""
-    model = _model(f"shapechanger/{env_id}-v1")
-    for name, factor in lengths.items():
-        (geom,) = (g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body(name).id)
-        assert 2.0 * model.geom_size[geom, 1] == pytest.approx(factor * 0.4 * np.sqrt(2.0))
-        assert model.geom_size[geom, 0] == 0.08

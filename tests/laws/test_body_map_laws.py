@@ -25,7 +25,7 @@ from shapechanger.transfer.body_map import (
 )
 
 # A fixed number of examples.
-law = settings(max_examples=40)
+law = settings(max_examples=25)
 
 NAMES = ("hip/angle", "ankle/angle", "foot/angle", "Größe", 'odd "name"', "x[0]", "eye")
 # Powers of two: their products and quotients are exact, so that maps can be compared for equality.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -37,6 +37,8 @@ DIFFERENCES: dict[str, Difference] = {
     "steps saved": lambda arm, scratch: time_to_threshold(arm, scratch, 0.5).steps_saved,
 }
 differences = pytest.mark.parametrize("difference", DIFFERENCES.values(), ids=DIFFERENCES.keys())
+
+law = settings(max_examples=40)
 
 # Returns from rounding noise to a few thousand, as for simulated robots.
 heights = st.floats(-5.0, 5.0) | st.floats(-1e4, 1e4)
@@ -111,6 +113,7 @@ def same(left: list[float | None], right: list[float | None], tolerance: float) 
 
 
 @differences
+@law
 @given(pair=pairs())
 def test_differences_are_antisymmetric(difference: Difference, pair: Pair) -> None:
     """Swapping the arms negates estimates and intervals."""
@@ -124,12 +127,14 @@ def test_differences_are_antisymmetric(difference: Difference, pair: Pair) -> No
 
 
 @differences
+@law
 @given(pair=pairs())
 def test_no_arm_gains_on_itself(difference: Difference, pair: Pair) -> None:
     """Identity: every gain of an arm over itself is zero."""
     assert value(difference(pair[0], pair[0])) == 0.0
 
 
+@law
 @given(pair=pairs(0.0, 1.0))
 def test_ratios_of_an_arm_with_itself(pair: Pair) -> None:
     """Identity: a ratio of 1 and a forward transfer of 0, where defined."""
@@ -140,6 +145,7 @@ def test_ratios_of_an_arm_with_itself(pair: Pair) -> None:
     assert transfer.value in (None, 0.0)
 
 
+@law
 @given(
     pair=pairs(),
     scale=st.floats(1e-2, 1e2),
@@ -168,6 +174,7 @@ def test_scores_are_invariant_to_reward_units(
 
 
 @differences
+@law
 @given(pair=pairs(), bonus=st.floats(0.0, 100.0), source=source_steps)
 def test_a_better_arm_never_gains_less(
     difference: Difference, pair: Pair, bonus: float, source: int
@@ -180,6 +187,7 @@ def test_a_better_arm_never_gains_less(
     assert after >= before - 1e-9 * max(1.0, abs(before))
 
 
+@law
 @given(pair=pairs(0.01, 0.9), bonus=st.floats(0.0, 0.1), source=source_steps)
 def test_a_better_arm_never_has_a_lower_ratio(pair: Pair, bonus: float, source: int) -> None:
     """Monotonicity of the two ratios, on scores between 0 and 1."""
@@ -200,6 +208,7 @@ def test_a_better_arm_never_has_a_lower_ratio(pair: Pair, bonus: float, source: 
         assert after >= before - 1e-9 * max(1.0, abs(before))
 
 
+@law
 @given(pair=pairs(), source=source_steps, data=st.data())
 def test_seeds_have_no_order(pair: Pair, source: int, data: st.DataObject) -> None:
     """Permutation: the order of seeds changes no point estimate."""
@@ -214,6 +223,7 @@ def test_seeds_have_no_order(pair: Pair, source: int, data: st.DataObject) -> No
     )
 
 
+@law
 @given(pair=pairs(), threshold=heights, source=source_steps)
 def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, source: int) -> None:
     """Restricted means and medians lie in [0, H], and other seeds are censored."""
@@ -229,6 +239,7 @@ def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, s
     assert np.all((steps <= arm.horizon) | np.isinf(steps))
 
 
+@law
 @given(pair=pairs())
 def test_a_higher_threshold_is_never_sooner(pair: Pair) -> None:
     """A curve reaches 0.25 no later than 0.75."""
@@ -236,6 +247,7 @@ def test_a_higher_threshold_is_never_sooner(pair: Pair) -> None:
     assert np.all(steps_to_reach(curves, 0.25) <= steps_to_reach(curves, 0.75))
 
 
+@law
 @given(pair=pairs(), source=st.integers(0, 2000))
 def test_source_steps_delay_crossings_in_total_steps(pair: Pair, source: int) -> None:
     curves, _ = pair
@@ -248,6 +260,7 @@ def test_source_steps_delay_crossings_in_total_steps(pair: Pair, source: int) ->
     )
 
 
+@law
 @given(pair=pairs())
 def test_without_source_steps_both_counts_agree(pair: Pair) -> None:
     """Estimates and intervals are exactly equal."""
@@ -255,6 +268,7 @@ def test_without_source_steps_both_counts_agree(pair: Pair) -> None:
     assert summary.in_total_steps == summary.in_target_steps
 
 
+@law
 @given(pair=pairs(), source=source_steps, floor=st.floats(-1e4, 1e4))
 def test_area_in_total_steps_is_linear_in_the_floor(pair: Pair, source: int, floor: float) -> None:
     """A floor of f adds f times the share of the budget spent on the source."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import os
 
 import gymnasium.envs.mujoco
@@ -108,12 +110,19 @@ EVERYTHING = """
 """
 
 
+@functools.cache
+def _compiled(name: str) -> mujoco.MjModel:
+    if name == "everything":
+        return mujoco.MjModel.from_xml_string(EVERYTHING)
+    return mujoco.MjModel.from_xml_path(os.path.join(ASSETS, f"{name}.xml"))
+
+
 def everything() -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(EVERYTHING)
+    return copy.copy(_compiled("everything"))
 
 
 def asset(name: str) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_path(os.path.join(ASSETS, f"{name}.xml"))
+    return copy.copy(_compiled(name))
 
 
 def asset_spec(name: str) -> mujoco.MjSpec:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
@@ -25,18 +27,7 @@ TINY = PpoSettings(
     eval_every=32,
     eval_episodes=2,
 )
-TINY_NORMALISED = PpoSettings(
-    n_envs=2,
-    n_steps=16,
-    batch_size=16,
-    n_epochs=1,
-    learning_rate=1e-3,
-    net_arch=(8,),
-    normalise=True,
-    steps=96,
-    eval_every=32,
-    eval_episodes=2,
-)
+TINY_NORMALISED = msgspec.structs.replace(TINY, normalise=True)
 
 
 def tiny_plan(settings: PpoSettings = TINY, **arguments: Any) -> Plan:

@@ -12,26 +12,22 @@ import onnx
 import pytest
 
 from shapechanger.errors import CorruptStudy, StudyError
-from shapechanger.policy import load_policy
-from shapechanger.transfer.executor import Serial
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.export import export_onnx
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.onnx_policy import OnnxPolicy
-from shapechanger.transfer.plan import Run
-from shapechanger.transfer.study import run_study
-from tests.transfer.studies import TINY, TINY_NORMALISED, tiny_plan
+from tests.transfer.studies import SMALL, TINY_NORMALISED
 
 
-@pytest.fixture(scope="module", params=[TINY, TINY_NORMALISED], ids=["plain", "normalised"])
-def files(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, Path]:
-    """A trained policy and its ONNX file."""
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A normalised policy and its ONNX file."""
     folder = tmp_path_factory.mktemp("onnx")
-    plan = tiny_plan(request.param, arms=("scratch", "fine-tune"), steps=32, source_steps=32)
-    run_study(plan, folder / "study", executor=Serial())
-    policy = Run("fine-tune", 0).policy_file(folder / "study")
-    export_onnx(load_policy(policy), folder / "policy.onnx")
-    return policy, folder / "policy.onnx"
+    learner = Sb3Learner("ppo", TINY_NORMALISED)
+    policy = learner.train(SMALL, 32, 0, on_evaluation=lambda evaluation: None)
+    save_policy(policy, folder / "policy.safetensors")
+    export_onnx(policy, folder / "policy.onnx")
+    return folder / "policy.safetensors", folder / "policy.onnx"
 
 
 def test_actions_are_those_of_pytorch(files: tuple[Path, Path]) -> None:

@@ -140,7 +140,10 @@ def test_normalised_learners_carry_their_statistics(tmp_path: Path) -> None:
 
 
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
-    task = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
+    short = {"max_episode_steps": 20}
+    task = TransferTask(
+        EnvRef("shapechanger/Ant-v1", short), EnvRef("shapechanger/ExtendedAnt-v1", short)
+    )
     plan = tiny_plan(
         msgspec.structs.replace(TINY_NORMALISED, eval_episodes=1),
         task=task,

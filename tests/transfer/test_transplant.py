@@ -267,18 +267,6 @@ def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
         assert torch.equal(values, ours[name]), name
 
 
-@each_class
-def test_there_and_back_is_bitwise_identical(kind: type[Model]) -> None:
-    there = MAPS["growth"]
-    source = trained(kind, there, normalised=True)
-    away = transplant(
-        source, there, envs(there.target_observation, there.target_action, normalised=True)
-    )
-    home = transplant(away, there.inverse(), envs(ant_observation(), ant_action(), normalised=True))
-    for name, values in source.policy.state_dict().items():
-        assert torch.equal(values, home.policy.state_dict()[name]), name
-
-
 def test_each_weight_goes_to_its_name() -> None:
     """A linear policy, by hand: each column moves to the feature of its name."""
     observation = Layout(tuple(Feature(name, "1") for name in ("a", "b", "c")))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,9 @@ _STATE = Layout((Feature("speed", "m/s"), Feature("distance", "m"), Feature("bum
 _RNG = np.random.default_rng(0)
 _PICTURE = _RNG.integers(0, 256, (60, 80, 3), dtype=np.uint8)
 _CARDS = {
-    "colours": {},
-    "edges": {"eyes": "edges"},
+    "edges": {"eyes": "edges", "low": (-0.5, 0.0), "high": (0.5, 1.0)},
     "state": {"eyes": "none", "nerves": (8,), "state_layout": _STATE, "unseen": ("bump",)},
     "both, several": {"nerves": (8, 4), "state_layout": _STATE, "members": 3},
-    "bounded": {"low": (-0.5, 0.0), "high": (0.5, 1.0)},
     "classes": {
         "head": "class",
         "classes": ((-1.0, 0.5), (0.0, 1.0), (1.0, 0.5)),
@@ -43,11 +42,18 @@ def _policy(**card: Any) -> CameraPolicy:
     )
 
 
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """An exported policy of each kind."""
+    folder = tmp_path_factory.mktemp("exported")
+    for kind, card in _CARDS.items():
+        export_clone(_policy(**card), folder / f"{kind}.onnx", body="car", control_hz=20.0)
+    return {kind: folder / f"{kind}.onnx" for kind in _CARDS}
+
+
 @pytest.mark.parametrize("kind", _CARDS)
-def test_actions_are_those_of_the_network(kind: str, tmp_path: Path) -> None:
-    policy, file = _policy(**_CARDS[kind]), tmp_path / "policy.onnx"
-    export_clone(policy, file, body="car", control_hz=20.0)
-    exported = OnnxClone(file)
+def test_actions_are_those_of_the_network(kind: str, files: dict[str, Path]) -> None:
+    policy, exported = _policy(**_CARDS[kind]), OnnxClone(files[kind])
     assert exported.card == msgspec.structs.replace(policy.card, body="car", control_hz=20.0)
     state = np.array([1.5, np.nan, 1.0], np.float32) if policy.card.state_size else None
     picture = None if policy.card.eyes == "none" else _PICTURE
@@ -65,28 +71,27 @@ def test_a_shipped_policy_acts_alike(tmp_path: Path) -> None:
         np.testing.assert_allclose(exported.predict(picture), policy.predict(picture), atol=1e-5)
 
 
-def test_missing_inputs_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "policy.onnx"
-    export_clone(_policy(**_CARDS["both, several"]), file)
-    exported = OnnxClone(file)
+def test_missing_inputs_are_refused(files: dict[str, Path]) -> None:
+    exported = OnnxClone(files["both, several"])
     with pytest.raises(CloningError, match="needs an image"):
         exported.predict(None, np.zeros(3))
     with pytest.raises(CloningError, match=r"needs the state speed, distance, bump"):
         exported.predict(_PICTURE, np.zeros(2))
 
 
-def test_a_change_of_the_file_changes_nothing(tmp_path: Path) -> None:
-    file = tmp_path / "policy.onnx"
-    export_clone(_policy(), file)
+def test_a_change_of_the_file_changes_nothing(files: dict[str, Path], tmp_path: Path) -> None:
+    file = Path(shutil.copy(files["edges"], tmp_path))
     exported = OnnxClone(file)
     before = exported.predict(_PICTURE)
     file.write_bytes(b"something else")
     np.testing.assert_array_equal(exported.predict(_PICTURE), before)
 
 
-def _model(operator: str = "Identity", domain: str = "", card: str = "") -> bytes:
+def _model(
+    operator: str = "Identity", domain: str = "", card: str = "", **attributes: str
+) -> bytes:
     make: Any = helper
-    node = make.make_node(operator, ["x"], ["y"], domain=domain)
+    node = make.make_node(operator, ["x"], ["y"], domain=domain, **attributes)
     sides = [make.make_tensor_value_info(name, TensorProto.FLOAT, ["n", 2]) for name in "xy"]
     graph = make.make_graph([node], "other", sides[:1], sides[1:])
     domains = [make.make_opsetid("", 17), *([make.make_opsetid(domain, 1)] if domain else [])]
@@ -96,15 +101,13 @@ def _model(operator: str = "Identity", domain: str = "", card: str = "") -> byte
     return model.SerializeToString()
 
 
-def _compiled() -> bytes:
-    """A network that was compiled for a provider."""
-    make: Any = helper
-    kernel = {"ep_cache_context": "x", "source": "TensorrtExecutionProvider"}
-    node = make.make_node("EPContext", ["x"], ["y"], domain="com.microsoft", **kernel)
-    sides = [make.make_tensor_value_info(name, TensorProto.FLOAT, ["n", 2]) for name in "xy"]
-    graph = make.make_graph([node], "compiled", sides[:1], sides[1:])
-    domains = [make.make_opsetid("", 17), make.make_opsetid("com.microsoft", 1)]
-    return make.make_model(graph, opset_imports=domains, ir_version=8).SerializeToString()
+# A network that was compiled for a provider.
+_COMPILED = _model(
+    "EPContext",
+    "com.microsoft",
+    ep_cache_context="x",
+    source="TensorrtExecutionProvider",
+)
 
 
 def _card(**changes: Any) -> str:
@@ -121,7 +124,7 @@ def _card(**changes: Any) -> str:
         (_model(card=_card()), "its card says"),
         # An operator that only the provider of somebody's accelerator has.
         (_model("Turbo", domain="com.accelerator"), "its operator com.accelerator:Turbo is not"),
-        (_compiled(), "CPUExecutionProvider"),
+        (_COMPILED, "CPUExecutionProvider"),
     ],
 )
 def test_other_files_are_refused(content: bytes, words: str, tmp_path: Path) -> None:
@@ -147,10 +150,8 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
         OnnxClone(tmp_path / "policy.onnx")
 
 
-def test_a_valid_file_passes_the_checker(tmp_path: Path) -> None:
-    file = tmp_path / "policy.onnx"
-    export_clone(_policy(), file)
-    model: Any = onnx.load(str(file))
+def test_a_valid_file_passes_the_checker(files: dict[str, Path]) -> None:
+    model: Any = onnx.load(str(files["edges"]))
     checker: Any = onnx
     checker.checker.check_model(model)
     assert [side.name for side in (*model.graph.input, *model.graph.output)] == [

@@ -88,14 +88,6 @@ def test_headers_round_trip(tmp_path: Path) -> None:
     assert writer.path.name == "20261121T103005Z-0001"
 
 
-def test_two_episodes_of_the_same_second_have_two_folders(tmp_path: Path) -> None:
-    now = datetime(2026, 11, 21, tzinfo=UTC)
-    for _ in range(2):
-        EpisodeWriter.create(tmp_path, header(), spare_bytes=0, now=lambda: now).close()
-    names = [path.name for path in episodes_of(tmp_path)]
-    assert names == ["20261121T000000Z-0001", "20261121T000000Z-0002"]
-
-
 def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
     writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
     writer.add(step(0), picture())
@@ -104,19 +96,6 @@ def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
     assert not read.closed
     writer.close("collision")
     assert read_episode(writer.path).outcome == "collision"
-
-
-def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
-    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        for number in range(60):
-            writer.add(step(number))
-        assert writer.undo(1.0) == 20
-        assert writer.undo(1.0) == 20
-        writer.add(step(60))
-    read = read_episode(writer.path)
-    assert len(read.steps) == 61
-    assert [s.index for s in read.kept] == [*range(20), 60]
-    assert writer.dropped == 40
 
 
 _TIMES_S = st.lists(st.floats(0.0, 3.0), min_size=1, max_size=12).map(sorted)
@@ -239,13 +218,6 @@ def test_a_missing_picture_does_not_keep_the_others_from_the_disk(
     assert flushed == ["a.jpg", "bad.jpg", "b.jpg", "steps"]
     syncer.close()
     os.close(fd)
-
-
-def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:
-    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        assert writer.undo() == 0
-        with pytest.raises(DemosError, match="must be positive, got nan"):
-            writer.undo(math.nan)
 
 
 def test_dropped_steps_can_be_kept_again(tmp_path: Path) -> None:

@@ -127,12 +127,6 @@ def test_a_table_of_others_that_cannot_be_read(
     assert expected in refused(folder, tmp_path / "data")
 
 
-def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
-    folder = keys_folder(tmp_path / "keys")
-    _edit("steps.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
-    assert import_recording(folder, tmp_path / "data").steps == 3
-
-
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [

@@ -18,11 +18,9 @@ _SHADOW = mujoco.mjtRndFlag.mjRND_SHADOW
 @pytest.mark.parametrize(
     ("size", "arguments", "shadows"),
     [
-        (128, {}, False),
         (256, {}, False),
         (257, {}, True),
         (64, {"shadows": True}, True),
-        (300, {"shadows": False}, False),
     ],
 )
 def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:

@@ -100,18 +100,6 @@ def test_options_reach_every_env() -> None:
     theirs.close()
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.float64, list])
-def test_actions_keep_their_precision(kind: Any) -> None:
-    """Actions reach the envs with their type, which determines their cost."""
-    ours, theirs = _pair("shapechanger/Ant-v1", ["Ant"] * 2, 1, "NextStep")
-    require_same(ours.reset(seed=0), theirs.reset(seed=0))
-    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (2, 8))
-    given = actions.tolist() if kind is list else actions.astype(kind)
-    require_same(ours.step(given), theirs.step(given))
-    ours.close()
-    theirs.close()
-
-
 def test_external_envs_are_stepped() -> None:
     """Envs and wrappers of other packages are stepped by their own `step`."""
 

@@ -47,15 +47,10 @@ def test_the_pretended_device_notices(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("name", "questions", "copies", "arguments"),
     [
-        ("Ant", 1, 0, {}),
         ("Ant", 1, 0, {"bodies": ["Ant", "ExtendedAnt", LONG]}),
         ("Ant", 1, 0, {"pool": ["Ant", LONG]}),
         ("Ant", 1, 0, {"task_infos": False}),
-        ("HalfCheetah", 1, 0, {}),
         ("Hopper", 1, 0, {}),
-        ("Walker2d", 1, 0, {}),
-        ("Swimmer", 1, 0, {}),
-        ("InvertedPendulum", 1, 0, {}),
         ("InvertedDoublePendulum", 1, 0, {}),
         ("Humanoid", 1, 0, {}),
         ("Finger", 1, 0, {}),

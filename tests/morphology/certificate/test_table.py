@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import re
 import subprocess
 import sys
@@ -14,7 +16,7 @@ import pytest
 
 from shapechanger.morphology.certificate import compare, fingerprint
 from shapechanger.morphology.certificate.changes import differences
-from shapechanger.morphology.certificate.fields import MOVED, Field, made_arrays
+from shapechanger.morphology.certificate.fields import MOVED, Field, Numbers, made_arrays
 from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
 from shapechanger.morphology.spec.elements import name_elements
 from tests.morphology.scenes import EVERYTHING, asset, asset_spec, everything
@@ -51,12 +53,24 @@ _RARE = """
 """
 
 
+@functools.cache
+def _compiled(text: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(text)
+
+
 def _rare() -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(_RARE)
+    return copy.copy(_compiled(_RARE))
 
 
 def _cloth() -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(_CLOTH)
+    return copy.copy(_compiled(_CLOTH))
+
+
+@functools.cache
+def _nominal(load: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, Numbers, str]:
+    """Return a model, its numbers and its fingerprint, which nobody changes."""
+    model = load()
+    return model, moved_numbers(model), fingerprint(model)
 
 
 def _array(model: mujoco.MjModel, name: str) -> Any:
@@ -99,16 +113,21 @@ def test_a_number_counts_where_the_table_says_so_and_nowhere_else(
     """Writing to an array changes the elements that list its quantity, and the fingerprint."""
     listed = 0
     for load in (everything, _cloth, _rare):
-        nominal, model = load(), load()
-        before = moved_numbers(nominal)
+        nominal, before, mark = _nominal(load)
+        model = load()
         _write(model, field)
-        after = moved_numbers(model)
-        for element, fields in before[section].items():
-            if field.quantity in fields and field.quantity in after[section].get(element, {}):
-                listed += 1
-                assert after[section][element][field.quantity] != fields[field.quantity], element
-                assert fingerprint(model) != fingerprint(nominal)
-                assert compare(nominal, model)
+        after = moved_numbers(model)[section]
+        found = [
+            element
+            for element, fields in before[section].items()
+            if field.quantity in fields and field.quantity in after.get(element, {})
+        ]
+        for element in found:
+            assert after[element][field.quantity] != before[section][element][field.quantity]
+        if found:
+            listed += 1
+            assert fingerprint(model) != mark
+            assert compare(nominal, model)
         mask = made_arrays(nominal).get(field.where)
         values = _array(nominal, field.array)
         if mask is None or values.ndim == 0 or len(mask) != len(values):
@@ -385,61 +404,6 @@ def test_the_last_bits_do_not_count(name: str, seed: int) -> None:
     assert fingerprint(model) == nominal
     model.body_mass[-1] *= 1.0 + 1e-6
     assert fingerprint(model) != nominal
-
-
-_SHANK = "left_ankle_geom"
-# Edits of the ant, and whether they change how it moves.
-_EDITS: dict[str, tuple[bool, Callable[[mujoco.MjSpec], object]]] = {
-    "longer leg": (True, lambda s: setattr(s.geom(_SHANK), "fromto", [0, 0, 0, 0.5, 0.5, 0])),
-    "denser torso": (True, lambda s: setattr(s.geom("torso_geom"), "density", 9.0)),
-    "narrower joint": (True, lambda s: s.joint("hip_1").__setattr__("range", [-10, 10])),
-    "another motor": (
-        True,
-        lambda s: s.add_actuator(
-            name="more", target="hip_1", trntype=mujoco.mjtTrn.mjTRN_JOINT
-        ).set_to_motor(),
-    ),
-    "rougher foot": (True, lambda s: setattr(s.geom(_SHANK), "friction", [1.5, 0.5, 0.5])),
-    "feet that collide": (True, lambda s: setattr(s.geom(_SHANK), "conaffinity", 1)),
-    "camera": (False, lambda s: s.body("torso").add_camera(name="eye", pos=[0, 0, 3])),
-    "light": (False, lambda s: s.worldbody.add_light(name="sun", pos=[0, 0, 3])),
-    "site": (False, lambda s: s.body("torso").add_site(name="sticker")),
-    "drawn geom": (
-        False,
-        lambda s: s.worldbody.add_geom(name="dot", size=[1, 0, 0], contype=0, conaffinity=0),
-    ),
-    "sensor": (
-        False,
-        lambda s: s.add_sensor(
-            name="angle",
-            type=mujoco.mjtSensor.mjSENS_JOINTPOS,
-            objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            objname="hip_1",
-        ),
-    ),
-    "keyframe": (False, lambda s: s.add_key(name="start")),
-    "custom number": (False, lambda s: s.add_numeric(name="seven", data=[7.0])),
-    "friction below the floor's": (
-        False,
-        lambda s: setattr(s.geom(_SHANK), "friction", [0.2, 0.5, 0.5]),
-    ),
-    "torsional friction that nothing uses": (
-        False,
-        lambda s: setattr(s.geom(_SHANK), "friction", [1.0, 0.9, 0.5]),
-    ),
-    "harder contact than the time step allows": (
-        False,
-        lambda s: setattr(s.geom("floor"), "solref", [0.001, 1.0]),
-    ),
-}
-
-
-@pytest.mark.parametrize("edit", _EDITS)
-def test_edits_of_the_ant_change_its_fingerprint_and_looks_do_not(edit: str) -> None:
-    spec = asset_spec("ant")
-    moves, change = _EDITS[edit]
-    change(spec)
-    assert (fingerprint(spec.compile()) != fingerprint(asset("ant"))) == moves
 
 
 # --- Names --------------------------------------------------------------------------------------

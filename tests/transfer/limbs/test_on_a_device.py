@@ -16,7 +16,6 @@ from shapechanger.errors import StudyError, TransplantError, UnknownName
 from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
 from shapechanger.policy import load_policy, save_policy
-from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_limbs
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
@@ -25,10 +24,7 @@ from shapechanger.transfer.learners.settings import RslLimbSettings
 from shapechanger.transfer.limbs.device import DeviceRows, LimbModel, RslLimbLearner
 from shapechanger.transfer.limbs.envs import fitted, rows_of_each
 from shapechanger.transfer.limbs.policy import LimbPolicy
-from shapechanger.transfer.methods import generalist
 from shapechanger.transfer.onnx_policy import OnnxPolicy
-from shapechanger.transfer.plan import TransferTask
-from shapechanger.transfer.study import make_plan, run_study
 
 ANT: Final = EnvRef("shapechanger/Ant-v1", {"max_episode_steps": 20})
 EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1", {"max_episode_steps": 20})
@@ -186,30 +182,6 @@ def test_the_file_acts_in_an_unseen_body(policy: TrainedPolicy, tmp_path: Path) 
         expected = acting.rows.actions(loaded.act(acting.rows.of(observation[None])))
     exported = OnnxPolicy(tmp_path / "ant.onnx")
     np.testing.assert_allclose(exported.act(observation[None]), expected, atol=1e-5)
-
-
-def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It learns in drawn bodies on the device first, and is evaluated before the first step."""
-    monkeypatch.setattr(generalist, "BODIES", 2)
-    trained: list[EnvRef] = []
-    train = RslLimbLearner.train
-
-    def recorded(self: RslLimbLearner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
-        trained.append(env)
-        return train(self, env, *arguments, **more)
-
-    monkeypatch.setattr(RslLimbLearner, "train", recorded)
-    settings = msgspec.structs.replace(TINY, eval_episodes=1)
-    plan = make_plan(
-        TransferTask(ANT, EXTENDED), "rsl-limbs", settings, seeds=2, arms=("scratch", "generalist")
-    )
-    study = run_study(plan, tmp_path / "study", executor=Serial())
-    many = ANT.having({"bodies": {"split": "train", "count": 2, "seed": 0}})
-    assert [trained.count(env) for env in (many, EXTENDED)] == [2, 4]
-    curves = [study.of(arm)[0].curve for arm in ("generalist", "scratch")]
-    assert [evaluation.steps for evaluation in curves[0]] == [0, 48]
-    assert curves[0][0].mean_return != curves[1][0].mean_return
-    assert [result.device for result in study.of("generalist")] == ["CPU", "CPU"]
 
 
 def test_what_it_refuses(policy: TrainedPolicy) -> None:

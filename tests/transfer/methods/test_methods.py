@@ -12,7 +12,7 @@ import pytest
 from shapechanger import registry
 from shapechanger.errors import StudyError, UnknownName
 from shapechanger.registry import METHODS
-from shapechanger.transfer.executor import Processes, Serial
+from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.methods import Method, MethodRun, load_method, register
 from shapechanger.transfer.plan import ARMS, Run
 from shapechanger.transfer.study import run_study
@@ -117,9 +117,9 @@ def test_methods_of_other_packages(
 
 
 def test_a_custom_method_is_an_arm(plugin: str, tmp_path: Path) -> None:
-    """A plug-in method runs in worker processes, with the numbers of scratch."""
+    """A plug-in method has the budget of scratch, and another seed."""
     plan = tiny_plan(arms=("scratch", plugin), steps=32)
-    study = run_study(plan, tmp_path / "study", executor=Processes(1))
+    study = run_study(plan, tmp_path / "study", executor=Serial())
     assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", plugin}
     assert (tmp_path / "study" / "runs" / "my_methods.patient-0" / "policy.safetensors").exists()
     ours, theirs = study.of(plugin)[0], study.of("scratch")[0]

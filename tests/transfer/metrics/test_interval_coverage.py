@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from benchmarks.interval_coverage import CASES, METHODS, Case, Measured, measure
 from shapechanger.transfer.metrics import Estimate, estimate_difference
-from tests.transfer.metrics.interval_coverage import CASES, METHODS, Case, Measured, measure
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "statistics.md"
 TRIALS = 2000

@@ -89,10 +89,6 @@ def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
     np.testing.assert_array_equal(copied.returns, RISING.returns)
 
 
-def test_sizes_have_names() -> None:
-    assert (RISING.n_seeds, RISING.n_evals, RISING.horizon) == (2, 3, 100.0)
-
-
 def test_last_steps() -> None:
     np.testing.assert_array_equal(RISING.last_steps(2), [50.0, 100.0])
 
@@ -108,11 +104,6 @@ def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
     """Values are linear between evaluations and constant after the last."""
     np.testing.assert_allclose(RISING.at([25.0, 100.0, 400.0]), [[0.25, 1, 1], [0.75, 0, 0]])
     np.testing.assert_allclose(RISING.at(25.0), [[0.25], [0.75]])
-
-
-def test_area_is_the_mean_height() -> None:
-    """A rise and a fall over the whole range both have the mean height 0.5."""
-    np.testing.assert_allclose(RISING.auc(), [0.5, 0.5])
 
 
 def test_area_weighs_uneven_evaluations() -> None:
@@ -155,14 +146,6 @@ def test_total_steps_jump_without_a_slope() -> None:
 def test_area_in_total_steps_is_exact(source_steps: int, rising: float, falling: float) -> None:
     total = in_total_steps(RISING, source_steps, floor=-1.0)
     np.testing.assert_allclose(total.auc(), [rising, falling], rtol=1e-12)
-
-
-def test_area_in_total_steps_agrees_with_a_fine_sum() -> None:
-    rng = np.random.default_rng(0)
-    steps = np.array([0.0, 7.0, 20.0, 64.0])
-    total = in_total_steps(LearningCurves(steps, rng.normal(size=(3, 4))), 13, floor=0.5)
-    midpoints = (np.arange(64_000) + 0.5) / 1000.0
-    np.testing.assert_allclose(total.auc(), total.at(midpoints).mean(axis=1), rtol=1e-6)
 
 
 def test_source_steps_count_once() -> None:

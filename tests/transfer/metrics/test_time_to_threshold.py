@@ -32,16 +32,6 @@ def test_first_crossing_of_the_line() -> None:
     np.testing.assert_allclose(steps_to_reach(SCRATCH, 0.5), [40.0, math.inf])
 
 
-def test_source_steps_delay_and_censor() -> None:
-    """10 source steps delay every time by 10; 35 move one beyond the horizon."""
-    np.testing.assert_allclose(
-        steps_to_reach(in_total_steps(ARM, 10, 0.0), 0.5), [15.0, 40.0, math.inf, 10.0]
-    )
-    np.testing.assert_allclose(
-        steps_to_reach(in_total_steps(ARM, 35, 0.0), 0.5), [40.0, math.inf, math.inf, 35.0]
-    )
-
-
 def test_a_floor_above_the_threshold_is_there_at_once() -> None:
     assert not steps_to_reach(in_total_steps(ARM, 10, 0.6), 0.5).any()
     np.testing.assert_allclose(steps_to_reach(ARM, -1.0), np.zeros(4))
@@ -71,13 +61,6 @@ def test_no_seed_reaches_the_threshold() -> None:
     assert times.steps_saved.value == 0.0
     assert times.steps_saved.low is None
     assert "all seeds" in times.steps_saved.note
-
-
-def test_total_steps_can_cost_more_than_they_save() -> None:
-    """With 30 steps on the source the times are 35, 40 (two censored) and 30."""
-    times = time_to_threshold(in_total_steps(ARM, 30, 0.0), SCRATCH, 0.5)
-    assert times.arm == ReachTimes(fraction=0.5, restricted_mean=36.25, restricted_median=35.0)
-    assert times.steps_saved.value == pytest.approx(3.75)
 
 
 def test_zero_shot_has_no_times() -> None:

@@ -1,6 +1,6 @@
 """Measure the coverage of three intervals of a ratio, for the table of docs/statistics.md.
 
-.venv/bin/python -m tests.transfer.metrics.interval_coverage
+.venv/bin/python -m benchmarks.interval_coverage
 """
 
 from __future__ import annotations
