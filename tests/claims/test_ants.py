@@ -297,14 +297,6 @@ def test_the_extended_ant_has_its_feet_last() -> None:
         assert env.observation_space.shape == (137,)
 
 
-def test_the_extended_ant_of_2017_has_passive_feet() -> None:
-    """The same body with the ant's eight motors."""
-    with gym.make("shapechanger/ExtendedAnt-v1", actuated_extension=False) as env:
-        assert env.action_space.shape == (8,)
-        assert env.observation_space.shape == (137,)
-        assert not [name for name in env.unwrapped.action_layout.names if "foot" in name]
-
-
 def test_the_extended_ant_starts_at_1_25_m() -> None:
     """The start height equals the original release's (2017)."""
     for arguments in ({}, {"actuated_extension": False}):

@@ -72,13 +72,6 @@ def test_a_frame_shows_the_body(env_id: str) -> None:
         assert _differs(env.render(), frame).mean() > 0.01
 
 
-def test_frames_follow_the_motion(ant: Any) -> None:
-    """Frames of successive steps differ."""
-    frame = ant.render()
-    ant.step(np.array([1, -1, 1, -1, 1, -1, 1, -1], np.float32))
-    assert _differs(ant.render(), frame).any()
-
-
 def test_depth_frames() -> None:
     """Depth is smaller at the body; `rgbd_tuple` has both arrays."""
     with gym.make("shapechanger/Ant-v1", render_mode="depth_array", **_SIZE) as env:

@@ -6,11 +6,9 @@ import copy
 import pickle
 
 import gymnasium as gym
-import numpy as np
 import pytest
 
 import shapechanger
-from shapechanger.contract.env_ref import env_traits
 from shapechanger.errors import SpaceMismatch, UnknownName
 
 
@@ -64,17 +62,6 @@ def test_vector_envs_draw_one_body_per_env() -> None:
     envs.close()
 
 
-def test_towards_works_for_pendulums() -> None:
-    """Families without a trunk support `towards`."""
-    env = gym.make("shapechanger/InvertedPendulum-v1", towards="BigInvertedPendulum")
-    lengths = set[float]()
-    for seed in range(3):
-        env.reset(seed=seed)
-        lengths.add(float(env.unwrapped.model.geom("cpole").size[1]))  # type: ignore[attr-defined]
-    assert len(lengths) == 3
-    assert all(0.3 <= length <= 0.6 for length in lengths)
-
-
 def test_an_invalid_towards_is_refused() -> None:
     """Unknown bodies, and bodies of other spaces, are refused."""
     with pytest.raises(UnknownName, match="BigAnt"):
@@ -84,10 +71,3 @@ def test_an_invalid_towards_is_refused() -> None:
     env = gym.make("shapechanger/Ant-v1", towards="ExtendedAnt", fast_model=False)
     with pytest.raises((SpaceMismatch, UnknownName)):
         env.reset(seed=0)
-
-
-def test_ant_and_big_ant_have_equal_layouts() -> None:
-    """Methods for equal spaces accept the pair."""
-    traits = [env_traits(gym.make(f"shapechanger/{name}-v1")) for name in ("Ant", "BigAnt")]
-    assert traits[0].observation_layout == traits[1].observation_layout
-    assert np.array_equal(traits[0].action_layout.low, traits[1].action_layout.low)

@@ -156,12 +156,12 @@ def _assert_continuous(
             )
 
 
-@pytest.mark.parametrize("pair", [*itertools.permutations(ANT.bodies, 2)], ids="-".join)
+@pytest.mark.parametrize("pair", [*itertools.combinations(ANT.bodies, 2)], ids="-".join)
 def test_the_ants_change_continuously(pair: tuple[str, str]) -> None:
     _assert_continuous(ant, ANT.body(pair[0]), ANT.body(pair[1]))
 
 
-@pytest.mark.parametrize("pair", [*itertools.permutations(PENDULUM.bodies, 2)], ids="-".join)
+@pytest.mark.parametrize("pair", [*itertools.combinations(PENDULUM.bodies, 2)], ids="-".join)
 def test_the_pendulums_change_continuously(pair: tuple[str, str]) -> None:
     _assert_continuous(pendulum, PENDULUM.body(pair[0]), PENDULUM.body(pair[1]))
 

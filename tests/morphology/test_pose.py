@@ -91,16 +91,6 @@ def test_the_trunk_is_the_first_free_joint() -> None:
     assert trunk_joint(model) == 1
 
 
-@pytest.mark.parametrize(
-    ("body", "height"),
-    [("Ant", 0.513), ("BigAnt", 0.947), ("ExtendedAnt", 1.292), ("ExtendedAntPassive", 1.292)],
-)
-def test_standing_heights_of_the_ants(body: str, height: float) -> None:
-    """Joints are in the middle of their ranges, and the lowest point is on the floor."""
-    model = built(ant(), *ANT.bodies[body])
-    assert standing_height(model) == pytest.approx(height, abs=1e-3)
-
-
 def test_a_body_starts_inside_its_limits() -> None:
     """Joints move by the least amount to be a tenth of the range inside."""
     model = built(ant())

@@ -16,7 +16,6 @@ import pytest
 from safetensors import numpy as safetensors
 
 import shapechanger
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy
 from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy, save_policy, tensor_bytes
@@ -96,11 +95,6 @@ def test_shipped_policies_load(path: Path) -> None:
     assert np.abs(policy.act(seen)).max() <= 1.0
 
 
-@pytest.mark.parametrize("path", sorted(SHIPPED.glob("clones/*.safetensors")), ids=lambda p: p.stem)
-def test_shipped_clones_load(path: Path) -> None:
-    assert CameraPolicy.load(path).card.framing.width > 0
-
-
 def test_loading_leaves_random_numbers_alone() -> None:
     random.seed(5)
     before = random.getstate()
@@ -123,14 +117,6 @@ def test_a_changed_card_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.safetensors").write_bytes(content.replace(b"MCP_flexion", b"PIP_flexion", 1))
     with pytest.raises(CorruptStudy, match="its card or its numbers do not have its hash"):
         load_policy(tmp_path / "bad.safetensors")
-
-
-def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
-    content = POLICIES["reach"].read_bytes()
-    for size in (0, 4, 500, len(content) - 1):
-        (tmp_path / "half.safetensors").write_bytes(content[:size])
-        with pytest.raises(CorruptStudy, match=r"half\.safetensors is not a policy"):
-            load_policy(tmp_path / "half.safetensors")
 
 
 def _changed(tmp_path: Path, card: dict[str, Any]) -> Path:

@@ -132,13 +132,6 @@ def test_a_finished_study_runs_nothing(finished: tuple[Study, Path], tmp_path: P
     assert (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == before
 
 
-def test_normalised_learners_carry_their_statistics(tmp_path: Path) -> None:
-    """With VecNormalize too, fine-tuning starts where the source policy ends."""
-    study = run_study(tiny_plan(TINY_NORMALISED), tmp_path / "study", executor=Serial())
-    for unchanged, tuned in zip(study.of("zero-shot"), study.of("fine-tune"), strict=True):
-        assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
-
-
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
     short = {"max_episode_steps": 20}
     task = TransferTask(

@@ -83,8 +83,7 @@ _EDITS = {
 }
 
 
-@pytest.mark.parametrize("edit", _EDITS)
-@pytest.mark.parametrize("seeds", [2, 3])
+@pytest.mark.parametrize(("edit", "seeds"), [*((edit, 2) for edit in _EDITS), ("the task", 3)])
 def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: Path) -> None:
     """Resuming and growing are refused, name the change and the way out, and change nothing."""
     file, content, words = _EDITS[edit]

@@ -90,16 +90,11 @@ def test_types_of_actions(kind: type) -> None:
             assert same(ours.step(given), theirs.step(given))
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_few_random_ants(seed: int) -> None:
-    ours, theirs = _ants(random_ant(seed))
-    step_together(ours, theirs, 120, seed=seed)
-    assert _steps_fast(ours)
+_SEEDS = [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 25))]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(25))
-def test_many_random_ants(seed: int) -> None:
+@pytest.mark.parametrize("seed", _SEEDS)
+def test_random_ants(seed: int) -> None:
     """Random ants take Gymnasium's 1,000 steps with falls, resets and contacts."""
     ours, theirs = _ants(random_ant(seed), healthy_z_range=(0.1, 3.0) if seed % 2 else None)
     ends, touches = step_together(ours, theirs, 1000, seed=seed)
@@ -108,17 +103,8 @@ def test_many_random_ants(seed: int) -> None:
     assert touches > 100
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_few_random_pendulums(seed: int) -> None:
-    body = random_pendulum(seed)
-    ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
-    step_together(ours, theirs, 200, seed=seed)
-    assert _steps_fast(ours)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(25))
-def test_many_random_pendulums(seed: int) -> None:
+@pytest.mark.parametrize("seed", _SEEDS)
+def test_random_pendulums(seed: int) -> None:
     """Random pendulums take Gymnasium's 1,000 steps, at the ends of the rail too."""
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)

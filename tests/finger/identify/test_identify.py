@@ -350,7 +350,7 @@ def test_a_delay_on_a_path_follows_from_the_motion() -> None:
     path = CommandPath(slew_per_s=20.0, slew_down_per_s=20.0)
     drawn = with_gears(GAPS["real-like"].draw(np.random.default_rng(1)))
     late = drawn.replace(path=path, command_delay=0.008, joint_noise=0.0)
-    log, truth = recorded(8.0, parameters=late)
+    log, truth = recorded(4.0, parameters=late)
     known = {"most_tension": truth.most_tension, "least_tension": truth.least_tension}
     assert log.motors == with_gears(NOMINAL.replace(path=path, **known))
     found = identify(log)

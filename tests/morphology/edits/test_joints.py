@@ -48,13 +48,6 @@ def test_a_slide_without_limits_needs_both() -> None:
     assert upper > 1e5
 
 
-def test_a_locked_joint_is_removed() -> None:
-    model = built(leg(), Lock("knee"))
-    assert (model.nq, model.nu, model.njnt) == (8, 1, 2)
-    assert model.body("shin").dofnum == 0
-    assert model.actuator(0).name == "hip"
-
-
 def test_joints_are_locked_in_the_middle() -> None:
     free = built(leg())
     for edit, angle in (

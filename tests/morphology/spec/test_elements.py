@@ -12,7 +12,7 @@ from shapechanger.morphology.spec.elements import (
     require_limb,
     select,
 )
-from tests.morphology.models import ant, differing, leg, spec_of
+from tests.morphology.models import ant, leg, spec_of
 
 _NAMELESS = """
 <mujoco>
@@ -86,14 +86,3 @@ def test_all_elements_get_unique_names() -> None:
     assert [site.name for site in spec.sites] == ["world_part_site"]
     assert [camera.name for camera in spec.cameras] == ["world_part_camera"]
     assert [actuator.name for actuator in spec.actuators] == ["knee", "knee_2", "m"]
-
-
-def test_names_change_no_physics() -> None:
-    """Naming does not change the compiled model, and is idempotent."""
-    spec = spec_of(_NAMELESS)
-    before = spec.copy().compile()
-    name_elements(spec)
-    names = [geom.name for geom in spec.geoms]
-    assert differing(before, spec.copy().compile()) == []
-    name_elements(spec)
-    assert [geom.name for geom in spec.geoms] == names

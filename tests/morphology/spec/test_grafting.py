@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -69,27 +68,6 @@ _REFERRED_TO = """
 """
 
 
-def _referring(model: mujoco.MjModel) -> dict[str, list[object]]:
-    kind, name_of = mujoco.mjtObj, mujoco.mj_id2name
-
-    def names(obj: int, ids: np.ndarray) -> list[object]:
-        return [name_of(model, obj, int(i)) for i in ids]
-
-    return {
-        "motors": names(kind.mjOBJ_ACTUATOR, np.arange(model.nu)),
-        "driven": names(kind.mjOBJ_JOINT, model.actuator_trnid[:3, 0]),
-        "sensed": [
-            name_of(model, int(t), int(i))
-            for t, i in zip(model.sensor_objtype, model.sensor_objid, strict=True)
-        ],
-        "tendons": [int(x) for x in model.tendon_num],
-        "coupled": names(kind.mjOBJ_JOINT, model.eq_obj1id[:1]),
-        "welded": names(kind.mjOBJ_BODY, model.eq_obj1id[1:2]),
-        "pairs": names(kind.mjOBJ_GEOM, model.pair_geom2),
-        "excluded": [model.nexclude],
-    }
-
-
 def test_a_copied_limb_shares_the_assets() -> None:
     spec = spec_of(_REFERRED_TO)
     before = built(spec)
@@ -104,29 +82,6 @@ def test_a_copied_limb_shares_the_assets() -> None:
     assert after.joint("knee_3").damping[0] == 3.0
     assert after.camera("eye_2").bodyid == after.body("shin_2").id
     assert after.light("lamp_2").bodyid == after.body("shin_2").id
-
-
-def test_all_that_names_a_limb_is_copied_with_it() -> None:
-    """Couplings, pins, exclusions, pairs, tendons, motors and sensors; nothing else is new."""
-    spec = spec_of(_REFERRED_TO)
-    before = _referring(built(spec))
-    copy_limb(spec, spec.body("thigh"), "_2", 2.0)
-    model = built(spec)
-    after = _referring(model)
-    assert after["motors"] == [*before["motors"], "knee_2", "hip_2", "tie_2", "jet_2"]
-    assert after["sensed"] == [
-        *before["sensed"],
-        *("knee_2", "tip_2", "shin_2", "knee_2", "rope_2"),
-    ]
-    assert after["tendons"] == [2, 2, 2, 2]
-    assert after["excluded"] == [2]
-    assert after["pairs"] == ["shin", "shin_2"]
-    names = mujoco.mj_id2name
-    assert names(model, mujoco.mjtObj.mjOBJ_JOINT, model.equality("couple_2").obj1id[0]) == "knee_2"
-    assert names(model, mujoco.mjtObj.mjOBJ_JOINT, model.equality("couple_2").obj2id[0]) == "flap"
-    assert names(model, mujoco.mjtObj.mjOBJ_BODY, model.equality("weld_2").obj1id[0]) == "shin_2"
-    assert "graft" not in spec.to_xml()
-    assert "~" not in spec.to_xml()
 
 
 def test_limbs_of_a_complex_model_can_be_copied() -> None:

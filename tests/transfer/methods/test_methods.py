@@ -116,18 +116,6 @@ def test_methods_of_other_packages(
         load_method("broken")
 
 
-def test_a_custom_method_is_an_arm(plugin: str, tmp_path: Path) -> None:
-    """A plug-in method has the budget of scratch, and another seed."""
-    plan = tiny_plan(arms=("scratch", plugin), steps=32)
-    study = run_study(plan, tmp_path / "study", executor=Serial())
-    assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", plugin}
-    assert (tmp_path / "study" / "runs" / "my_methods.patient-0" / "policy.safetensors").exists()
-    ours, theirs = study.of(plugin)[0], study.of("scratch")[0]
-    assert [e.steps for e in ours.curve] == [e.steps for e in theirs.curve] == [0, 32]
-    assert ours.seed != theirs.seed
-    assert study.summaries[plugin].source_steps == 0
-
-
 def test_a_study_can_gain_arms(tmp_path: Path) -> None:
     first = tiny_plan(steps=32)
     run_study(first, tmp_path / "study", executor=Serial())
