@@ -137,7 +137,7 @@ def _seen(env: Any) -> np.ndarray:
     return _differs(env.render(), frame)
 
 
-@pytest.mark.parametrize("body", ["Ant", "BigAnt", "ExtendedAnt"])
+@pytest.mark.parametrize("body", ["Ant", "ExtendedAnt"])
 def test_the_camera_follows_the_body(body: str) -> None:
     """After 30 m the body has the same size and place in the frame, and is not cropped."""
     seen = []
@@ -156,7 +156,7 @@ def test_the_camera_follows_the_body(body: str) -> None:
     assert not border.any()
 
 
-@pytest.mark.parametrize("name", ["HalfCheetah", "Hopper", "Walker2d", "Swimmer"])
+@pytest.mark.parametrize("name", ["Hopper", "Swimmer"])
 def test_the_camera_follows_planar_bodies(name: str) -> None:
     """After 10 m the body has the same size."""
     seen = []
