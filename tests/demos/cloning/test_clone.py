@@ -135,9 +135,13 @@ def test_training_stops_early() -> None:
 
 def test_read_only_arrays_are_accepted() -> None:
     few = demonstrations(12, 0)
+    expected, _ = clone(few.pictures, few.actions, settings=_QUICK, seed=0)
     for array in (few.pictures, few.actions):
         array.flags.writeable = False
-    clone(few.pictures, few.actions, settings=_QUICK, seed=0)
+    policy, _ = clone(few.pictures, few.actions, settings=_QUICK, seed=0)
+    np.testing.assert_array_equal(
+        policy.predict_many(few.pictures), expected.predict_many(few.pictures)
+    )
 
 
 def test_the_end_of_each_episode_is_held_out() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import weakref
 
 import mujoco
 import numpy as np
@@ -49,11 +50,14 @@ def test_cameras_render_their_models_in_turn() -> None:
 def test_an_unclosed_camera_frees_its_context() -> None:
     """Garbage collection frees it, and `close` can be called twice and before an image."""
     model, data = _model("1 0 0")
+    dropped: list[weakref.ref[OnboardCamera]] = []
     for _ in range(3):
         camera = OnboardCamera((32, 16), "eye")
         camera.picture(model, data)
+        dropped.append(weakref.ref(camera))
     del camera
     gc.collect()
+    assert [reference() for reference in dropped] == [None] * 3
     camera = OnboardCamera((32, 16), "eye")
     camera.close()
     camera.close()
