@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from shapechanger.contract.plan import ActionPlan, GuardPlan
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.cameras.jpeg import with_capture_time
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
@@ -32,7 +33,6 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard import channel as wire
 from shapechanger.robot.guard.running import ServePlan, plan_fd
 from shapechanger.robot.link.card import RobotCard
-from shapechanger.robot.twin.camera import with_capture_time
 
 _HZ = 100.0
 # A robot accepts 500 messages per second and closes the connection of a client that sends more.

@@ -71,7 +71,7 @@ def test_noise_rarely_has_a_barcode() -> None:
 
 def test_barcode_that_does_not_fit_is_refused() -> None:
     """Cells narrower than three pixels would not survive compression."""
-    with pytest.raises(ValueError, match="not 64 by 48"):
+    with pytest.raises(RobotError, match="64 by 48 pixels is too small"):
         draw_barcode(_picture(64, 48), 1)
     assert read_barcode(_picture(64, 48)) is None
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 import simplejpeg
+from numpy.typing import NDArray
 
 from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
@@ -24,30 +24,44 @@ def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
 
     Header and end of the data are checked; it is decoded only in order to rotate it.
     """
-    jpeg = _without_padding(jpeg)
+    if not simplejpeg.is_jpeg(jpeg) and len(jpeg) <= _MAX_JPEG:  # Some cameras pad their frames.
+        splitter = JpegSplitter()
+        splitter.feed(jpeg)
+        jpeg = splitter.next() or jpeg
     if len(jpeg) > _MAX_JPEG:
         raise RobotError(f"The camera returned {len(jpeg)} bytes; a frame has at most {_MAX_JPEG}.")
     if not simplejpeg.is_jpeg(jpeg):
         raise RobotError("The camera returned an incomplete JPEG.")
-    with translate_errors(ValueError, to=_not_decoded):
+    with translate_errors(
+        ValueError,
+        to=lambda error: RobotError(
+            f"The camera sent an invalid JPEG that cannot be decoded: {error}."
+        ),
+    ):
         height, width, _, _ = simplejpeg.decode_jpeg_header(jpeg)
-    if (int(width), int(height)) != plan.size:
+        _require_size(int(width), int(height), plan)
+        if not plan.flip:
+            return Frame(jpeg, captured_ns)
+        # Strict: without it, missing blocks would become grey, and the new JPEG would hide that.
+        image = simplejpeg.decode_jpeg(jpeg, strict=True)
+    return encoded_frame(image[::-1, ::-1], captured_ns, plan)
+
+
+def encoded_frame(image: NDArray[np.uint8], captured_ns: int, plan: CameraPlan) -> Frame:
+    """Return the frame of an image of the camera's size, RGB, shape (height, width, 3)."""
+    _require_size(image.shape[1], image.shape[0], plan)
+    jpeg = simplejpeg.encode_jpeg(
+        np.ascontiguousarray(image), plan.jpeg_quality, colorsubsampling="420"
+    )
+    return Frame(jpeg, captured_ns, encoded_here=True)
+
+
+def _require_size(width: int, height: int, plan: CameraPlan) -> None:
+    if (width, height) != plan.size:
         raise RobotError(
             f"The camera returned a frame of {width} by {height} pixels; "
             f"the profile sets {plan.size[0]} by {plan.size[1]}."
         )
-    if not plan.flip:
-        return Frame(jpeg, captured_ns)
-    with translate_errors(ValueError, to=_not_decoded):
-        # Strict: without it, missing blocks would become grey, and the new JPEG would hide that.
-        image = simplejpeg.decode_jpeg(jpeg, strict=True)
-    upright = np.ascontiguousarray(image[::-1, ::-1])
-    encoded = simplejpeg.encode_jpeg(upright, plan.jpeg_quality, colorsubsampling="420")
-    return Frame(encoded, captured_ns, encoded_here=True)
-
-
-def _not_decoded(error: ValueError) -> RobotError:
-    return RobotError(f"The camera sent an invalid JPEG that cannot be decoded: {error}.")
 
 
 _START: Final = b"\xff\xd8"
@@ -80,7 +94,6 @@ class JpegSplitter:
     def __init__(self) -> None:
         self.skipped = 0
         self._data = bytearray()
-        self._scan: Iterator[int | None] | None = None  # Of the first frame.
         self._since_frame = 0  # Bytes skipped since the last frame.
 
     def feed(self, data: bytes) -> None:
@@ -94,12 +107,12 @@ class JpegSplitter:
             RobotError: If there is more than 1 MiB without a frame; the next call continues after
                 it.
         """
-        while (length := self._scanned()) is not None:
+        while (length := self._length_of_first()) is not None:
             jpeg = bytes(self._data[: max(length, 0)])
             if skipped := max(-length, 0) or _start_of_another(jpeg):
                 self._skip(skipped)
                 continue
-            self._drop(length)
+            del self._data[:length]
             self._since_frame = 0
             return jpeg
         if len(self._data) > _MAX_JPEG:
@@ -112,61 +125,47 @@ class JpegSplitter:
             )
         return None
 
-    def _scanned(self) -> int | None:
-        """Continue the scan of the first frame; see `_scan`."""
-        if self._scan is None:
-            start = self._data.find(_START)
-            # Without a start, its first byte may be the last one here.
-            self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
-            if start < 0:
-                return None
-            self._scan = _scan(self._data)
-        return next(self._scan)
+    def _length_of_first(self) -> int | None:
+        """Skip what is before the first frame; see `_length` for the result."""
+        start = self._data.find(_START)
+        # Without a start, its first byte may be the last one here.
+        self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
+        return _length(self._data)
 
     def _skip(self, count: int) -> None:
         self.skipped += count
         self._since_frame += count
-        self._drop(count)
-
-    def _drop(self, count: int) -> None:
         del self._data[:count]
-        self._scan = None
 
 
-def _scan(data: bytes | bytearray) -> Iterator[int | None]:
-    """Scan data that begins with the start of a frame, and grows meanwhile.
+def _length(data: bytes | bytearray) -> int | None:
+    """Return the length of the frame at the start of the data; None while bytes are missing.
 
-    Yields:
-        None while more bytes are needed; then the length of the frame, or, negative, the number of
-        bytes that are part of no frame.
+    A negative result is the number of bytes that are part of no frame.
     """
     at, has_scan = len(_START), False
-    while True:
-        while len(data) < at + 2:
-            yield None
+    while at + 2 <= len(data):
         marker = data[at + 1]
         if data[at] != 0xFF or marker in _NOT_IN_FRAME or (marker == _END and not has_scan):
-            yield -len(_START)
-        elif marker == _END:
-            yield at + 2
-        elif marker == 0xFF:
-            at += 1
-        elif marker in _WITHOUT_LENGTH:
-            at += 2
-        else:
-            while len(data) < at + 4:
-                yield None
-            length = int.from_bytes(data[at + 2 : at + 4], "big")
-            if not 2 <= length <= _LONGEST.get(marker, _LONGEST_TABLE):
-                yield -len(_START)
-            at += 2 + length
-            if marker == _SCAN:
-                while (found := _AFTER_SCAN.search(data, at)) is None:
-                    at = max(at, len(data) - 1)
-                    yield None
-                at, has_scan = found.start(), True
-                if data[at + 1] == _START[1]:
-                    yield -at  # A frame that is cut off, and the next one.
+            return -len(_START)
+        if marker == _END:
+            return at + 2
+        if marker == 0xFF or marker in _WITHOUT_LENGTH:
+            at += 1 if marker == 0xFF else 2
+            continue
+        if len(data) < at + 4:
+            break
+        length = int.from_bytes(data[at + 2 : at + 4])
+        if not 2 <= length <= _LONGEST.get(marker, _LONGEST_TABLE):
+            return -len(_START)
+        at += 2 + length
+        if marker == _SCAN:
+            if (found := _AFTER_SCAN.search(data, at)) is None:
+                break
+            at, has_scan = found.start(), True
+            if data[at + 1] == _START[1]:
+                return -at  # A frame that is cut off, and the next one.
+    return None
 
 
 def _start_of_another(jpeg: bytes) -> int:
@@ -176,23 +175,20 @@ def _start_of_another(jpeg: bytes) -> int:
     it. A thumbnail ends before its frame.
     """
     starts = (found.start() for found in _ANOTHER.finditer(jpeg, len(_START)))
-    return next((at for at in starts if next(_scan(jpeg[at:])) == len(jpeg) - at), 0)
+    return next((at for at in starts if _length(jpeg[at:]) == len(jpeg) - at), 0)
 
 
-def _without_padding(data: bytes) -> bytes:
-    """Return the first frame in the data of a camera, which may pad it; the data without one."""
-    if simplejpeg.is_jpeg(data):
-        return data
-    splitter = JpegSplitter()
-    splitter.feed(data)
-    return data if len(data) > _MAX_JPEG else splitter.next() or data
+def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
+    """Add the capture time, ns, to a JPEG, as a comment segment; see `captured_ns_of`."""
+    words = b"captured_ns=%d" % captured_ns
+    return _START + bytes((0xFF, _COMMENT)) + (len(words) + 2).to_bytes(2) + words + jpeg[2:]
 
 
 def captured_ns_of(jpeg: bytes) -> int | None:
     """Return the time in a comment segment `captured_ns=<integer>`, or None."""
     at = len(_START)
     while at + 4 <= len(jpeg) and jpeg[at] == 0xFF and jpeg[at + 1] != _SCAN:
-        end = at + 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
+        end = at + 2 + int.from_bytes(jpeg[at + 2 : at + 4])
         if jpeg[at + 1] == _COMMENT and (found := _CAPTURED.fullmatch(jpeg[at + 4 : end])):
             return int(found[1])
         at = end

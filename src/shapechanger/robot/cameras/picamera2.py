@@ -10,11 +10,9 @@ import threading
 from contextlib import ExitStack
 from typing import Any, Final
 
-import numpy as np
-import simplejpeg
-
 from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.cameras.jpeg import encoded_frame
 
 _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
 
@@ -65,18 +63,10 @@ class PiCamera:
             with translate_errors(TimeoutError, RuntimeError, to=_silent):
                 request = self._camera.capture_request(wait=_SILENT_S)
             stack.callback(request.release)
-            image = np.ascontiguousarray(request.make_array("main"))
+            image = request.make_array("main")
             # SensorTimestamp: nanoseconds of the monotonic clock at the first line's exposure.
             captured_ns = int(request.get_metadata()["SensorTimestamp"])
-        width, height = self._plan.size
-        if image.shape != (height, width, 3):
-            raise RobotError(
-                f"The Pi's camera returned a frame of {image.shape[1]} by {image.shape[0]} pixels; "
-                f"the profile sets {width} by {height}."
-            )
-        quality = self._plan.jpeg_quality
-        jpeg = simplejpeg.encode_jpeg(image, quality, colorsubsampling="420")
-        return Frame(jpeg, captured_ns, encoded_here=True)
+        return encoded_frame(image, captured_ns, self._plan)
 
     def _missing(self, error: Exception) -> RobotError:
         return RobotError(

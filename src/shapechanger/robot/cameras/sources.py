@@ -8,19 +8,23 @@ import shlex
 import stat
 import subprocess
 import time
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import simplejpeg
 from numpy.typing import NDArray
 
 from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.cameras.camera import CameraPlan, Frame, WaitingCamera
-from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, checked_frame
+from shapechanger.robot.cameras.jpeg import (
+    JpegSplitter,
+    captured_ns_of,
+    checked_frame,
+    encoded_frame,
+)
 
 _CHUNK: Final = 64 * 1024  # Bytes; the default capacity of a Linux pipe.
 _MOST_WAITING: Final = 1 << 20  # Bytes; the largest capacity of a pipe without privileges.
@@ -41,14 +45,14 @@ class Pipe(WaitingCamera):
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)
-        self._fd: int | None = None
+        self._fd = -1
         self._path: str = plan.settings["path"]
         self._program: subprocess.Popen[bytes] | None = None
         self._splitter = JpegSplitter()
         with translate_errors(
             OSError, to=lambda error: RobotError(f"The stream cannot be opened: {error}.")
         ):
-            self._fd = self._open()
+            self._open()
         self._live = not stat.S_ISREG(os.fstat(self._fd).st_mode)
 
     def read(self) -> Frame:
@@ -57,15 +61,14 @@ class Pipe(WaitingCamera):
         while (jpeg := self._splitter.next()) is None:
             self._await_data()
         left = _MOST_WAITING
-        captured_ns = None
-        while True:
-            while self._live and (newer := self._splitter.next()) is not None:
+        while self._live:
+            while (newer := self._splitter.next()) is not None:
                 jpeg = newer
-            captured_ns = captured_ns_of(jpeg)
-            if captured_ns is not None or left <= 0 or not (waiting := self._waiting()):
+            if captured_ns_of(jpeg) is not None or left <= 0 or not (waiting := self._waiting()):
                 break
             self._splitter.feed(waiting)
             left -= len(waiting)
+        captured_ns = captured_ns_of(jpeg)
         at_ns = time.monotonic_ns() if captured_ns is None else captured_ns
         frame = checked_frame(jpeg, at_ns, self.plan)
         return replace(frame, skipped=self._splitter.skipped - skipped)
@@ -83,37 +86,32 @@ class Pipe(WaitingCamera):
     def __del__(self) -> None:
         # Not in `close`: a `read` in another thread may still be waiting on it.
         super().__del__()
-        if self._fd is not None:
+        if self._fd >= 0:
             os.close(self._fd)
 
-    def _open(self) -> int:
+    def _open(self) -> None:
         if not self._path.startswith("|"):
             # Opening a named pipe would otherwise block until it has a writer.
             flags = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
-            return os.open(os.path.expanduser(self._path), flags)
-        words = shlex.split(self._path[1:])
-        with ExitStack() as undo:
-            fd, its_end = os.pipe()
-            undo.callback(os.close, fd)
-            with os.fdopen(its_end, "wb") as output:
-                self._program = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=output)
-            undo.pop_all()
-        os.set_blocking(fd, False)
-        return fd
+            self._fd = os.open(os.path.expanduser(self._path), flags)
+            return
+        self._fd, its_end = os.pipe()
+        os.set_blocking(self._fd, False)
+        with os.fdopen(its_end, "wb") as output:
+            words = shlex.split(self._path[1:])
+            self._program = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=output)
 
     def _waiting(self) -> bytes | None:
-        """Return data that waits in the pipe, b"" at its end; None without data."""
-        if self._fd is None or not self._live:
-            return None
+        """Return data that waits in the stream, b"" at its end; None without data."""
         with suppress(BlockingIOError):
             return os.read(self._fd, _CHUNK)
         return None
 
     def _await_data(self) -> None:
-        if self._fd is None:
-            self._fd = self._open()
+        if self._fd < 0:
+            self._open()
         self.wait(self._fd)
-        data = self._waiting() if self._live else os.read(self._fd, _CHUNK)
+        data = self._waiting()
         if data is None:
             return  # Another reader took it; a named pipe may have several.
         if not data:
@@ -121,7 +119,7 @@ class Pipe(WaitingCamera):
             self._splitter = JpegSplitter()
             if self._program is None and self._live:
                 os.close(self._fd)
-                self._fd = None
+                self._fd = -1
             raise RobotError(f"The stream of {self._path} has ended.")
         self._splitter.feed(data)
 
@@ -152,10 +150,9 @@ class Folder(WaitingCamera):
             return checked_frame(file.read_bytes(), captured_ns, self.plan)
 
 
-_BARCODE_BITS: Final = 48
-"""Bits of the number. In nanoseconds they count 78 hours, and then start again."""
+_BARCODE_BYTES: Final = 6
+"""Bytes of the number. In nanoseconds they count 78 hours, and then start again."""
 
-_BYTES: Final = _BARCODE_BITS // 8
 _COLUMNS: Final = 32
 _ROWS: Final = 2
 _LEAST_WIDTH: Final = 96  # Pixels: 3 by 4 is the smallest cell that survives JPEG.
@@ -175,17 +172,17 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
 
     Args:
         image: The image, shape (height, width, 3), at least 96 pixels wide; changed in place.
-        number: At least 0.
+        number: The number.
     """
     height, width = image.shape[:2]
     rows = barcode_rows(width)
-    if width < _LEAST_WIDTH or height < rows or number < 0:
-        raise ValueError(
-            f"A barcode needs a number of at least 0, not {number}, and an image of at least "
-            f"{_LEAST_WIDTH} by {rows} pixels, not {width} by {height}."
+    if width < _LEAST_WIDTH or height < rows:
+        raise RobotError(
+            f"An image of {width} by {height} pixels is too small for its barcode, which needs at "
+            f"least {_LEAST_WIDTH} by {rows}."
         )
-    data = (number % 2**_BARCODE_BITS).to_bytes(_BYTES, "big")
-    data += binascii.crc_hqx(data, _CHECK_START).to_bytes(2, "big")
+    data = (number % 256**_BARCODE_BYTES).to_bytes(_BARCODE_BYTES)
+    data += binascii.crc_hqx(data, _CHECK_START).to_bytes(2)
     cells = np.unpackbits(np.frombuffer(data, np.uint8)).reshape(_ROWS, _COLUMNS) * np.uint8(255)
     cell_height, cell_width = rows // _ROWS, width // _COLUMNS
     drawn = cells.repeat(cell_height, axis=0).repeat(cell_width, axis=1)
@@ -200,16 +197,14 @@ class Pattern(WaitingCamera):
 
     def __init__(self, plan: CameraPlan) -> None:
         super().__init__(plan)
-        width, height = plan.size
-        if width < _LEAST_WIDTH or height < barcode_rows(width):
-            raise RobotError(
-                f"A test pattern of {width} by {height} pixels is too small for its "
-                f"barcode, which needs a width of at least {_LEAST_WIDTH}."
-            )
+        self._draw(0)  # Raises for a size that is too small.
 
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""
         captured_ns = self.pace()
+        return encoded_frame(self._draw(captured_ns), captured_ns, self.plan)
+
+    def _draw(self, captured_ns: int) -> NDArray[np.uint8]:
         width, height = self.plan.size
         across = np.arange(width) + captured_ns // 20_000_000  # 50 pixels per second.
         down = np.arange(height)[:, np.newaxis]
@@ -218,5 +213,4 @@ class Pattern(WaitingCamera):
         image[..., 1] = down * 2 % 256
         image[..., 2] = (across + down) % 256
         draw_barcode(image, captured_ns)
-        jpeg = simplejpeg.encode_jpeg(image, self.plan.jpeg_quality, colorsubsampling="420")
-        return Frame(jpeg, captured_ns, encoded_here=True)
+        return image

@@ -60,19 +60,13 @@ class Buffer(ctypes.Structure):
 class PixelFormat(ctypes.Structure):
     """Struct v4l2_format."""
 
-    _fields_ = (
-        *_words("type", "padding", "width", "height", "kind", "field"),
-        ("rest", _U32 * 46),
-    )
+    _fields_ = (*_words("type", "padding", "width", "height", "kind", "field"), ("rest", _U32 * 46))
 
 
 class Parameters(ctypes.Structure):
     """Struct v4l2_streamparm, with the time of a frame as a fraction of a second."""
 
-    _fields_ = (
-        *_words("type", "capability", "mode", "numerator", "denominator"),
-        ("rest", _U32 * 46),
-    )
+    _fields_ = (*_words("type", "capability", "mode", "numerator", "denominator"), ("r", _U32 * 46))
 
 
 class BufferRequest(ctypes.Structure):
@@ -124,9 +118,7 @@ class V4l2(WaitingCamera):
 
     def _start(self) -> None:
         width, height = self.plan.size
-        wanted = PixelFormat(
-            type=_CAPTURE, width=width, height=height, kind=MJPEG, field=_FIELD_NONE
-        )
+        wanted = PixelFormat(_CAPTURE, 0, width, height, MJPEG, _FIELD_NONE)
         self._ioctl(self._fd, SET_FORMAT, wanted)
         if (wanted.width, wanted.height, wanted.kind) != (width, height, MJPEG):
             raise RobotError(
@@ -148,7 +140,7 @@ class V4l2(WaitingCamera):
     def _newest(self) -> tuple[bytes, int]:
         newest: tuple[bytes, int] | None = None
         while True:
-            buffer = Buffer(type=_CAPTURE, memory=_MEMORY_MMAP)
+            buffer: Any = Buffer(type=_CAPTURE, memory=_MEMORY_MMAP)
             try:
                 self._ioctl(self._fd, DEQUEUE, buffer)
             except BlockingIOError:
@@ -156,10 +148,9 @@ class V4l2(WaitingCamera):
                     raise
                 return newest
             if not buffer.flags & BUFFER_FLAG_ERROR:
-                at_ns: int = time.monotonic_ns()
+                at_ns = time.monotonic_ns()
                 if buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC:
                     at_ns = buffer.seconds * 1_000_000_000 + buffer.microseconds * 1000
                 index: int = buffer.index
-                used: int = buffer.used
-                newest = self._buffers[index][:used], at_ns
+                newest = self._buffers[index][: buffer.used], at_ns
             self._ioctl(self._fd, QUEUE, buffer)

@@ -6,6 +6,7 @@ import errno
 import fcntl
 import os
 import random
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Final, Literal, get_args
 
@@ -15,33 +16,21 @@ import simplejpeg
 from shapechanger.contract.world import World
 from shapechanger.errors import UnknownName
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.cameras.jpeg import with_capture_time
 from shapechanger.robot.cameras.sources import draw_barcode
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
 """Faults of a camera: no images, the same one again, noise, or half an image; "" for none."""
 
-_START_OF_IMAGE: Final = b"\xff\xd8"
-_COMMENT: Final = b"\xff\xfe"
 _PIPE_BYTES: Final = 1 << 20  # The most that Linux gives without privileges.
 _FIONREAD: Final = 0x541B
 
 
-def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
-    """Add the capture time to a JPEG, as a comment segment.
-
-    Args:
-        jpeg: The image.
-        captured_ns: The time, ns.
-    """
-    words = b"captured_ns=%d" % captured_ns
-    segment = _COMMENT + (len(words) + 2).to_bytes(2, "big") + words
-    return _START_OF_IMAGE + segment + jpeg[len(_START_OF_IMAGE) :]
-
-
+@dataclass
 class FrontCameraPipe:
     """Takes images and writes them into a FIFO, without ever waiting for its reader.
 
-    Args:
+    Attributes:
         path: Path of the FIFO.
         plan: The camera.
         world: World to take images of.
@@ -49,56 +38,45 @@ class FrontCameraPipe:
         latest_only: Whether to drop an image while the one before is unread. Otherwise images
             are dropped only if the pipe is full or has no reader.
         barcode: Whether the first rows of an image show its capture time.
-
-    Attributes:
         next_ns: Time of the next image.
         newest_ns: Capture time of the newest image that was written; None before.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        plan: CameraPlan,
-        world: World,
-        start_ns: int,
-        *,
-        latest_only: bool,
-        barcode: bool = True,
-    ) -> None:
-        self._path = path
-        self._plan = plan
-        self._world = world
-        self._latest_only = latest_only
-        self._barcode = barcode
-        self._start_ns = start_ns
+    path: Path
+    plan: CameraPlan
+    world: World
+    start_ns: int
+    _: KW_ONLY
+    latest_only: bool
+    barcode: bool = True
+
+    def __post_init__(self) -> None:
+        self.next_ns = self.start_ns
+        self.newest_ns: int | None = None
         self._taken = 0
         self._fd: int | None = None
-        self._rest = b""
+        self._rest = b""  # Of an image that did not fit into the pipe, with its time.
         self._rest_ns: int | None = None
-        self._last = b""
-        self._last_ns: int | None = None
+        self._last, self._last_ns = b"", 0
         self._noise = random.Random("camera")
         self._fault = ""
-        self.next_ns = start_ns
-        self.newest_ns: int | None = None
 
     def take(self, now_ns: int) -> None:
         """Take the image that is due, and skip those whose time has passed."""
         while self.next_ns <= now_ns:
             self._taken += 1
-            self.next_ns = self._start_ns + round(self._taken * 1e9 / self._plan.fps)
+            self.next_ns = self.start_ns + round(self._taken * 1e9 / self.plan.fps)
         if self._fault == "off" or not self._ready():
             return
         if self._fault != "freeze" or not self._last:
             self._last, self._last_ns = self.draw(now_ns), now_ns
-        jpeg = self._last
         match self._fault:
             case "garbage":
-                self._write(self._noise.randbytes(len(jpeg)), None)
+                self._write(self._noise.randbytes(len(self._last)), None)
             case "short":
-                self._write(jpeg[: len(jpeg) // 2], None)
+                self._write(self._last[: len(self._last) // 2], None)
             case _:
-                self._write(jpeg, self._last_ns)
+                self._write(self._last, self._last_ns)
 
     def break_down(self, fault: CameraFault | str) -> None:
         """Make the camera fail; "" repairs it."""
@@ -108,10 +86,10 @@ class FrontCameraPipe:
 
     def draw(self, now_ns: int) -> bytes:
         """Return the current image as JPEG, with its time in a comment and maybe a barcode."""
-        picture = np.ascontiguousarray(self._world.picture())
-        if self._barcode:
+        picture = np.ascontiguousarray(self.world.picture())
+        if self.barcode:
             draw_barcode(picture, now_ns)
-        jpeg = simplejpeg.encode_jpeg(picture, self._plan.jpeg_quality, "RGB", "444")
+        jpeg = simplejpeg.encode_jpeg(picture, self.plan.jpeg_quality, "RGB", "444")
         return with_capture_time(jpeg, now_ns)
 
     def close(self) -> None:
@@ -125,7 +103,7 @@ class FrontCameraPipe:
         """Open the pipe if it has a reader, which waits for that; return whether it is open."""
         if self._fd is None:
             try:
-                self._fd = os.open(self._path, os.O_WRONLY | os.O_NONBLOCK)
+                self._fd = os.open(self.path, os.O_WRONLY | os.O_NONBLOCK)
             except OSError as error:
                 if error.errno == errno.ENXIO:  # No reader.
                     return False
@@ -139,11 +117,9 @@ class FrontCameraPipe:
             return False
         if self._rest:
             self._write(self._rest, self._rest_ns)
-        return not self._rest and not (self._latest_only and self._unread())
-
-    def _unread(self) -> bool:
-        """Return whether bytes wait in the pipe."""
-        return self._fd is not None and any(fcntl.ioctl(self._fd, _FIONREAD, bytes(4)))
+        if self._rest or self._fd is None or not self.latest_only:
+            return not self._rest
+        return not any(fcntl.ioctl(self._fd, _FIONREAD, bytes(4)))  # Bytes that wait in the pipe.
 
     def _write(self, data: bytes, captured_ns: int | None) -> None:
         """Write what fits; the rest of an image is written first the next time."""
