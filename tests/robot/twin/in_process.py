@@ -53,7 +53,7 @@ class LocalBoard(BoardClient):
         self.pid = os.getpid()
         self.pins = PinBoard(wiring, world, None, seed, lambda: self._now_ns)
         self.levels: dict[int, int] = {}
-        self.on_edge: Callable[[int, int, int], None] | None = None
+        self.watchers: dict[int, Callable[[int, int], None]] = {}
         self._closed = False
         self.clock = "twin"
         self.hardware = TwinHardware(self, cast("SteadyClock", _Clock(self)))
@@ -69,8 +69,8 @@ class LocalBoard(BoardClient):
         for t, pin, level in self.pins.advance(now_ns):
             if pin in self.levels:
                 self.levels[pin] = level
-                if self.on_edge is not None:
-                    self.on_edge(pin, level, t)
+                if pin in self.watchers:
+                    self.watchers[pin](level, t)
 
     def wait_until(self, until_ns: int) -> bool:
         """Refuse: the caller is the one who would have to advance the board."""

@@ -85,7 +85,7 @@ def test_a_board_that_never_replies_ends_the_heartbeats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After that the supervisor finds the guard silent."""
-    monkeypatch.setattr(rpc, "_HELD_UP_S", 0.0)
+    monkeypatch.setattr(rpc, "_PATIENCE_S", 0.0)
     client, board = _connected(tmp_path)
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")
     ending = threading.Timer(0.05, board.close)

@@ -39,8 +39,7 @@ class _Bench:
 
     @property
     def rig(self) -> Rig:
-        assert self.robot.pins.rig is not None
-        return self.robot.pins.rig
+        return self.robot.pins.require_rig()
 
     def drive(self, values: tuple[float, ...], steps: int) -> Observation:
         for _ in range(steps):
@@ -159,8 +158,7 @@ def test_a_rig_that_controls_lengths_flexes_and_releases(tmp_path: Path) -> None
     names = Layout.from_json(robot.welcome.state_layout).names
     try:
         robot.start()
-        rig = robot.pins.rig
-        assert rig is not None
+        rig = robot.pins.require_rig()
         for _ in range(60):  # Flexors to -17 mm, the others let out.
             seen, _ = robot.step((0.7, 0.7, 0.01, 0.01, 0.01, 0.01, 0.01))
         assert seen.state[names.index("FDP/length")] == pytest.approx(-0.0174, abs=2e-3)

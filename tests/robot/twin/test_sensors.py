@@ -70,14 +70,13 @@ def test_the_encoder_counts_the_distance() -> None:
     """A wheel turn of 0.2 m gives 80 edges."""
     edges: list[int] = []
     with _rig(ENCODER) as rig:
-        inner = rig.board.on_edge
-        assert inner is not None
+        for pin, watcher in list(rig.board.watchers.items()):
 
-        def count(pin: int, level: int, at_ns: int) -> None:
-            edges.append(at_ns)
-            inner(pin, level, at_ns)
+            def count(level: int, at_ns: int, watcher: Any = watcher) -> None:
+                edges.append(at_ns)
+                watcher(level, at_ns)
 
-        rig.board.on_edge = count
+            rig.board.watchers[pin] = count
         rig.motor.value = 1.0
         rig.advance(0.7)
         travelled = rig.operator.where().travelled_m

@@ -1,7 +1,8 @@
 """The twin's board, a separate process: pins, chips, ledger, world and time.
 
 It is started before the robot and outlives the robot's processes, as hardware does. It ends on
-SIGTERM, or with the process at the other end of its owner's descriptor.
+SIGTERM, or with the process at the other end of its owner's descriptor. Its arguments are that
+descriptor and its `BoardSettings`.
 """
 
 from __future__ import annotations
@@ -12,10 +13,8 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import suppress
 from pathlib import Path
-from types import FrameType
 from typing import Final, NamedTuple
 
 import msgspec
@@ -25,14 +24,7 @@ from shapechanger.robot.guard.running import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.pin_board import PinBoard
-from shapechanger.robot.twin.rpc import (
-    LATER,
-    BoardConnection,
-    BoardServer,
-    OwnerGone,
-    Slept,
-)
-from shapechanger.robot.twin.signals import LedgerWriter
+from shapechanger.robot.twin.rpc import LATER, BoardConnection, BoardServer, OwnerGone, Slept
 from shapechanger.robot.twin.start import BoardAt, BoardSettings, open_world
 from shapechanger.robot.twin.wiring import TwinWiring
 
@@ -59,24 +51,23 @@ def run_board(settings: BoardSettings, owner_fd: int) -> None:
         run_early()  # Hardware is never late because the machine is busy.
     clock = RealTime() if is_real else TwinTime(plan.tick_hz)
     at = BoardAt(Path(settings.folder))
-    with ExitStack() as stack:
-        pipe = None
-        if camera is not None:
-            barcode = not settings.place.opener
-            pipe = FrontCameraPipe(
-                at.fifo_path, camera, world, clock.now_ns(), latest_only=is_real, barcode=barcode
-            )
-            stack.callback(pipe.close)
-        ledger = stack.enter_context(closing(LedgerWriter(at.ledger_path)))
+    pipe = None
+    if camera is not None:
+        barcode = not settings.place.opener
+        pipe = FrontCameraPipe(
+            at.fifo_path, camera, world, clock.now_ns(), latest_only=is_real, barcode=barcode
+        )
+    with (
+        at.ledger_path.open("xb", buffering=0) as ledger,
+        socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening,
+    ):
         wiring = TwinWiring(plan, settings.one_shot_ms)
         board = PinBoard(wiring, world, ledger, seed, clock.now_ns, pipe)
         functions = [*clock.functions, *board.functions, *operator_functions(board)]
-        listening = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
         listening.bind(at.socket_path)
         server = BoardServer(
             listening, owner_fd, settings.clock, clock.now_ns, functions, board.free
         )
-        stack.callback(server.close)
         listening.listen()
         os.write(owner_fd, b"r")  # Ready.
         with suppress(OwnerGone):
@@ -96,7 +87,7 @@ class RealTime:
     """CLOCK_MONOTONIC; the world advances in steps of 10 ms, and for an image."""
 
     def __init__(self) -> None:
-        self.functions: Sequence[Callable[..., object]] = (self.wait,)
+        self.functions = (self.wait,)
 
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
         """Reply once the client's inputs have edges."""
@@ -145,7 +136,7 @@ class TwinTime:
         self._sleepers: list[_Sleeper] = []
         self._sleeps = 0
         self._wanted_ns: dict[BoardConnection, int] = {}  # Next grant of each that takes part.
-        self.functions: Sequence[Callable[..., object]] = (self.sleep, self.wait)
+        self.functions = (self.sleep, self.wait)
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
@@ -208,18 +199,8 @@ class TwinTime:
         return tick_ns
 
 
-def _end(number: int, frame: FrameType | None) -> None:
-    sys.exit(0)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a board of the `BoardSettings` on stdin; the argument is its owner's descriptor."""
-    (owner_fd,) = map(int, sys.argv[1:] if arguments is None else arguments)
-    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
-    signal.signal(signal.SIGTERM, _end)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
-    run_board(msgspec.json.decode(sys.stdin.buffer.read(), type=BoardSettings), owner_fd)
-
-
 if __name__ == "__main__":
-    main()
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
+    run_board(msgspec.json.decode(sys.argv[2], type=BoardSettings), int(sys.argv[1]))

@@ -15,12 +15,7 @@ _REVISION: Final = 0xC03115
 
 
 class TwinPin(PiPin):
-    """One pin of the board.
-
-    Args:
-        factory: Factory of the pin.
-        info: gpiozero's description of the pin.
-    """
+    """One pin of the board; it reports all edges."""
 
     bounce: float | None = None
     edges = "both"
@@ -28,13 +23,7 @@ class TwinPin(PiPin):
     def __init__(self, factory: TwinPinFactory, info: Any) -> None:
         super().__init__(factory, info)
         self._board = factory.board
-        self._watched = False
         self._claim("input")
-
-    @property
-    def number(self) -> int:
-        """BCM number."""
-        return self._number
 
     def close(self) -> None:
         """Leave an output at its level, or low if it had PWM; remove the pull of an input."""
@@ -48,19 +37,9 @@ class TwinPin(PiPin):
     def output_with_state(self, state: bool) -> None:
         """Become an output at this level; an output changes to it."""
         if self._function != "output":
-            self._watched = False
+            self._disable_event_detect()
             self._claim("output", level=int(state))
         self.state = state
-
-    def report_edge(self, level: int, at_ns: int) -> None:
-        """Call the callback of the pin, if it watches edges in this direction.
-
-        Args:
-            level: Level after the edge.
-            at_ns: Time, ns.
-        """
-        if self._watched and self.edges in ("both", "rising" if level else "falling"):
-            self._call_when_changed(at_ns / 1e9, level)
 
     def _claim(self, function: str, pull: str = "floating", level: int = 0) -> None:
         self._function, self._pull = function, pull
@@ -77,7 +56,7 @@ class TwinPin(PiPin):
         return self._function
 
     def _set_function(self, value: str) -> None:
-        self._watched = False
+        self._disable_event_detect()
         self._claim(value)
 
     def _get_state(self) -> float:
@@ -111,10 +90,13 @@ class TwinPin(PiPin):
         self._claim("input", value)
 
     def _enable_event_detect(self) -> None:
-        self._watched = True
+        self._board.watchers[self._number] = self._report
 
     def _disable_event_detect(self) -> None:
-        self._watched = False
+        self._board.watchers.pop(self._number, None)
+
+    def _report(self, level: int, at_ns: int) -> None:
+        self._call_when_changed(at_ns / 1e9, level)
 
 
 class TwinPinFactory(PiFactory):
@@ -128,15 +110,7 @@ class TwinPinFactory(PiFactory):
         self.board = board
         self.clock = clock
         self.pin_class = TwinPin
-        self._by_number: dict[int, TwinPin] = {}
         self._pulsed: set[int] = set()
-        board.on_edge = self._report_edge
-
-    def pin(self, name: int | str) -> TwinPin:
-        """Return the pin of a name, such as 22, "GPIO22" or "BOARD15"."""
-        pin: TwinPin = super().pin(name)
-        self._by_number[pin.number] = pin
-        return pin
 
     def pulse(self, pin: int, width_us: int, frequency_hz: int) -> None:
         """Send servo pulses on a pin; see `LowAtOnceFactory.pulse`.
@@ -148,11 +122,6 @@ class TwinPinFactory(PiFactory):
             self._pulsed.add(pin)
         self.board.post("pulse", pin, width_us, frequency_hz)
 
-    def close(self) -> None:
-        """Close all pins."""
-        super().close()
-        self._by_number.clear()
-
     def ticks(self) -> float:
         """Return the clock's time in seconds."""
         return self.clock.now_ns() / 1e9
@@ -163,7 +132,3 @@ class TwinPinFactory(PiFactory):
 
     def _get_revision(self) -> int:
         return _REVISION
-
-    def _report_edge(self, pin: int, level: int, at_ns: int) -> None:
-        if (watching := self._by_number.get(pin)) is not None:
-            watching.report_edge(level, at_ns)

@@ -53,16 +53,14 @@ def _at_board(
     function: Callable[Concatenate[Operator, _P], _R],
 ) -> Callable[Concatenate[Operator, _P], _R]:
     """Let a method ask the board, in whose process its body runs with `_board`."""
-    signature = inspect.signature(function)
 
     @functools.wraps(function)
     def ask(self: Operator, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        given = signature.bind(self, *args, **kwargs)
+        given = inspect.signature(function).bind(self, *args, **kwargs)
         given.apply_defaults()
-        arguments = [*given.arguments.values()][1:]
         kind = get_type_hints(function)["return"]
         client = self._client  # pyright: ignore[reportPrivateUsage]
-        return client.ask(kind, function.__name__, *arguments)
+        return client.ask(kind, function.__name__, *given.args[1:], *given.kwargs.values())
 
     return ask
 
@@ -158,48 +156,27 @@ class Operator:
 
     @_at_board
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
-        """Override what distance sensors measure.
-
-        Args:
-            metres: Distance, m; None for the truth.
-            dead: Whether they do not answer at all.
-        """
+        """Let distance sensors measure so much, None for the truth, or not answer if `dead`."""
         for sensor in self._board.of_kind(SimulatedHcsr04):
             sensor.override_m, sensor.dead = metres, dead
         self._board.record("fault", what=f"distance {'dead' if dead else metres}")
 
     @_at_board
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
-        """Make an I2C chip stop answering, or answer again.
-
-        Args:
-            bus: Number of the bus.
-            address: Address on the bus.
-            dead: Whether it stops answering.
-        """
+        """Make the I2C chip at an address of a bus stop answering, or answer again."""
         chips = self._board.dead_chips
         (chips.add if dead else chips.discard)((bus, address))
         self._board.record("fault", what=f"chip {bus} {address} {'dead' if dead else 'well'}")
 
     @_at_board
     def break_servo(self, tendon: str, fault: ServoFault) -> None:
-        """Make the servo of a tendon fail.
-
-        Args:
-            tendon: Name of the tendon.
-            fault: The fault; "" repairs what can be repaired.
-        """
+        """Make the servo of a tendon fail; "" repairs what can be repaired."""
         self._board.require_rig().break_servo(tendon, fault)
         self._board.record("fault", what=f"servo {tendon} {fault or 'well'}")
 
     @_at_board
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
-        """Change the magnet of a joint's encoder.
-
-        Args:
-            joint: Name of the joint.
-            state: State of the magnet; "" repairs it.
-        """
+        """Change the magnet of a joint's encoder; "" repairs it."""
         self._board.encoder(joint).set_magnet(state)
         self._board.record("fault", what=f"magnet {joint} {state or 'well'}")
 
@@ -216,18 +193,11 @@ class Operator:
     @_at_board
     def where(self) -> Whereabouts:
         """Return the true state of the vehicle."""
-        world, seen = self._board.world, self._board.world.inputs()
-        return Whereabouts(
-            x=seen.pose.x,
-            y=seen.pose.y,
-            heading=seen.pose.heading,
-            speed=seen.speed,
-            travelled_m=seen.travelled_m,
-            bumped=seen.bumped,
-            distance_m=world.distance_m(),
-            truth=world.truth(),
-            t=self._board.clock(),
-        )
+        world = self._board.world
+        seen = world.inputs()
+        pose = (seen.pose.x, seen.pose.y, seen.pose.heading)
+        motion = (seen.speed, seen.travelled_m, seen.bumped)
+        return Whereabouts(*pose, *motion, world.distance_m(), world.truth(), self._board.clock())
 
     def close(self) -> None:
         """Leave the board."""

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import errno
 import heapq
+import json
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from io import RawIOBase
 from typing import Any, Final, Literal, TypeVar
 
 from shapechanger.contract.world import World
@@ -29,7 +31,6 @@ from shapechanger.robot.drivers.simulation import (
 )
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.rpc import BoardConnection
-from shapechanger.robot.twin.signals import LedgerWriter
 from shapechanger.robot.twin.wiring import TwinWiring
 
 # Servos do not count longer times for which a busy machine kept the board waiting: their watchdogs
@@ -54,11 +55,8 @@ class PinBoard:
 
     Args:
         wiring: What is attached; it gives undriven pins their level.
-        world: World of the robot.
-        ledger: Record of the changes of outputs; None to keep none.
+        ledger: File for the changes of outputs, unbuffered; None to keep none.
         seed: Seed of the phase of software PWM.
-        clock: Returns the time, ns.
-        camera: Front camera; None without one.
 
     Attributes:
         clock: Returns the time, ns.
@@ -66,7 +64,6 @@ class PinBoard:
         camera: Front camera; None without one.
         levels: State of all outputs.
         stop_held: Whether the stop button is pressed; its level follows at the next `advance`.
-        rig: Servos on a bus; None without any.
         dead_chips: Bus and address of the chips that do not answer.
     """
 
@@ -74,7 +71,7 @@ class PinBoard:
         self,
         wiring: TwinWiring,
         world: World,
-        ledger: LedgerWriter | None,
+        ledger: RawIOBase | None,
         seed: int,
         clock: Callable[[], int],
         camera: FrontCameraPipe | None = None,
@@ -91,28 +88,22 @@ class PinBoard:
         self._claims: dict[int, _Claim] = {}
         self._now_ns = clock()
         plan = wiring.plan
-        self._sensors = [
-            simulate(one, world)
-            for one in plan.sensors
-            if (simulate := SENSORS[one.driver].simulate) is not None
-        ]
+        kinds = ((one, SENSORS[one.driver].simulate) for one in plan.sensors)
+        self._sensors = [simulate(one, world) for one, simulate in kinds if simulate is not None]
         self._due: list[Edge] = []  # Edges that follow from outputs.
         self._inputs = {pin: level for one in self._sensors for pin, level in one.levels.items()}
         if plan.stop_pin is not None:
             self._inputs[plan.stop_pin] = 1  # A button to ground, with a pull-up.
-        self.rig: Rig | None = None
+        self._rig: Rig | None = None
         self._switches_rig = False
         if servos := [output for output in plan.outputs if output.driver == DRIVER]:
             settings = bus_settings(servos)
-            self.rig = Rig(settings, world)
+            self._rig = Rig(settings, world)
             # Without watchdogs, the power of the servos comes from the enable line.
             self._switches_rig = not settings.family.has_watchdog
-            self.rig.set_power(on=not self._switches_rig)
-        self._obeys = {
-            one.name: obeys(one)
-            for one in plan.outputs
-            if (obeys := OUTPUTS[one.driver].obeys) is not None
-        }
+            self._rig.set_power(on=not self._switches_rig)
+        obeys = ((one, OUTPUTS[one.driver].obeys) for one in plan.outputs)
+        self._obeys = {one.name: obey(one) for one, obey in obeys if obey is not None}
         self._chips: dict[tuple[int, int], SimulatedChip] = {}
         for output in plan.outputs:
             if over := output.settings.get("over"):
@@ -126,17 +117,17 @@ class PinBoard:
     def record(self, kind: str, t: int | None = None, **fields: Any) -> None:
         """Write a line of the ledger, of the time `t`, or of now."""
         if self._ledger is not None:
-            self._ledger.write(self.clock() if t is None else t, kind, **fields)
+            line = {"t": self.clock() if t is None else t, "kind": kind, **fields}
+            self._ledger.write(json.dumps(line, allow_nan=False).encode() + b"\n")
 
     def advance(self, now_ns: int) -> list[Edge]:
         """Advance the world to a time, and return and record the edges of inputs on the way."""
         start_ns = self._now_ns
         if now_ns > start_ns:
-            if self.rig is not None:
+            if self._rig is not None:
                 if self._switches_rig:
-                    ends_ns = self._wiring.power_ends_ns(self.levels)
-                    self.rig.set_power(on=ends_ns is None or now_ns < ends_ns)
-                self.rig.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
+                    self._rig.set_power(on=self._wiring.has_power(self.levels, now_ns))
+                self._rig.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
             self.world.advance((now_ns - start_ns) / 1e9, self._parts())
             self._now_ns = now_ns
         seen = self.world.inputs()
@@ -156,11 +147,13 @@ class PinBoard:
         """Return the sensors of one kind."""
         return [one for one in self._sensors if isinstance(one, kind)]
 
-    def require_rig(self) -> Rig:
-        """Return the servos; raise RobotError without servos."""
-        if self.rig is None:
+    def require_rig(self, device: str | None = None) -> Rig:
+        """Return the servos; raise RobotError without servos, or with servos on another device."""
+        if self._rig is None:
             raise RobotError("This twin has no servo bus.")
-        return self.rig
+        if device not in (None, self._rig.device):
+            raise RobotError(f"There is no {device} at this twin, only {self._rig.device}.")
+        return self._rig
 
     def encoder(self, joint: str) -> SimulatedAs5600:
         """Return the encoder of a joint."""
@@ -199,12 +192,11 @@ class PinBoard:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
         claim.owner, claim.mode, claim.hz = caller, mode, 0
         if mode == "output":
-            self._drive(caller, pin, float(level), 0)
+            self._drive(caller, pin, float(level))
             return level
         idle = self._wiring.idle_level(pin)
         if pin in self.levels.duties:
-            self.levels.release(pin)
-            self._drove(caller, pin, float(idle), 0, released=True)
+            self._drive(caller, pin, float(idle), released=True)
         if pull != "floating" and not self._wiring.has_resistor(pin):
             idle = int(pull == "up")
         return self._inputs.get(pin, idle)
@@ -242,11 +234,11 @@ class PinBoard:
 
     def read_servos(self, device: str, ids: list[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of servos, and return their replies by id."""
-        return self._rig_at(device).read(ids, at, size)
+        return self.require_rig(device).read(ids, at, size)
 
     def write_servos(self, device: str, data: dict[int, bytes], at: int) -> dict[int, ServoReply]:
         """Write bytes of servos, and return their replies by id."""
-        return self._rig_at(device).write(data, at)
+        return self.require_rig(device).write(data, at)
 
     def free(self, caller: BoardConnection, died: bool) -> None:
         """Free the pins of a process that has ended; outputs keep their level of that moment.
@@ -268,7 +260,7 @@ class PinBoard:
                 period_ns = 1e9 / claim.hz
                 duty = float((caller.t - claim.phase_ns) % period_ns < duty * period_ns)
             claim.hz = 0
-            self._drive(caller, pin, duty, 0)
+            self._drive(caller, pin, duty)
 
     def _parts(self) -> dict[str, float | None]:
         """Return the value of each part of the vehicle; the mean of outputs that share a part."""
@@ -280,12 +272,6 @@ class PinBoard:
             if value is not None:
                 shares.append(value)
         return {part: sum(got) / len(got) if got else None for part, got in values.items()}
-
-    def _rig_at(self, device: str) -> Rig:
-        rig = self.require_rig()
-        if device != rig.device:
-            raise RobotError(f"There is no {device} at this twin, only {rig.device}.")
-        return rig
 
     def _update_channels(self, at: tuple[int, int], chip: SimulatedChip) -> list[tuple[int, Pulse]]:
         """Update the levels of a chip's channels and return those that changed."""
@@ -306,14 +292,14 @@ class PinBoard:
             claim.phase_ns = caller.t - int(self._random.random() * 1e9 / hz)
         claim.hz = hz
 
-    def _drive(self, caller: BoardConnection, pin: int, duty: float, hz: float) -> None:
-        self.levels.drive(pin, duty, caller.t)
-        self._drove(caller, pin, duty, hz)
-
-    def _drove(
-        self, caller: BoardConnection, pin: int, duty: float, hz: float, **released: bool
+    def _drive(
+        self, caller: BoardConnection, pin: int, duty: float, hz: float = 0, **released: bool
     ) -> None:
         t = caller.t
+        if released:
+            self.levels.release(pin)
+        else:
+            self.levels.drive(pin, duty, t)
         self.record("pin", t=t, pin=pin, duty=duty, hz=hz, pid=caller.pid, **released)
         for sensor in self._sensors:
             for edge in sensor.output_changed(t, pin, duty):

@@ -36,12 +36,10 @@ class RunningRobot:
     """A robot that is served by processes on this machine, until `close`.
 
     Args:
-        folder: Folder of its files: the twin's ledger and socket, the key and the log.
-        supervisor: Process of its supervisor.
         temporary: Whether `close` removes the folder.
 
     Attributes:
-        folder: Folder of its files.
+        folder: Folder of its files: the twin's ledger and socket, the key and the log.
         supervisor: Process of its supervisor.
 
     Raises:
@@ -57,7 +55,6 @@ class RunningRobot:
         self.await_restart()
 
     def __enter__(self) -> Self:
-        """Return the robot."""
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
@@ -181,15 +178,13 @@ def run_robot(
     folder = folder or Path(tempfile.mkdtemp(prefix="shapechanger-robot-"))
     make_credentials(folder / "credentials", profile.name)
     command = [sys.executable, "-m", "shapechanger", "robot", "serve", str(profile.path)]
-    command += ["--port", "0", "--no-announce"]
+    command += ["--port", "0", "--no-announce", "--host", "127.0.0.1"]
     command += ["--credentials", str(folder / "credentials")]
-    command += ["--host", "127.0.0.1", "--ready-file", str(folder / _READY)]
+    command += ["--ready-file", str(folder / _READY)]
     command += ["--recordings", str(folder / "recordings"), *arguments]
     if twin:
-        command += ["--twin", "--clock", clock, "--seed", str(seed)]
-        command += ["--twin-folder", str(folder)]
-    with contextlib.ExitStack() as stack:
-        output = log or stack.enter_context((folder / "log.txt").open("wb"))
+        command += ["--twin", "--clock", clock, "--seed", str(seed), "--twin-folder", str(folder)]
+    with contextlib.nullcontext(log) if log else (folder / "log.txt").open("wb") as output:
         supervisor = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -197,14 +192,7 @@ def run_robot(
             stderr=output,
             # So that Ctrl-C first reaches the driving program, which then ends the robot.
             process_group=0,
-            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+            # A robot must not run on because a terminal was closed. The setting survives `exec`.
+            preexec_fn=lambda: ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM),
         )
     return RunningRobot(folder, supervisor, temporary=temporary)
-
-
-def _end_with_parent() -> None:
-    """Let the kernel end this process when its parent ends, for whatever reason.
-
-    A robot must not run on because a terminal was closed. The setting survives `exec`.
-    """
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

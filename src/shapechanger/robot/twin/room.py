@@ -48,22 +48,16 @@ _WALLS: Final = np.array(((220, 70, 60), (70, 150, 220), (235, 190, 60), (90, 18
 
 
 class _Drive(NamedTuple):
-    """Motion of a kind of vehicle.
+    """Motion of a kind of vehicle."""
 
-    Attributes:
-        ahead: Speed that each part gives at a value of 1, m/s.
-        turn: Rate of turn that it gives, rad/s, counter-clockwise seen from above.
-        rudder: Part that steers; "" if only the sides do.
-        curvature: Turn to the right for each metre at full rudder, rad/m.
-        lag_s: Time in which the motion covers 63 % of a difference.
-    """
+    ahead: Mapping[str, float]  # Speed that each part gives at a value of 1, m/s.
+    turn: Mapping[str, float] = {}  # Rate of turn that it gives, rad/s, counter-clockwise.
+    rudder: str = ""  # Part that steers; "" if only the sides do.
+    curvature: float = 0.0  # Turn to the right for each metre at full rudder, rad/m.
+    lag_s: float = 0.15  # Time in which the motion covers 63 % of a difference.
 
-    ahead: Mapping[str, float]
-    turn: Mapping[str, float] = {}
-    rudder: str = ""
-    curvature: float = 0.0
-    lag_s: float = 0.15
 
+_Floats = NDArray[np.float64]
 
 _DRIVES: Final = (
     # A wheelbase of 0.18 m, and front wheels that turn by 28 degrees.
@@ -102,7 +96,6 @@ class DrivingWorld(World):
         parts: Collection[str],
         size: tuple[int, int],
         seed: int,
-        *,
         pitch_deg: float | None = None,
         fovy_deg: float | None = None,
     ) -> None:
@@ -111,7 +104,7 @@ class DrivingWorld(World):
             raise RobotError(f"No vehicle has all of these parts: {', '.join(sorted(parts))}.")
         self._drive = kinds[0] if kinds else _Drive({})  # Other parts do not move.
         self._first_stripe = random.Random(f"room {seed}").uniform(0.0, 2.0 * _STRIPE)
-        self._bearings, self._slopes = _lines_of_sight(size, pitch_deg or 0.0, fovy_deg)
+        self._aim(size, math.radians(pitch_deg or 0.0), fovy_deg)
         self.resting_v = RESTING_V
         self._travelled = 0.0
         self.place(seed)
@@ -140,9 +133,8 @@ class DrivingWorld(World):
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
         """Advance time; see `World.advance`."""
         while dt_s > 1e-12:
-            step_s = min(dt_s, _LONGEST_STEP_S)
-            self._step(step_s, outputs)
-            dt_s -= step_s
+            self._step(min(dt_s, _LONGEST_STEP_S), outputs)
+            dt_s -= _LONGEST_STEP_S
 
     def inputs(self) -> Readings:
         """Return the quantities that sensors measure."""
@@ -172,10 +164,24 @@ class DrivingWorld(World):
         picture = np.where(below < _CAMERA_HEIGHT, colours, _FLOOR)
         return np.where(below < _CAMERA_HEIGHT - _WALL_HEIGHT, _CEILING, picture)
 
-    def _cast(
-        self, bearings: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
-        """Return where rays from the vehicle hit the walls.
+    def _aim(self, size: tuple[int, int], pitch: float, fovy_deg: float | None) -> None:
+        """Set the bearing of each column, rad, and the downward slope of each pixel's line.
+
+        All lines of a column have the bearing of its middle one, also in a pitched camera.
+        """
+        width, height = size
+        across = width if fovy_deg is None else height
+        angle = _FIELD_OF_VIEW if fovy_deg is None else math.radians(fovy_deg)
+        focal = (across / 2) / math.tan(angle / 2)  # In pixels.
+        right = (np.arange(width) + 0.5 - width / 2) / focal
+        below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
+        down = math.sin(pitch) + math.cos(pitch) * below
+        ahead = math.cos(pitch) - math.sin(pitch) * below
+        self._bearings = -np.arctan2(right, math.cos(pitch))
+        self._slopes = down / np.hypot(right, ahead)
+
+    def _cast(self, bearings: _Floats) -> tuple[_Floats, NDArray[np.intp], _Floats]:
+        """Cast rays from the vehicle to the walls.
 
         Returns:
             Distance, m, number of the wall, 0 to 3, and place along it, m, of each ray.
@@ -224,23 +230,3 @@ def _free_share(place: float, move: float, length: float) -> float:
     """Return the share of a move along an axis before a wall, 0 to 1."""
     limit = length - RADIUS if move > 0.0 else RADIUS
     return 1.0 if move == 0.0 else min(1.0, max(0.0, (limit - place) / move))
-
-
-def _lines_of_sight(
-    size: tuple[int, int], pitch_deg: float, fovy_deg: float | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the bearing of each column, rad, and the downward slope of each pixel's line.
-
-    All lines of a column have the bearing of its middle one, also in a pitched camera.
-    """
-    width, height = size
-    if fovy_deg is None:
-        focal = (width / 2) / math.tan(_FIELD_OF_VIEW / 2)  # In pixels.
-    else:
-        focal = (height / 2) / math.tan(math.radians(fovy_deg) / 2)
-    pitch = math.radians(pitch_deg)
-    right = (np.arange(width) + 0.5 - width / 2) / focal
-    below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
-    down = math.sin(pitch) + math.cos(pitch) * below
-    ahead = math.cos(pitch) - math.sin(pitch) * below
-    return -np.arctan2(right, math.cos(pitch)), down / np.hypot(right, ahead)

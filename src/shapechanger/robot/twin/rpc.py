@@ -15,7 +15,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
-from typing import Any, Final, Literal, NamedTuple, get_origin, get_type_hints
+from typing import Any, Final, Literal, NamedTuple, TypeVar, get_origin, get_type_hints
 
 import msgspec
 
@@ -32,11 +32,12 @@ Role = Literal["hardware", "operator", "clock"]
 """A robot's process, a person next to the robot, or a connection that only sleeps."""
 
 _GONE: Final = "The twin's board is gone."
-_HELD_UP_MS: Final = 10  # Between two calls while the board does not reply.
-_HELD_UP_S: Final = 10.0  # A board that does not reply for longer is broken.
+_HELD_UP_S: Final = 0.01  # Between two calls while the board does not reply.
+_PATIENCE_S: Final = 10.0  # A board that does not reply for longer is broken.
 _MAX_EDGES: Final = 500  # Kept for a client that does not wait for them, before they are merged.
 
 _log = logging.getLogger(__name__)
+_Result = TypeVar("_Result")
 
 
 class Call(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -122,7 +123,7 @@ class BoardClient:
         clock: Kind of clock, "real" or "twin".
         now_ns: Newest twin time that the board has sent; with the clock "real", an earlier time.
         levels: Level of each pin that is claimed as an input.
-        on_edge: Called by `dispatch` with pin, level and time of each edge.
+        watchers: Functions that `dispatch` calls with level and time of each edge, by pin.
         while_held_up: Called every 10 ms while the board is held up and neither takes a request nor
             replies to it, for 10 s at most.
     """
@@ -133,7 +134,7 @@ class BoardClient:
         self._replies: dict[int, Reply] = {}
         self._edges: deque[Edge] = deque()
         self.levels: dict[int, int] = {}
-        self.on_edge: Callable[[int, int, int], None] | None = None
+        self.watchers: dict[int, Callable[[int, int], None]] = {}
         self.while_held_up: Callable[[], object] = lambda: None
         with ExitStack() as undo:
             self._socket = undo.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
@@ -144,13 +145,14 @@ class BoardClient:
                 ),
             ):
                 self._socket.connect(path)
+            self._socket.settimeout(_HELD_UP_S)
             self.clock, self.now_ns = self.ask(Greeting, "greet", role, os.getpid())
             undo.pop_all()
 
     @property
     def closed(self) -> bool:
         """True if `close` was called."""
-        return self._socket.fileno() < 0
+        return self.fileno() < 0
 
     def fileno(self) -> int:
         """Return the descriptor of the connection."""
@@ -163,10 +165,9 @@ class BoardClient:
     def ask(self, kind: Any, function: str, *arguments: object) -> Any:
         """Call a function of the board and return its result."""
         call_id = self._call(function, *arguments)
-        until_s = time.monotonic() + _HELD_UP_S
+        until_s = time.monotonic() + _PATIENCE_S
         while call_id not in self._replies:
-            self._await(select.POLLIN, until_s)
-            self._receive()
+            self._receive(until_s)
         return self._replies.pop(call_id).decode(kind)
 
     def wait(self, until_ns: int = 0, at_most_s: float = 0.0) -> bool:
@@ -180,8 +181,10 @@ class BoardClient:
             Whether it did, which updates `now_ns` and `levels`.
         """
         self._waits = self._waits or self._call("wait", until_ns)
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
         while self._waits not in self._replies:
-            if not self._is_ready(select.POLLIN, max(0.0, at_most_s * 1e3)):
+            if not poll.poll(max(0.0, at_most_s * 1e3)):
                 return False
             self._receive()
         self.now_ns, edges = self._replies.pop(self._waits).decode(Awake)
@@ -191,17 +194,17 @@ class BoardClient:
         return True
 
     def dispatch(self) -> None:
-        """Call `on_edge` for all edges that have arrived."""
+        """Pass all edges that have arrived to their watchers."""
         while self._edges:
             edge = self._edges.popleft()
-            if self.on_edge is not None:
-                self.on_edge(edge.pin, edge.level, edge.t)
+            if (watcher := self.watchers.get(edge.pin)) is not None:
+                watcher(edge.level, edge.t)
 
     def close(self) -> None:
         """Leave the board in order."""
         if not self.closed:
-            with suppress(OSError), self._socket:  # The board may have ended first.
-                self._socket.send(encode_call("leave"))
+            with suppress(RobotError), self._socket:  # The board may have ended first.
+                self.post("leave")
 
     def _call(self, function: str, *arguments: object) -> int:
         self._last_id += 1
@@ -209,30 +212,17 @@ class BoardClient:
         return self._last_id
 
     def _send(self, data: bytes) -> None:
-        until_s = time.monotonic() + _HELD_UP_S
-        while True:
-            try:
-                self._socket.send(data, socket.MSG_DONTWAIT)
-            except BlockingIOError:
-                self._await(select.POLLOUT, until_s)
-            except OSError as error:
-                raise board_gone(error) from error
-            else:
-                return
+        self._await(lambda: self._socket.send(data), time.monotonic() + _PATIENCE_S)
 
-    def _receive(self) -> None:
-        with translate_errors(OSError, to=board_gone):
-            reply = decode_reply(self._socket.recv(MAX_MESSAGE))
+    def _receive(self, until_s: float = 0.0) -> None:
+        reply = decode_reply(self._await(lambda: self._socket.recv(MAX_MESSAGE), until_s))
         self._replies[reply.id] = reply
 
-    def _is_ready(self, event: int, at_most_ms: float) -> bool:
-        poll = select.poll()
-        poll.register(self._socket, event)
-        return bool(poll.poll(at_most_ms))
-
-    def _await(self, event: int, until_s: float) -> None:
+    def _await(self, transfer: Callable[[], _Result], until_s: float) -> _Result:
         """Wait for the board, which a busy machine or a new world may hold up."""
-        while not self._is_ready(event, _HELD_UP_MS):
+        while True:
+            with translate_errors(OSError, to=board_gone), suppress(TimeoutError):
+                return transfer()
             if time.monotonic() < until_s:
                 self.while_held_up()
 
@@ -306,21 +296,24 @@ class BoardConnection:
             self.reply(waits, Awake(now_ns, edges))
 
 
-class _Function(NamedTuple):
-    run: Callable[..., object]
-    names: tuple[str, ...]
-    decode: Callable[[bytes], tuple[Any, ...]]
-    takes_caller: bool
-
-
-def _served(function: Callable[..., object]) -> _Function:
+def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgspec.Raw], object]:
+    """Return a function that takes its caller and its encoded arguments."""
     hints = get_type_hints(function)
     hints.pop("return", None)
     takes_caller = hints.pop("caller", None) is not None
     # The function itself refuses other words than those of a `Literal`, with the nearest one.
     kinds = [str if get_origin(hint) is Literal else hint for hint in hints.values()]
-    decode = msgspec.msgpack.Decoder(tuple[*kinds] if kinds else tuple[()]).decode
-    return _Function(function, tuple(hints), decode, takes_caller)
+    decode: Any = msgspec.msgpack.Decoder(tuple[*kinds]).decode
+
+    def run(caller: BoardConnection, arguments: msgspec.Raw) -> object:
+        with translate_errors(
+            msgspec.MsgspecError,
+            to=lambda error: RobotError(f"The board's {function.__name__} takes others: {error}."),
+        ):
+            given = dict(zip(hints, decode(arguments), strict=True))
+        return function(**given, **({"caller": caller} if takes_caller else {}))
+
+    return run
 
 
 class BoardServer:
@@ -381,11 +374,6 @@ class BoardServer:
         """Announce that a process ends in order."""
         caller.has_left = True
 
-    def close(self) -> None:
-        """Close the sockets of all clients."""
-        for connection in self.connections.values():
-            connection.socket.close()
-
     def _execute_all(self, connection: BoardConnection) -> None:
         """Execute all calls that have arrived from a client."""
         if connection.executes or connection.closed:
@@ -421,11 +409,6 @@ class BoardServer:
         function = self._functions.get(call.function)
         if function is None:
             raise RobotError(f"The board has no function {call.function!r}.")
-        with translate_errors(
-            msgspec.MsgspecError,
-            to=lambda error: RobotError(f"The board's {call.function} takes others: {error}."),
-        ):
-            arguments = function.decode(call.arguments)
         # An operator acts after everything that processes have sent until now, and the owner of a
         # pin may have ended before another process claims it.
         if connection.role == "operator" or call.function == "claim":
@@ -434,5 +417,4 @@ class BoardServer:
                     self._execute_all(other)
         connection.call_id = call.id
         connection.t = self._now_ns() if self._clock == "twin" else call.t
-        given = dict(zip(function.names, arguments, strict=True))
-        return function.run(**given, **({"caller": connection} if function.takes_caller else {}))
+        return function(connection, call.arguments)

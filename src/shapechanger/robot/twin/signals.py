@@ -23,11 +23,9 @@ Each line is written at once, so that a crash leaves at most one broken line, th
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -37,25 +35,10 @@ from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One line of the ledger; fields that its kind does not have are None.
+    """One line of the ledger, as the module describes it; None where its kind has no such field.
 
-    Attributes:
-        t: Time, in nanoseconds of the run's clock.
-        kind: Kind of line; see the module.
-        pid: Process that made the change.
-        pin: BCM number.
-        duty: Share of the time at which the pin is high, 0 to 1.
-        hz: Frequency of PWM or pulses, Hz.
-        us: Width of the pulses in microseconds; 0 for none.
-        bus: Number of the I2C bus.
-        address: Address on that bus.
-        channel: PWM channel of that chip.
-        register: First register of a write.
-        data: Bytes of a write.
-        level: Level of an input.
-        released: Whether the pin is no longer driven.
-        seed: Seed of a start or of surroundings.
-        what: Action of the operator.
+    `pid` is the process that made the change, `pin` a BCM number, `duty` a share of the time from 0
+    to 1, `hz` a frequency in Hz, and `us` the width of pulses in microseconds.
     """
 
     t: int
@@ -76,35 +59,11 @@ class Transition:
     what: str | None = None
 
 
-class LedgerWriter:
-    """A ledger in a file."""
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_EXCL, 0o644)
-        self._encoder = json.JSONEncoder(allow_nan=False)
-
-    def write(self, t: int, kind: str, **fields: Any) -> None:
-        """Append a line, which the kernel has when this returns.
-
-        Args:
-            t: Time, ns.
-            kind: Kind of line; see the module.
-            **fields: Other fields of the line.
-        """
-        line = self._encoder.encode({"t": t, "kind": kind, **fields}) + "\n"
-        os.write(self._fd, line.encode())
-
-    def close(self) -> None:
-        """Close the file."""
-        os.close(self._fd)
-
-
 def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
     """Read all complete lines of a ledger, ordered by time.
 
     Processes stamp their changes, so lines of two processes may be out of order in the file.
     """
-    text = Path(path).read_text(encoding="utf-8")
     decode = msgspec.json.Decoder(Transition).decode
     transitions: list[Transition] = []
     with translate_errors(
@@ -114,7 +73,7 @@ def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
         ),
     ):
         # After the last newline there is at most a broken line.
-        for line in text.split("\n")[:-1]:
+        for line in Path(path).read_bytes().split(b"\n")[:-1]:
             transitions.append(decode(line))
     return sorted(transitions, key=lambda transition: transition.t)
 

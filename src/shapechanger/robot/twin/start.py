@@ -8,7 +8,6 @@ import select
 import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import Collection, Mapping
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field, replace
@@ -24,9 +23,6 @@ from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.rpc import BoardClient
 from shapechanger.robot.twin.wiring import ONE_SHOT_MS, TwinWiring
-
-_HARDWARE: Final = "shapechanger.robot.twin.hardware:connect"
-"""Source of the twin's hardware for a robot's processes; its argument is the board's socket."""
 
 _READY_S: Final = 30.0
 _END_S: Final = 5.0
@@ -63,23 +59,20 @@ def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, 
     """
     if not place.opener:
         plan = camera or CameraPlan("")
-        angles = {"pitch_deg": plan.pitch_deg, "fovy_deg": plan.fovy_deg}
-        return DrivingWorld(parts, plan.size, seed, **angles)
+        return DrivingWorld(parts, plan.size, seed, plan.pitch_deg, plan.fovy_deg)
     module, _, name = place.opener.partition(":")
-    with translate_errors(ModuleNotFoundError, to=lambda error: _no_module(place, error)):
+    with translate_errors(
+        ModuleNotFoundError,
+        to=lambda error: RobotError(
+            f"The world of this twin is opened by {place.opener}, and there is no "
+            f"{error.name}: install the package that names it."
+        ),
+    ):
         found = importlib.import_module(module)
     if not hasattr(found, name):
         known = [other for other in vars(found) if other.startswith("open_")]
         raise UnknownName(f"function of {module} that opens a world", name, known)
-    world: World = getattr(found, name)(parts, camera, seed, **place.arguments)
-    return world
-
-
-def _no_module(place: Place, error: ModuleNotFoundError) -> RobotError:
-    return RobotError(
-        f"The world of this twin is opened by {place.opener}, and there is no "
-        f"{error.name}: install the package that names it."
-    )
+    return getattr(found, name)(parts, camera, seed, **place.arguments)
 
 
 class BoardSettings(msgspec.Struct, frozen=True):
@@ -102,7 +95,7 @@ class BoardAt:
 
     @property
     def socket_path(self) -> str:
-        """Socket on which it listens; the argument of `_HARDWARE`."""
+        """Socket on which it listens."""
         return str(self.folder / "board.socket")
 
     @property
@@ -117,8 +110,8 @@ class BoardAt:
 
     @property
     def hardware(self) -> tuple[str, str]:
-        """Source of a robot's hardware, with its argument."""
-        return _HARDWARE, self.socket_path
+        """Source of the hardware of a robot's processes, with its argument."""
+        return "shapechanger.robot.twin.hardware:connect", self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
         """Return the camera of a profile, reading the images of this board.
@@ -207,14 +200,12 @@ def start_board(
         wiring.to_json(), str(at.folder), clock, seed, one_shot_ms, place or Place(), camera
     )
     ours, theirs = socket.socketpair()
+    command = [sys.executable, "-m", "shapechanger.robot.twin.board", str(theirs.fileno())]
     with ExitStack() as undo:
         undo.enter_context(ours)
-        with theirs, tempfile.TemporaryFile() as file:
-            file.write(msgspec.json.encode(settings))
-            file.seek(0)
+        with theirs:
             process = subprocess.Popen(
-                [sys.executable, "-m", "shapechanger.robot.twin.board", str(theirs.fileno())],
-                stdin=file,
+                [*command, msgspec.json.encode(settings)],
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,  # So that Ctrl-C reaches the robot but not the board.
             )

@@ -30,13 +30,15 @@ class TwinWiring:
         self.plan = plan
         has_one_shot = plan.enable_pin is not None and one_shot_ms is not None
         self._one_shot_ns = int((one_shot_ms or 0.0) * 1e6) if has_one_shot else None
-        enables = (_output_enable(output) for output in plan.outputs)
-        self._high = {pin for pin in enables if pin >= 0}
+        keys = (one.settings for one in plan.outputs if one.settings.get("over") == "pca9685")
+        self._high = {one["output_enable"] for one in keys if one.get("output_enable", -1) >= 0}
         self._low = driven_pins(plan).keys()
-        self._actions = {action.name: action for action in plan.actions}
         self._states = {output.name: self._state(output) for output in plan.outputs}
         self.outputs: Mapping[str, OutputPlan] = {output.name: output for output in plan.outputs}
-        self.propelling = tuple(name for name in self.outputs if self._propels(name))
+        ahead = {action.name for action in plan.actions if action.propels}
+        self.propelling = tuple(
+            one.name for one in plan.outputs if any(one.mix.get(name) for name in ahead)
+        )
 
     def idle_level(self, pin: int) -> int:
         """Return the level of an undriven pin.
@@ -57,6 +59,11 @@ class TwinWiring:
         edge_ns = levels.edges_ns.get(self.plan.enable_pin)
         return 0 if edge_ns is None else edge_ns + self._one_shot_ns
 
+    def has_power(self, levels: Levels, now_ns: int) -> bool:
+        """Return whether the one-shot, if there is one, leaves the motors their power."""
+        ends_ns = self.power_ends_ns(levels)
+        return ends_ns is None or now_ns < ends_ns
+
     def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
         """Return the state of each output, by name.
 
@@ -64,29 +71,19 @@ class TwinWiring:
             levels: Levels of all pins.
             now_ns: Time, ns, by which the one-shot may have cut the power.
         """
-        ends_ns = self.power_ends_ns(levels)
-        powered = ends_ns is None or now_ns < ends_ns
+        powered = self.has_power(levels, now_ns)
         return {
             name: (None if powered else OUTPUTS[self.outputs[name].driver].unpowered)
             or state(levels)
             for name, state in self._states.items()
         }
 
-    def _propels(self, name: str) -> bool:
-        weights = self.outputs[name].mix.items()
-        return any(w and one in self._actions and self._actions[one].propels for one, w in weights)
-
     def _state(self, plan: OutputPlan) -> Callable[[Levels], WiredOutput]:
         """Return what reads the state of an output, apart from the motors' power."""
-        known = ((self._actions[n].rest, w) for n, w in plan.mix.items() if n in self._actions)
-        rest = max(-1.0, min(1.0, plan.offset + sum(weight * value for value, weight in known)))
+        mixed = sum(one.rest * plan.mix.get(one.name, 0.0) for one in self.plan.actions)
+        rest = max(-1.0, min(1.0, plan.offset + mixed))
         return OUTPUTS[plan.driver].wire(plan, rest, self._duty)
 
     def _duty(self, levels: Levels, pin: int) -> float:
         duty = levels.duties.get(pin)
         return float(self.idle_level(pin)) if duty is None else duty
-
-
-def _output_enable(plan: OutputPlan) -> int:
-    pin = plan.settings.get("output_enable", -1)
-    return pin if isinstance(pin, int) and plan.settings.get("over") == "pca9685" else -1
