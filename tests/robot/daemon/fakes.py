@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.guard.channel import MAX_DATAGRAM, GuardState, Order, decode_order, encode
 from tests.robot.daemon.plans import guard_state
 
@@ -90,10 +90,11 @@ class FakeGuard:
         self.state = msgspec.structs.replace(self.state, **changes)
 
 
-class FakeCamera:
+class FakeCamera(Camera):
     """Camera that returns the frames of a test."""
 
     def __init__(self) -> None:
+        super().__init__(CameraPlan("fake"))
         self.opened = 0
         self._frames: queue.Queue[Frame | str | int] = queue.Queue()
 

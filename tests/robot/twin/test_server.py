@@ -24,7 +24,7 @@ def test_the_last_edge_of_each_input_is_kept(pins: list[int]) -> None:
     with own, theirs:
         board = BoardConnection(own)
         for edge in edges:
-            board.add_edges([edge])
+            board.add_edge(edge)
         board.waits = 7
         board.wake(9, always=True)
         board.wake(10, always=True)  # It no longer waits.

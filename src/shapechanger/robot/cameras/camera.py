@@ -6,7 +6,7 @@ import os
 import select
 import time
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final, Protocol
+from typing import Annotated, Any, Final
 
 from msgspec import Meta
 
@@ -73,29 +73,8 @@ class CameraPlan:
     settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
-class Camera(Protocol):
-    """Source of frames, read by one thread."""
-
-    def read(self) -> Frame:
-        """Wait for the next frame.
-
-        Raises:
-            RobotError: If the camera stopped or its data is not a valid frame.
-        """
-        ...
-
-    def close(self) -> None:
-        """Close the camera; a `read` that waits in another thread raises an error."""
-        ...
-
-
-def open_camera(plan: CameraPlan) -> Camera:
-    """Open a camera."""
-    return load(CAMERA_DRIVERS[plan.driver])(plan)
-
-
-class WaitingCamera(Camera):
-    """Camera whose waits end with `close`, from any thread.
+class Camera:
+    """Source of frames, read by one thread, whose waits end with `close`, from any thread.
 
     Args:
         plan: The camera.
@@ -106,6 +85,14 @@ class WaitingCamera(Camera):
         self._woken, self._wake = os.pipe()
         self._closed = False
         self._next_ns = time.monotonic_ns()
+
+    def read(self) -> Frame:
+        """Wait for the next frame.
+
+        Raises:
+            RobotError: If the camera stopped or its data is not a valid frame.
+        """
+        raise NotImplementedError
 
     def wait(self, fd: int | None = None, at_most_s: float | None = None) -> bool:
         """Wait until a descriptor is readable.
@@ -133,7 +120,7 @@ class WaitingCamera(Camera):
         return now_ns
 
     def close(self) -> None:
-        """Interrupt all waits, now and in the future."""
+        """Close the camera; a `read` that waits in another thread raises an error."""
         if not self._closed:
             self._closed = True
             os.write(self._wake, b"\0")
@@ -142,3 +129,8 @@ class WaitingCamera(Camera):
         # Not in `close`: another thread may still be waiting on them.
         os.close(self._woken)
         os.close(self._wake)
+
+
+def open_camera(plan: CameraPlan) -> Camera:
+    """Open a camera."""
+    return load(CAMERA_DRIVERS[plan.driver])(plan)

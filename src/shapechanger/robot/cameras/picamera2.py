@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from typing import Any, Final
 
 from shapechanger.errors import RobotError, translate_errors
-from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import encoded_frame
 
 _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
@@ -20,7 +20,7 @@ _SILENT_S: Final = 2.0  # Some camera stacks stop silently (picamera2#1004).
 _FORMAT: Final = "BGR888"
 
 
-class PiCamera:
+class PiCamera(Camera):
     """Camera on the Pi's own connector; see `Camera`. Its setting is its `number`, from 0.
 
     Raises:
@@ -28,14 +28,21 @@ class PiCamera:
     """
 
     def __init__(self, plan: CameraPlan) -> None:
+        super().__init__(plan)
         with translate_errors(ImportError, to=_not_installed):
             from libcamera import Transform  # pyright: ignore[reportMissingModuleSource]
             from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
-        self._plan = plan
         self._lock = threading.Lock()  # `close` waits for a `read` in progress.
-        self._closed = False
-        with translate_errors(RuntimeError, IndexError, to=self._missing):
-            self._camera: Any = Picamera2(plan.settings["number"])
+        number = plan.settings["number"]
+        with translate_errors(
+            RuntimeError,
+            IndexError,
+            to=lambda error: RobotError(
+                f"There is no camera {number}: {error}. "
+                "`rpicam-hello --list-cameras` lists what the system sees."
+            ),
+        ):
+            self._camera: Any = Picamera2(number)
         period_us = round(1e6 / plan.fps)
         with ExitStack() as undo:
             undo.callback(self._camera.close)
@@ -58,27 +65,26 @@ class PiCamera:
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""
         with self._lock, ExitStack() as stack:
-            if self._closed:
-                raise RobotError("The camera is closed.")
-            with translate_errors(TimeoutError, RuntimeError, to=_silent):
+            self.wait(at_most_s=0.0)  # Raises if it is closed.
+            with translate_errors(
+                TimeoutError,
+                RuntimeError,
+                to=lambda _: RobotError(
+                    f"The Pi's camera has sent no frame for {_SILENT_S:g} s: check its cable."
+                ),
+            ):
                 request = self._camera.capture_request(wait=_SILENT_S)
             stack.callback(request.release)
             image = request.make_array("main")
             # SensorTimestamp: nanoseconds of the monotonic clock at the first line's exposure.
             captured_ns = int(request.get_metadata()["SensorTimestamp"])
-        return encoded_frame(image, captured_ns, self._plan)
-
-    def _missing(self, error: Exception) -> RobotError:
-        return RobotError(
-            f"There is no camera {self._plan.settings['number']}: {error}. "
-            "`rpicam-hello --list-cameras` lists what the system sees."
-        )
+        return encoded_frame(image, captured_ns, self.plan)
 
     def close(self) -> None:
         """Stop the camera after a `read` in progress."""
         with self._lock:
             if not self._closed:
-                self._closed = True
+                super().close()
                 self._camera.stop()
                 self._camera.close()
 
@@ -89,7 +95,3 @@ def _not_installed(_: ImportError) -> RobotError:
         "virtual environment made with `python3 -m venv --system-site-packages` by the "
         "system's Python."
     )
-
-
-def _silent(_: Exception) -> RobotError:
-    return RobotError(f"The Pi's camera has sent no frame for {_SILENT_S:g} s: check its cable.")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import RobotError, translate_errors
-from shapechanger.robot.cameras.camera import CameraPlan, Frame, WaitingCamera
+from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import (
     JpegSplitter,
     captured_ns_of,
@@ -32,7 +32,7 @@ _PROGRAM_ENDS_S: Final = 2.0
 _SUFFIXES: Final = (".jpg", ".jpeg")
 
 
-class Pipe(WaitingCamera):
+class Pipe(Camera):
     """JPEG stream from a named pipe, a file or a program such as rpicam-vid; see `Camera`.
 
     A frame may carry its time of capture in a comment segment (`captured_ns=`, monotonic).
@@ -124,7 +124,7 @@ class Pipe(WaitingCamera):
         self._splitter.feed(data)
 
 
-class Folder(WaitingCamera):
+class Folder(Camera):
     """Camera that replays the files of a folder in the order of their names; see `Camera`.
 
     Its setting is the folder, `path`.
@@ -189,7 +189,7 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
     image[:rows, : drawn.shape[1]] = drawn[..., np.newaxis]
 
 
-class Pattern(WaitingCamera):
+class Pattern(Camera):
     """Camera with drifting colours and the time of capture as a barcode; see `Camera`.
 
     It has no settings and ignores `flip`.

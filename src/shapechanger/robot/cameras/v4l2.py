@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from shapechanger.errors import RobotError, translate_errors
-from shapechanger.robot.cameras.camera import CameraPlan, Frame, WaitingCamera
+from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.cameras.jpeg import checked_frame
 
 SET_FORMAT: Final = 0xC0D05605  # VIDIOC_S_FMT
@@ -75,7 +75,7 @@ class BufferRequest(ctypes.Structure):
     _fields_ = _words("count", "type", "memory", "caps", "rest")
 
 
-class V4l2(WaitingCamera):
+class V4l2(Camera):
     """Webcam; see `Camera`. Of several ready frames the newest is returned.
 
     Args:

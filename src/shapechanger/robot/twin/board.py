@@ -9,22 +9,25 @@ from __future__ import annotations
 
 import logging
 import os
+import select
 import signal
 import socket
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, get_origin, get_type_hints
 
 import msgspec
 
 from shapechanger.contract.plan import GuardPlan
+from shapechanger.errors import RobotError, ShapechangerError, translate_errors
 from shapechanger.robot.guard.running import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.operator import operator_functions
 from shapechanger.robot.twin.pin_board import PinBoard
-from shapechanger.robot.twin.rpc import LATER, BoardConnection, BoardServer, OwnerGone, Slept
+from shapechanger.robot.twin.rpc import BoardConnection, Call, Greeting, Role, Slept
 from shapechanger.robot.twin.start import BoardAt, BoardSettings, open_world
 from shapechanger.robot.twin.wiring import TwinWiring
 
@@ -34,83 +37,187 @@ START_NS: Final = 1_000_000_000
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
 """Interval of looking for a reader of the images while time stands still."""
+_LATER: Final = object()
+"""Result of a function that the board answers later, or never."""
+
+_log = logging.getLogger(__name__)
+_decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
 
 
-def run_board(settings: BoardSettings, owner_fd: int) -> None:
-    """Run a board until its owner is gone; write a byte to the owner once it listens."""
-    plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
-    is_real = settings.clock == "real"
-    parts = {output.part for output in plan.outputs if output.part}
-    world = open_world(settings.place, parts, camera, seed)
-    # Let the world prepare what takes a while, before a guard in real time waits for it.
-    world.put_back()
-    world.place(seed)
-    if camera is not None:
-        world.picture()
-    if is_real:
-        run_early()  # Hardware is never late because the machine is busy.
-    clock = RealTime() if is_real else TwinTime(plan.tick_hz)
-    at = BoardAt(Path(settings.folder))
-    pipe = None
-    if camera is not None:
-        barcode = not settings.place.opener
-        pipe = FrontCameraPipe(
-            at.fifo_path, camera, world, clock.now_ns(), latest_only=is_real, barcode=barcode
-        )
-    with (
-        at.ledger_path.open("xb", buffering=0) as ledger,
-        socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening,
-    ):
+class _OwnerGone(Exception):
+    """The process at the other end of the owner's descriptor has ended."""
+
+
+def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgspec.Raw], object]:
+    """Return a function that takes its caller and its encoded arguments."""
+    hints = get_type_hints(function)
+    hints.pop("return", None)
+    takes_caller = hints.pop("caller", None) is not None
+    # The function itself refuses other words than those of a `Literal`, with the nearest one.
+    kinds = [str if get_origin(hint) is Literal else hint for hint in hints.values()]
+    decode: Any = msgspec.msgpack.Decoder(tuple[*kinds]).decode
+
+    def run(caller: BoardConnection, arguments: msgspec.Raw) -> object:
+        with translate_errors(
+            msgspec.MsgspecError,
+            to=lambda error: RobotError(f"The board's {function.__name__} takes others: {error}."),
+        ):
+            given = dict(zip(hints, decode(arguments), strict=True))
+        return function(**given, **({"caller": caller} if takes_caller else {}))
+
+    return run
+
+
+class Board:
+    """Executes the calls of clients; time is CLOCK_MONOTONIC, and a step of the world 10 ms.
+
+    A parameter `caller` of a called function gets the connection. It may raise a
+    `ShapechangerError`, or an `OSError` with its `errno`.
+
+    Args:
+        settings: Its settings.
+        owner_fd: Descriptor that is readable once its owner has ended; it gets a byte once the
+            board listens.
+    """
+
+    def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
+        plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
+        at = BoardAt(Path(settings.folder))
+        parts = {output.part for output in plan.outputs if output.part}
+        world = open_world(settings.place, parts, camera, seed)
+        # Let the world prepare what takes a while, before a guard in real time waits for it.
+        world.put_back()
+        world.place(seed)
+        self._camera: FrontCameraPipe | None = None
+        if camera is not None:
+            world.picture()
+            self._camera = FrontCameraPipe(
+                at.fifo_path,
+                camera,
+                world,
+                self.now_ns(),
+                latest_only=settings.clock == "real",
+                barcode=not settings.place.opener,
+            )
+        ledger = at.ledger_path.open("xb", buffering=0)
         wiring = TwinWiring(plan, settings.one_shot_ms)
-        board = PinBoard(wiring, world, ledger, seed, clock.now_ns, pipe)
-        functions = [*clock.functions, *board.functions, *operator_functions(board)]
-        listening.bind(at.socket_path)
-        server = BoardServer(
-            listening, owner_fd, settings.clock, clock.now_ns, functions, board.free
-        )
-        listening.listen()
+        self._pins = PinBoard(wiring, world, ledger, seed, self.now_ns, self._camera)
+        self._clock: Literal["real", "twin"] = settings.clock
+        own = (self.greet, self.leave, self.wait, self.sleep)
+        functions = (*own, *self._pins.functions, *operator_functions(self._pins))
+        self._functions = {one.__name__: _served(one) for one in functions}
+        # Clients by descriptor, in the order in which they connected.
+        self._connections: dict[int, BoardConnection] = {}
+        self._owner_fd = owner_fd
+        self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._listening.bind(at.socket_path)
+        self._listening.listen()
         os.write(owner_fd, b"r")  # Ready.
-        with suppress(OwnerGone):
-            clock.run(board, server)
-
-
-def _advance(board: PinBoard, now_ns: int) -> None:
-    """Advance the world to a time, and take the image that is due."""
-    for edge in board.advance(now_ns):
-        if (reader := board.reader(edge.pin)) is not None:
-            reader.add_edges([edge])
-    if board.camera is not None and now_ns >= board.camera.next_ns:
-        board.camera.take(now_ns)
-
-
-class RealTime:
-    """CLOCK_MONOTONIC; the world advances in steps of 10 ms, and for an image."""
-
-    def __init__(self) -> None:
-        self.functions = (self.wait,)
-
-    def wait(self, caller: BoardConnection, until_ns: int) -> object:
-        """Reply once the client's inputs have edges."""
-        caller.waits = caller.call_id
-        caller.wake(self.now_ns(), always=False)
-        return LATER
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return time.monotonic_ns()
 
-    def run(self, board: PinBoard, server: BoardServer) -> None:
-        """Run a board until its owner is gone."""
+    def run(self) -> None:
+        """Serve clients and advance time until an error."""
+        run_early()  # Hardware is never late because the machine is busy.
         step_ns = self.now_ns()
         while True:
-            due_ns = step_ns if board.camera is None else min(step_ns, board.camera.next_ns)
-            server.serve(max(0, due_ns - self.now_ns()) / 1e9)
+            due_ns = step_ns if self._camera is None else min(step_ns, self._camera.next_ns)
+            self._serve(max(0, due_ns - self.now_ns()) / 1e9)
             now_ns = self.now_ns()
             if now_ns >= due_ns:
-                _advance(board, now_ns)
-                for connection in server.connections.values():
+                self._advance(now_ns)
+                for connection in self._connections.values():
                     connection.wake(now_ns, always=False)
                 step_ns = now_ns + _WORLD_STEP_NS if now_ns >= step_ns else step_ns
+
+    def greet(self, caller: BoardConnection, role: Role, pid: int) -> Greeting:
+        """Introduce a client as a process with a role."""
+        caller.role, caller.pid = role, pid
+        return Greeting(self._clock, self.now_ns())
+
+    def leave(self, caller: BoardConnection) -> None:
+        """Announce that a process ends in order."""
+        caller.has_left = True
+
+    def wait(self, caller: BoardConnection, until_ns: int) -> object:
+        """Reply once the client's inputs have edges."""
+        caller.waits = caller.call_id
+        caller.wake(self.now_ns(), always=False)
+        return _LATER
+
+    def sleep(self, caller: BoardConnection, ns: int) -> object:
+        """Let a client sleep for `ns` nanoseconds of twin time, which ends with a `Slept`."""
+        raise RobotError("This board runs in real time, which cannot be advanced.")
+
+    def _serve(self, timeout_s: float | None) -> None:
+        """Wait for calls and execute them."""
+        poll = select.poll()
+        for fd in (self._listening.fileno(), self._owner_fd, *self._connections):
+            poll.register(fd, select.POLLIN)
+        ready = {fd for fd, _ in poll.poll(None if timeout_s is None else timeout_s * 1e3)}
+        if self._owner_fd in ready:
+            raise _OwnerGone
+        for connection in [one for fd, one in self._connections.items() if fd in ready]:
+            self._execute_all(connection)
+        # Last, so that the successor of a process that died follows its end.
+        if self._listening.fileno() in ready:
+            connected, _ = self._listening.accept()
+            self._connections[connected.fileno()] = BoardConnection(connected)
+
+    def _execute_all(self, connection: BoardConnection) -> None:
+        """Execute all calls that have arrived from a client."""
+        if connection.executes or connection.closed:
+            return
+        connection.executes = True
+        try:
+            while data := connection.receive():
+                self._execute(connection, _decode_call(data))
+        except msgspec.MsgspecError as error:
+            _log.warning("process %d sends a malformed request: %s", connection.pid, error)
+            data = b""
+        connection.executes = False
+        if data is not None:
+            del self._connections[connection.socket.fileno()]
+            if connection.role == "hardware":
+                connection.t = self.now_ns()
+                self._pins.free(connection, not connection.has_left)
+            connection.socket.close()
+
+    def _execute(self, connection: BoardConnection, call: Call) -> None:
+        try:
+            result = self._result(connection, call)
+        except (ShapechangerError, OSError) as refusal:  # The board runs on.
+            if call.id is None:
+                _log.warning("process %d: %s", connection.pid, refusal)
+            number = refusal.errno if isinstance(refusal, OSError) else None
+            connection.reply(call.id, error=number or str(refusal))
+        else:
+            if result is not _LATER:
+                connection.reply(call.id, result)
+
+    def _result(self, connection: BoardConnection, call: Call) -> object:
+        function = self._functions.get(call.function)
+        if function is None:
+            raise RobotError(f"The board has no function {call.function!r}.")
+        # An operator acts after everything that processes have sent until now, and the owner of a
+        # pin may have ended before another process claims it.
+        if connection.role == "operator" or call.function == "claim":
+            for other in [*self._connections.values()]:
+                if other.role == "hardware":
+                    self._execute_all(other)
+        connection.call_id = call.id
+        connection.t = self.now_ns() if self._clock == "twin" else call.t
+        return function(connection, call.arguments)
+
+    def _advance(self, now_ns: int) -> None:
+        """Advance the world to a time, and take the image that is due."""
+        for edge in self._pins.advance(now_ns):
+            if (reader := self._pins.reader(edge.pin)) is not None:
+                reader.add_edge(edge)
+        if self._camera is not None and now_ns >= self._camera.next_ns:
+            self._camera.take(now_ns)
 
 
 class _Sleeper(NamedTuple):
@@ -122,85 +229,83 @@ class _Sleeper(NamedTuple):
     call_id: int | None
 
 
-class TwinTime:
-    """Time that advances only while a client sleeps, and waits for all that take part.
+class TwinTimeBoard(Board):
+    """A board whose time advances only while a client sleeps, and waits for all that take part.
 
-    Args:
-        tick_hz: Rate of the grants of time, Hz; a client may ask for further ones in between.
+    A client takes part from its first `wait`. It is granted time at each tick of the guard, and at
+    its own `until_ns`.
     """
 
-    def __init__(self, tick_hz: float) -> None:
-        self._tick_hz = tick_hz
+    def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
+        self._tick_hz = GuardPlan.from_json(settings.plan).tick_hz
         self._now_ns = START_NS
         self._ticks = 0
         self._sleepers: list[_Sleeper] = []
         self._sleeps = 0
         self._wanted_ns: dict[BoardConnection, int] = {}  # Next grant of each that takes part.
-        self.functions = (self.sleep, self.wait)
+        super().__init__(settings, owner_fd)
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return self._now_ns
+
+    def wait(self, caller: BoardConnection, until_ns: int) -> object:
+        """Finish the grant of a client, which takes part from now on, until its next is due."""
+        self._wanted_ns[caller] = until_ns
+        caller.waits = caller.call_id
+        return _LATER
 
     def sleep(self, caller: BoardConnection, ns: int) -> object:
         """Let a client sleep for `ns` nanoseconds, which ends with a `Slept`."""
         self._sleeps += 1
         until_ns = self._now_ns + ns
         self._sleepers.append(_Sleeper(until_ns, self._sleeps, caller, caller.call_id))
-        return LATER
+        return _LATER
 
-    def wait(self, caller: BoardConnection, until_ns: int) -> object:
-        """Finish the grant of a client, which takes part from now on, until its next is due."""
-        self._wanted_ns[caller] = until_ns
-        caller.waits = caller.call_id
-        return LATER
-
-    def run(self, board: PinBoard, server: BoardServer) -> None:
-        """Run a board until its owner is gone."""
-        camera = board.camera
+    def run(self) -> None:
+        """Serve clients and advance time until an error."""
+        camera = self._camera
         while True:
             if self._sleepers:
-                server.serve(0.0)
+                self._serve(0.0)
             else:
                 found = camera is None or camera.find_reader()
-                server.serve(None if found else _LOOK_FOR_READER_S)
+                self._serve(None if found else _LOOK_FOR_READER_S)
             # Clients that are gone no longer sleep.
             self._sleepers = [one for one in self._sleepers if not one.connection.closed]
             if not self._sleepers:
                 continue
             first = min(self._sleepers)
             if first.until_ns > self._now_ns:
-                self._step(board, server, first.until_ns)
+                self._step(first.until_ns)
             if first.until_ns <= self._now_ns:
                 self._sleepers.remove(first)
                 newest_ns = None if camera is None else camera.newest_ns
                 first.connection.reply(first.call_id, Slept(self._now_ns, newest_ns))
 
-    def _step(self, board: PinBoard, server: BoardServer, end_ns: int) -> None:
+    def _step(self, end_ns: int) -> None:
         """Advance to the next time at which anything happens."""
         now_ns = self._now_ns
+        while (tick_ns := START_NS + round(self._ticks * 1e9 / self._tick_hz)) <= now_ns:
+            self._ticks += 1
         wanted = {one: ns for one, ns in self._wanted_ns.items() if not one.closed}
         self._wanted_ns = wanted
-        grant_ns = min(end_ns, self._next_tick_ns(), *(ns for ns in wanted.values() if ns > now_ns))
-        camera = board.camera
-        picture_ns = grant_ns if camera is None else max(camera.next_ns, now_ns)
+        grant_ns = min(end_ns, tick_ns, *(ns for ns in wanted.values() if ns > now_ns))
+        picture_ns = grant_ns if self._camera is None else max(self._camera.next_ns, now_ns)
         self._now_ns = min(grant_ns, picture_ns)
-        _advance(board, self._now_ns)
+        self._advance(self._now_ns)
         if self._now_ns < grant_ns:
             return
         for connection in wanted:
             connection.wake(self._now_ns, always=True)
         while any(one.waits is None and not one.closed for one in wanted):
-            server.serve(None)
-
-    def _next_tick_ns(self) -> int:
-        while (tick_ns := START_NS + round(self._ticks * 1e9 / self._tick_hz)) <= self._now_ns:
-            self._ticks += 1
-        return tick_ns
+            self._serve(None)
 
 
 if __name__ == "__main__":
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="twin: %(message)s")
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the robot, which then stops.
-    run_board(msgspec.json.decode(sys.argv[2], type=BoardSettings), int(sys.argv[1]))
+    given = msgspec.json.decode(sys.argv[2], type=BoardSettings)
+    with suppress(_OwnerGone):
+        (Board if given.clock == "real" else TwinTimeBoard)(given, int(sys.argv[1])).run()

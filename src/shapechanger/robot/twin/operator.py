@@ -95,8 +95,6 @@ class Operator:
         Raises:
             RobotError: If the board runs in real time.
         """
-        if self._client.clock == "real":
-            raise RobotError("This board runs in real time, which cannot be advanced.")
         return self._client.ask(Slept, "sleep", round(seconds * 1e9)).t
 
     @_at_board

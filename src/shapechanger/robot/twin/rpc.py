@@ -1,4 +1,4 @@
-"""Calls from processes to the board: messages, the client's end and the server.
+"""Calls from processes to the board: messages, and both ends of a connection.
 
 A client sends `Call`s and the board replies to them: one MessagePack object per datagram, over a
 Unix socket of type `SOCK_SEQPACKET`, which keeps datagrams separate and in order. Arguments are
@@ -7,26 +7,22 @@ decoded by the types of the called function. Times are nanoseconds of the run's 
 
 from __future__ import annotations
 
-import logging
 import os
 import select
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from typing import Any, Final, Literal, NamedTuple, TypeVar, get_origin, get_type_hints
+from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 import msgspec
 
-from shapechanger.errors import RobotError, ShapechangerError, translate_errors
+from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.drivers.simulation import Edge
 
 MAX_MESSAGE: Final = 64 * 1024
 """Size of the largest message in bytes."""
-
-LATER: Final = object()
-"""Result of a function that the board answers later, or never."""
 
 Role = Literal["hardware", "operator", "clock"]
 """A robot's process, a person next to the robot, or a connection that only sleeps."""
@@ -36,7 +32,6 @@ _HELD_UP_S: Final = 0.01  # Between two calls while the board does not reply.
 _PATIENCE_S: Final = 10.0  # A board that does not reply for longer is broken.
 _MAX_EDGES: Final = 500  # Kept for a client that does not wait for them, before they are merged.
 
-_log = logging.getLogger(__name__)
 _Result = TypeVar("_Result")
 
 
@@ -95,7 +90,6 @@ class Awake(NamedTuple):
 
 # The keys of a chip have their pins as integers of a class of their own, `Pin`.
 encode: Callable[[object], bytes] = msgspec.msgpack.Encoder(enc_hook=int).encode
-_decode_call: Callable[[bytes], Call] = msgspec.msgpack.Decoder(Call).decode
 _decode_reply: Callable[[bytes], Reply] = msgspec.msgpack.Decoder(Reply).decode
 
 
@@ -227,10 +221,6 @@ class BoardClient:
                 self.while_held_up()
 
 
-class OwnerGone(Exception):
-    """The process at the other end of the owner's descriptor has ended."""
-
-
 class BoardConnection:
     """The board's end of the connection to a client, which never blocks.
 
@@ -278,13 +268,13 @@ class BoardConnection:
             with suppress(OSError):  # The client is gone, which `receive` reports.
                 self.socket.send(encode(Reply(call_id, msgspec.Raw(encode(result)), error)))
 
-    def add_edges(self, edges: Iterable[Edge]) -> None:
-        """Keep edges of the client's inputs, in order of time, until it is awake.
+    def add_edge(self, edge: Edge) -> None:
+        """Keep an edge of the client's inputs, in order of time, until the client is awake.
 
         A client that does not wait for them loses edges, as in the kernel: beyond 500, only the
         last edge of each input is kept.
         """
-        self._edges += edges
+        self._edges.append(edge)
         if len(self._edges) > _MAX_EDGES:
             self._edges = sorted({edge.pin: edge for edge in self._edges}.values())
 
@@ -294,127 +284,3 @@ class BoardConnection:
             waits, edges = self.waits, self._edges
             self.waits, self._edges = None, []
             self.reply(waits, Awake(now_ns, edges))
-
-
-def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgspec.Raw], object]:
-    """Return a function that takes its caller and its encoded arguments."""
-    hints = get_type_hints(function)
-    hints.pop("return", None)
-    takes_caller = hints.pop("caller", None) is not None
-    # The function itself refuses other words than those of a `Literal`, with the nearest one.
-    kinds = [str if get_origin(hint) is Literal else hint for hint in hints.values()]
-    decode: Any = msgspec.msgpack.Decoder(tuple[*kinds]).decode
-
-    def run(caller: BoardConnection, arguments: msgspec.Raw) -> object:
-        with translate_errors(
-            msgspec.MsgspecError,
-            to=lambda error: RobotError(f"The board's {function.__name__} takes others: {error}."),
-        ):
-            given = dict(zip(hints, decode(arguments), strict=True))
-        return function(**given, **({"caller": caller} if takes_caller else {}))
-
-    return run
-
-
-class BoardServer:
-    """Accepts clients and executes their calls.
-
-    Args:
-        listening: Socket to accept them at.
-        owner_fd: Descriptor that is readable once the board's owner has ended.
-        clock: Kind of clock.
-        now_ns: Its time, ns.
-        functions: Functions that clients call by name. A parameter `caller` gets the connection.
-            They may raise a `ShapechangerError`, or an `OSError` with its `errno`.
-        ended: Called when a process of the robot has ended, with whether it died.
-
-    Attributes:
-        connections: Connected clients by descriptor, in the order in which they connected.
-    """
-
-    def __init__(
-        self,
-        listening: socket.socket,
-        owner_fd: int,
-        clock: Literal["real", "twin"],
-        now_ns: Callable[[], int],
-        functions: Iterable[Callable[..., object]],
-        ended: Callable[[BoardConnection, bool], object],
-    ) -> None:
-        self._listening = listening
-        self._owner_fd = owner_fd
-        self._clock: Literal["real", "twin"] = clock
-        self._now_ns = now_ns
-        all_functions = (*functions, self.greet, self.leave)
-        self._functions = {one.__name__: _served(one) for one in all_functions}
-        self._ended = ended
-        self.connections: dict[int, BoardConnection] = {}
-
-    def serve(self, timeout_s: float | None) -> None:
-        """Wait for calls and execute them."""
-        poll = select.poll()
-        for fd in (self._listening.fileno(), self._owner_fd, *self.connections):
-            poll.register(fd, select.POLLIN)
-        ready = {fd for fd, _ in poll.poll(None if timeout_s is None else timeout_s * 1e3)}
-        if self._owner_fd in ready:
-            raise OwnerGone
-        for connection in [one for fd, one in self.connections.items() if fd in ready]:
-            self._execute_all(connection)
-        # Last, so that the successor of a process that died follows its end.
-        if self._listening.fileno() in ready:
-            connected, _ = self._listening.accept()
-            self.connections[connected.fileno()] = BoardConnection(connected)
-
-    def greet(self, caller: BoardConnection, role: Role, pid: int) -> Greeting:
-        """Introduce a client as a process with a role."""
-        caller.role, caller.pid = role, pid
-        return Greeting(self._clock, self._now_ns())
-
-    def leave(self, caller: BoardConnection) -> None:
-        """Announce that a process ends in order."""
-        caller.has_left = True
-
-    def _execute_all(self, connection: BoardConnection) -> None:
-        """Execute all calls that have arrived from a client."""
-        if connection.executes or connection.closed:
-            return
-        connection.executes = True
-        try:
-            while data := connection.receive():
-                self._execute(connection, _decode_call(data))
-        except msgspec.MsgspecError as error:
-            _log.warning("process %d sends a malformed request: %s", connection.pid, error)
-            data = b""
-        connection.executes = False
-        if data is not None:
-            del self.connections[connection.socket.fileno()]
-            if connection.role == "hardware":
-                connection.t = self._now_ns()
-                self._ended(connection, not connection.has_left)
-            connection.socket.close()
-
-    def _execute(self, connection: BoardConnection, call: Call) -> None:
-        try:
-            result = self._result(connection, call)
-        except (ShapechangerError, OSError) as refusal:  # The board runs on.
-            if call.id is None:
-                _log.warning("process %d: %s", connection.pid, refusal)
-            number = refusal.errno if isinstance(refusal, OSError) else None
-            connection.reply(call.id, error=number or str(refusal))
-        else:
-            if result is not LATER:
-                connection.reply(call.id, result)
-
-    def _result(self, connection: BoardConnection, call: Call) -> object:
-        function = self._functions.get(call.function)
-        if function is None:
-            raise RobotError(f"The board has no function {call.function!r}.")
-        # An operator acts after everything that processes have sent until now, and the owner of a
-        # pin may have ended before another process claims it.
-        if connection.role == "operator" or call.function == "claim":
-            for other in [*self.connections.values()]:
-                if other.role == "hardware":
-                    self._execute_all(other)
-        connection.call_id = call.id
-        connection.t = self._now_ns() if self._clock == "twin" else call.t
-        return function(connection, call.arguments)
