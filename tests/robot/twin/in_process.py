@@ -35,28 +35,43 @@ from shapechanger.robot.twin.pin_board import PinBoard
 from shapechanger.robot.twin.rpc import BoardClient
 from shapechanger.robot.twin.wiring import TwinWiring
 
-_log = logging.getLogger(__name__)
-
-_SESSION: Final = 1
 # Ticks in which the guard must arm, once all speed controllers listen.
 _MAX_ARM_TICKS: Final = 10
+
+
+class _Clock(SteadyClock):
+    """Clock of a board in this process: `wait_until` of the board waits, `advance` moves it."""
+
+    def __init__(self, board: LocalBoard) -> None:
+        self._board = board
+
+    def now_ns(self) -> int:
+        return self._board.t
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        return self._board.wait_until(until_ns)
 
 
 class LocalBoard(BoardClient):
     """A board with its world in this process, whose time only `advance` moves.
 
     It is the board of the only process that uses it, and that process's clock.
+
+    Attributes:
+        t: Time, ns.
     """
 
+    clock = "twin"
+
     def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
-        self._now_ns = START_NS
+        self.t = START_NS
         self.pid = os.getpid()
-        self.pins = PinBoard(wiring, world, None, seed, lambda: self._now_ns)
+        self.pins = PinBoard(wiring, world, None, seed, lambda: self.t)
         self.levels: dict[int, int] = {}
         self.watchers: dict[int, Callable[[int, int], None]] = {}
+        self.while_held_up: Callable[[], object] = lambda: None
+        self.hardware = TwinHardware(self, _Clock(self))
         self._closed = False
-        self.clock = "twin"
-        self.hardware = TwinHardware(self, cast("SteadyClock", _Clock(self)))
 
     @property
     def closed(self) -> bool:
@@ -65,7 +80,7 @@ class LocalBoard(BoardClient):
 
     def advance(self, now_ns: int) -> None:
         """Advance time, the world and the sensors."""
-        self._now_ns = now_ns
+        self.t = now_ns
         for t, pin, level in self.pins.advance(now_ns):
             if pin in self.levels:
                 self.levels[pin] = level
@@ -78,12 +93,7 @@ class LocalBoard(BoardClient):
 
     def pass_ns(self, ns: int) -> None:
         """Advance time by some nanoseconds."""
-        self.advance(self._now_ns + ns)
-
-    @property
-    def t(self) -> int:
-        """Time of a call."""
-        return self._now_ns
+        self.advance(self.t + ns)
 
     def post(self, function: str, *arguments: Any) -> None:
         """Call a function of the board."""
@@ -100,29 +110,14 @@ class LocalBoard(BoardClient):
         self._closed = True
 
 
-class _Clock:
-    is_real = False
-
-    def __init__(self, board: LocalBoard) -> None:
-        self._board = board
-
-    def now_ns(self) -> int:
-        return self._board._now_ns
-
-    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
-        return self._board.wait_until(until_ns)
-
-    def keep_alive(self, beat: Callable[[], object]) -> None:
-        """Do nothing: a guard in this process has no supervisor."""
-
-
 class _Orders:
     """Orders of this process and the newest state of the guard; see `DaemonChannel`."""
 
+    lost = False
+
     def __init__(self) -> None:
-        self.lost = False
         self.waiting: list[Order] = []
-        self.state: GuardState | None = None
+        self.state = cast("GuardState", None)  # Until the guard's first round.
         self.refused = ""
 
     def filenos(self) -> list[int]:
@@ -150,48 +145,47 @@ class InProcessRobot:
         world: World,
         *,
         pictures: bool = True,
-        seed: int = 0,
         wired_as: GuardPlan | None = None,
     ) -> None:
-        self._profile = profile
+        self._deadline_ms = profile.limits.deadline_ms
         self._plan = profile.guard_plan()
         self._wiring = TwinWiring(self._plan if wired_as is None else wired_as)
         self._world = world
-        self._seed = seed
-        camera = profile.camera if pictures else None
-        self._camera = camera
+        self._camera = profile.camera if pictures else None
         self._tick_ns = round(1e9 / self._plan.tick_hz)
         self._period_ns = round(1e9 / profile.control_hz)
         card = card_of(profile, arming="anyone", clock="twin", pictures=pictures)
-        self.welcome = Welcome(**msgspec.structs.asdict(card), session=_SESSION)
+        self.welcome = Welcome(**msgspec.structs.asdict(card), session=1)
         self._guard: Guard | None = None
         # Numbers images through all starts.
         self._hub = SessionHub(DaemonPlan(card=card), lambda: self.now_ns, self._send)
-        self._client = Client(_SESSION)
+        self._client = Client(1)
         self._hub.lease.take(self._client)
         self._start()
 
     @property
     def now_ns(self) -> int:
         """Time of the robot in nanoseconds."""
-        return self._board.hardware.clock.now_ns()
+        return self._board.t
+
+    @property
+    def pins(self) -> PinBoard:
+        """Pins, chips and servos, since the last start."""
+        return self._board.pins
 
     def start(self, place: Callable[[], object] | None = None) -> Observation:
-        """Restart the robot, arm it, and place it at a start.
+        """Restart the robot, arm it, and return the first observation.
 
         Args:
             place: Places the vehicle, before and after it is armed; None to leave it.
-
-        Returns:
-            First observation there.
-
-        Raises:
-            RobotError: If the robot does not arm.
         """
         if place is not None:
             place()  # So that a moving vehicle does not roll on while the robot starts.
         self._start()
-        self._arm()
+        # Speed controllers must have seen neutral for long enough.
+        settings = (output.settings for output in self._plan.outputs)
+        self._advance(round(max((one.get("arm_s", 0.0) for one in settings), default=0.0) * 1e9))
+        self.arm()
         if place is not None:
             place()
             # A served robot sends its first observation after one period, too.
@@ -207,41 +201,25 @@ class InProcessRobot:
         Returns:
             The observation at the end of the period, and whether the robot bumped into something.
         """
-        bumps = self._state.bumps
+        bumps = self._orders.state.bumps
         self._seq += 1
-        ttl_ms = self._profile.limits.deadline_ms
-        command = Command(seq=self._seq, answers=0, values=tuple(values), ttl_ms=ttl_ms)
+        command = Command(seq=self._seq, answers=0, values=tuple(values), ttl_ms=self._deadline_ms)
         self._hub.command(self._client, command, self.now_ns)
         self._advance(self._period_ns)
-        return self._observe(), self._state.bumps > bumps
+        return self._observe(), self._orders.state.bumps > bumps
 
     def arm(self) -> None:
-        """Arm the robot, as a person does after a stop.
-
-        Raises:
-            RobotError: If the robot does not arm.
-        """
-        self._orders.refused = refused = ""  # An earlier refusal is about something else.
-        seen = self._state.emergencies
+        """Arm the robot, as a person does after a stop; raise RobotError if it does not arm."""
+        orders = self._orders
+        refused, orders.refused = "", ""  # An earlier refusal is about something else.
+        seen = orders.state.emergencies
         for _ in range(_MAX_ARM_TICKS):
-            now_ns = self._board.hardware.clock.now_ns()
-            self._orders.waiting.append(Order("arm", issued_ns=now_ns, emergency=seen, person=True))
+            orders.waiting.append(Order("arm", issued_ns=self.now_ns, emergency=seen, person=True))
             self._advance(self._tick_ns)
-            refused = self.refused
-            if self._state.armed and not refused:
+            refused, orders.refused = orders.refused, ""
+            if orders.state.armed and not refused:
                 return
-        raise RobotError(f"The robot does not arm: {refused or self._state.stop_reason}")
-
-    @property
-    def pins(self) -> PinBoard:
-        """Pins, chips and servos, since the last start."""
-        return self._board.pins
-
-    @property
-    def refused(self) -> str:
-        """Reason for which the guard refused the newest command; empty if it did not."""
-        refused, self._orders.refused = self._orders.refused, ""
-        return refused
+        raise RobotError(f"The robot does not arm: {refused or orders.state.stop_reason}")
 
     def close(self) -> None:
         """Bring the outputs to rest and let go of the pins."""
@@ -250,21 +228,13 @@ class InProcessRobot:
             self._board.hardware.close()
             self._guard = None
 
-    @property
-    def _state(self) -> GuardState:
-        if self._orders.state is None:
-            raise RobotError("The guard has sent no state yet.")
-        return self._orders.state
-
     def _start(self) -> None:
         self.close()
-        self._board = LocalBoard(self._wiring, self._world, self._seed)
+        self._board = LocalBoard(self._wiring, self._world)
         self._orders = _Orders()
-        self._guard = Guard(
-            self._plan, self._board.hardware, cast("DaemonChannel", self._orders), _log
-        )
-        self._seq = 0
-        self._observed = 0
+        channel = cast("DaemonChannel", self._orders)
+        self._guard = Guard(self._plan, self._board.hardware, channel, logging.getLogger(__name__))
+        self._seq = self._observed = 0
         self._advance(self._period_ns)
 
     def _send(self, order: Order) -> None:
@@ -273,31 +243,17 @@ class InProcessRobot:
 
     def _advance(self, ns: int) -> None:
         """Advance time, with a round of the guard at each of its ticks."""
-        guard, board = self._guard, self._board
-        if guard is None:
-            raise RobotError("This robot is closed.")
-        now_ns = board.hardware.clock.now_ns()
-        end_ns = now_ns + ns
-        while now_ns < end_ns:
-            now_ns = min(now_ns + self._tick_ns, end_ns)
-            board.advance(now_ns)
-            guard.round(now_ns)
-
-    def _arm(self) -> None:
-        """Arm the robot, once its speed controllers have seen neutral for long enough."""
-        settings = (output.settings for output in self._plan.outputs)
-        patience_s = max((one["arm_s"] for one in settings if "arm_s" in one), default=0.0)
-        self._advance(round(patience_s * 1e9))
-        self.arm()
+        assert self._guard is not None
+        end_ns = self.now_ns + ns
+        while self.now_ns < end_ns:
+            self._board.advance(min(self.now_ns + self._tick_ns, end_ns))
+            self._guard.round(self.now_ns)
 
     def _observe(self) -> Observation:
         self._observed += 1
-        now_ns = self._board.hardware.clock.now_ns()
         if self._camera is not None:
-            quality = self._camera.jpeg_quality
-            jpeg = simplejpeg.encode_jpeg(
-                np.ascontiguousarray(self._world.picture()), quality, "RGB", "444"
-            )
-            self._hub.on_frame(Frame(jpeg, now_ns))
-        self._hub.on_state(self._state)
+            image = np.ascontiguousarray(self._world.picture())
+            jpeg = simplejpeg.encode_jpeg(image, self._camera.jpeg_quality, "RGB", "444")
+            self._hub.on_frame(Frame(jpeg, self.now_ns))
+        self._hub.on_state(self._orders.state)
         return self._hub.observation(self._client, self._observed, self._hub.frame_seq - 1)

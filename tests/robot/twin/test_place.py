@@ -7,9 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.signals import read_ledger
@@ -100,6 +103,41 @@ def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
         assert (again.x, again.y, again.heading) == (first.x, first.y, first.heading)
         laid_out = [one.seed for one in read_ledger(board.ledger_path) if one.kind == "course"]
     assert laid_out == [5, 4]
+
+
+def test_an_operator_puts_it_back_on_a_course(tmp_path: Path) -> None:
+    """The vehicle returns to the lane near the collision, and counters keep their values."""
+    plan = load_profile(find_profile("lab-car")).guard_plan()
+    with (
+        start_board(plan, "twin", tmp_path, place=_CORRIDOR) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        hardware = connect(board.socket_path)
+        operator.lay_out(4)
+        operator.place(7)
+        motor = DigitalOutputDevice(22, initial_value=True, pin_factory=hardware.pin_factory())
+        for _ in range(200):
+            operator.advance(0.05)
+            if operator.where().truth["collisions"]:
+                break
+        hit = operator.where()
+        assert hit.truth["collisions"] == 1.0
+        operator.put_back()
+        back = operator.where()
+        assert back.speed == 0.0
+        assert not back.bumped
+        assert 0.0 < (back.x - hit.x) ** 2 + (back.y - hit.y) ** 2 < 1.5**2
+        assert back.truth["collisions"] == 1.0
+        assert back.truth["progress_m"] == pytest.approx(hit.truth["progress_m"], abs=1.5)
+        assert back.distance_m > hit.distance_m
+        motor.close()
+        hardware.close()
+    kinds = [line.kind for line in read_ledger(board.ledger_path)]
+    assert [kind for kind in kinds if kind in ("course", "place", "put_back")] == [
+        "course",
+        "place",
+        "put_back",
+    ]
 
 
 def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> None:

@@ -1,66 +1,69 @@
-"""One exam for both families of servos on a bus: the real guard and drivers on a twin."""
+"""Rig of a finger: the real guard and drivers on a twin, one exam for both families of servos."""
 
 from __future__ import annotations
 
 import contextlib
 import re
 import socket
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from shapechanger.errors import ProfileError, RobotError
-from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
+from shapechanger.errors import ProfileError, RobotError, UnknownName
+from shapechanger.finger.anatomy import JOINT_REST, JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
-from shapechanger.robot.drivers.servos.simulation import Rig
-from shapechanger.robot.guard import start
 from shapechanger.robot.guard.channel import GuardState, Order, decode_state, encode
 from shapechanger.robot.guard.outputs import Switches, make_safe
-from shapechanger.robot.guard.running import ServePlan, plan_fd
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.calibration import find_zeros
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.profile.texts import finger_text, read
 from tests.robot.twin.in_process import InProcessRobot, LocalBoard
-from tests.robot.twin.robots import until
+from tests.robot.twin.robots import guard_process, until
 
 _REST = (0.0,) * 7
 _FLEX = (0.65, 0.65, 0.2, 0.2, 0.2, 0.2, 0.2)
+_BENT = (0.65, 0.65, 0.0, 0.0, 0.0, 0.0, 0.0)
 _ALL = (1.0,) * 7
+# Torque for an ampere of an XL330-M077 on a spool of 10 mm, N.
+_N_PER_A = 0.215 / 1.47 / 0.010
 _TICK_NS = 10_000_000
 
 
 class _Bench:
     """An armed rig, whose twin may be wired with other servos."""
 
-    def __init__(self, family: str, wired_as: Profile | None = None) -> None:
-        self.family = family
-        self.profile = read(finger_text(family))
+    def __init__(self, profile: Profile, wired_as: Profile | None = None) -> None:
         plan = None if wired_as is None else wired_as.guard_plan()
-        self.robot = InProcessRobot(self.profile, FingerWorld(NOMINAL, seed=3), wired_as=plan)
+        self.world = FingerWorld(NOMINAL, seed=3)
+        self.robot = InProcessRobot(profile, self.world, wired_as=plan)
         self.names = Layout.from_json(self.robot.welcome.state_layout).names
         self.seen = self.robot.start()
-
-    @property
-    def rig(self) -> Rig:
-        return self.robot.pins.require_rig()
+        self.rig = self.robot.pins.require_rig()
 
     def drive(self, values: tuple[float, ...], steps: int) -> Observation:
         for _ in range(steps):
             self.seen, _ = self.robot.step(values)
         return self.seen
 
-    def length(self, name: str) -> float:
-        return self.seen.state[self.names.index(f"{name}/length")]
+    def state(self, name: str) -> float:
+        return self.seen.state[self.names.index(name)]
+
+    def lengths(self) -> list[float]:
+        return [self.state(f"{name}/length") for name in TENDONS]
+
+    def lengths_of_angles(self) -> NDArray[np.float64]:
+        truth = self.world.truth()
+        return -MOMENT_ARMS @ np.array([truth[f"{name}/angle"] for name in JOINTS])
 
     def pulls(self) -> list[float]:
         return [servo.pulls_a for servo in self.rig.servos.values()]
@@ -79,7 +82,15 @@ def family(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def bench(family: str) -> Iterator[_Bench]:
     """An armed rig of each family."""
-    made = _Bench(family)
+    made = _Bench(read(finger_text(family)))
+    yield made
+    made.robot.close()
+
+
+@pytest.fixture
+def tensed() -> Iterator[_Bench]:
+    """The shipped finger, which controls tensions."""
+    made = _Bench(load_profile(find_profile("finger")))
     yield made
     made.robot.close()
 
@@ -90,23 +101,23 @@ def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
     assert not any(servo.has_torque for servo in bench.rig.servos.values())
 
 
-def test_commands_move_the_finger(bench: _Bench) -> None:
+def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
     """Flexors go to their lengths, with at most their largest tension."""
     bench.drive(_FLEX, 100)
     assert bench.seen.stop_reason == ""
-    assert bench.length("FDP") < -0.008
-    assert bench.length("FDS") < -0.005
+    assert bench.state("FDP/length") < -0.008
+    assert bench.state("FDS/length") < -0.005
     assert bench.seen.action_applied == pytest.approx(_FLEX)
     friction = bench.rig.servo("FDP").motor._model.gears.friction_nm / 0.010
-    most = 15.0 if bench.family == "Dynamixel" else 25.0
+    most = 15.0 if family == "Dynamixel" else 25.0
     assert max(bench.rig.tensions().values()) < most + 2.0 * friction
 
 
-def test_rest_is_the_pretension(bench: _Bench) -> None:
+def test_rest_is_the_pretension(bench: _Bench, family: str) -> None:
     """At the command 0 each servo pulls with its pretension, to one count of its goal."""
     bench.drive(_FLEX, 25)
     bench.drive(_REST, 25)
-    pretension = 1.0 if bench.family == "Dynamixel" else 6.0
+    pretension = 1.0 if family == "Dynamixel" else 6.0
     model = bench.rig.servo("FDP").motor._model
     goals = [abs(a) * model.torque_constant / 0.010 for a in bench.pulls()]
     assert goals == pytest.approx([pretension] * 7, abs=model.ampere_per_goal * 100)
@@ -122,7 +133,7 @@ def test_an_emergency_stop_ends_without_torque(bench: _Bench) -> None:
     assert not any(servo.has_torque for servo in bench.rig.servos.values())
 
 
-def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench) -> None:
+def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench, family: str) -> None:
     """Watchdogs of Dynamixel servos stop them; Feetech servos lose their power."""
     bench.drive(_FLEX, 25)
     bench.advance_without_guard(80)
@@ -130,7 +141,7 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench) -> None:
     bench.advance_without_guard(150)
     assert bench.pulls() == [0.0] * 7
     assert max(abs(servo.motor.current) for servo in bench.rig.servos.values()) == 0.0
-    assert bench.rig.has_power == (bench.family == "Dynamixel")
+    assert bench.rig.has_power == (family == "Dynamixel")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +154,7 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench) -> None:
         ("power", "FDS .*(restarted|does not answer)"),
     ],
 )
-def test_a_failed_servo_stops_all(bench: _Bench, how: str, words: str) -> None:
+def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, words: str) -> None:
     """All servos let go, also one that hears nothing, and stay so until a person has armed."""
     bench.drive(_FLEX, 25)
     bench.rig.break_servo("FDS", how)
@@ -160,7 +171,7 @@ def test_a_failed_servo_stops_all(bench: _Bench, how: str, words: str) -> None:
         return
     bench.rig.break_servo("FDS", "")
     bench.drive(_FLEX, 20)
-    if how == "power" and bench.family == "Dynamixel":
+    if how == "power" and family == "Dynamixel":
         with pytest.raises(RobotError, match="FDS lost the power, and so the zero"):
             bench.robot.arm()
         return
@@ -205,7 +216,7 @@ def test_another_servo_than_in_the_profile_is_refused(
     """A servo with another id or of another model is named before anything moves."""
     wired = read(change(finger_text(family)))
     with pytest.raises(RobotError, match=words):
-        _Bench(family, wired)
+        _Bench(read(finger_text(family)), wired)
 
 
 def _other(match: re.Match[str]) -> str:
@@ -253,56 +264,123 @@ def test_a_feetech_rig_needs_a_power_switch() -> None:
 
 def test_feetech_servos_find_their_turns_again() -> None:
     """Their lengths are right after each start, wherever within half a turn they stood."""
-    bench = _Bench("Feetech")
+    bench = _Bench(read(finger_text("Feetech")))
     bench.drive(_FLEX, 60)
-    angles = np.array([bench.robot._world.truth()[f"{name}/angle"] for name in JOINTS])
-    expected = -MOMENT_ARMS @ angles
+    expected = bench.lengths_of_angles()
     bench.rig.set_power(on=False)
     bench.robot._advance(60 * _TICK_NS)
     bench.robot.arm()
-    bench.seen, _ = bench.robot.step(_REST)
-    got = [bench.length(name) for name in TENDONS]
-    np.testing.assert_allclose(got, expected, atol=4e-3)
-    assert min(got) < -0.008
+    bench.drive(_REST, 1)
+    np.testing.assert_allclose(bench.lengths(), expected, atol=4e-3)
+    assert min(bench.lengths()) < -0.008
     bench.robot.close()
+
+
+def test_commands_map_to_tensions(tensed: _Bench) -> None:
+    """Command 0 is the pretension and 1 the largest tension, to one count of current."""
+    tensed.drive(_REST, 5)
+    assert [one * _N_PER_A for one in tensed.pulls()] == pytest.approx([1.0] * 7, abs=0.02)
+    tensed.drive((1.0, *_REST[1:]), 15)
+    assert tensed.pulls()[0] * _N_PER_A == pytest.approx(15.0, abs=0.02)
+    assert tensed.seen.action_applied == pytest.approx((1.0, *_REST[1:]))
+    assert tensed.seen.stop_reason == ""
+
+
+def test_sensed_lengths_match_the_joint_angles() -> None:
+    """The sensors report lengths and tensions, and the same commands give the same motion."""
+    states: list[tuple[float, ...]] = []
+    for _ in range(2):
+        bench = _Bench(load_profile(find_profile("finger")))
+        states.append(bench.drive(_BENT, 50).state)
+        assert bench.world.truth()[f"{JOINTS[0]}/angle"] > JOINT_REST[0] + 0.2
+        stretch = np.array([bench.rig.tensions()[name] for name in TENDONS]) / 20e3
+        expected = bench.lengths_of_angles() - stretch
+        np.testing.assert_allclose(bench.lengths(), expected, atol=2e-4)
+        assert bench.state("FDP/tension") == pytest.approx(1.0 + 0.65 * 14.0, abs=0.1)
+        assert bench.seen.sources["FDP/length"] == "tendons"
+        bench.robot.close()
+    assert states[0] == states[1]
+
+
+def test_a_snapped_tendon_releases_all_tendons(tensed: _Bench) -> None:
+    """Tendons go to the pretension in 0.3 s, then to zero; later commands have no effect."""
+    tensed.drive(_BENT, 25)
+    assert tensed.rig.tensions()["FDP"] > 5.0
+    tensed.rig.break_servo("FDS", "snapped")
+    for _ in range(40):
+        if tensed.drive(_ALL, 1).stop_reason:
+            break
+    assert re.search("FDS .*lost its tendon", tensed.seen.stop_reason), tensed.seen.stop_reason
+    tensed.drive(_BENT, 16)
+    others = [s for s in tensed.rig.servos.values() if s is not tensed.rig.servo("FDS")]
+    assert max(abs(servo.pulls_a) for servo in others) * _N_PER_A < 1.05
+    tensed.drive(_BENT, 20)
+    assert [servo.pulls_a for servo in others] == [0.0] * 6
+    assert max(tensed.rig.tensions().values()) < 2.0
+    assert tensed.seen.stop_reason != ""
+
+
+def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
+    """Tendons go to the pretension, then to zero, and stay released until a person arms."""
+    tensed.drive(_BENT, 25)
+    magnet = tensed.robot.pins.encoder("PIP_flexion")
+    magnet.set_magnet("gone")
+    tensed.drive(_BENT, 2)
+    assert tensed.seen.stop_reason == ""  # A short loss only marks the joint absent.
+    assert tensed.seen.sources["PIP_flexion/angle"] == "absent"
+    tensed.drive(_BENT, 2)
+    assert "The encoder of PIP_flexion, on channel 2, detects no magnet." in tensed.seen.stop_reason
+    assert not tensed.seen.armed
+    tensed.drive(_BENT, 36)
+    assert tensed.pulls() == [0.0] * 7
+    magnet.set_magnet("")
+    tensed.drive(_BENT, 5)
+    assert "no magnet" in tensed.seen.stop_reason
+    tensed.robot.arm()
+    tensed.drive(_BENT, 20)
+    assert tensed.seen.stop_reason == ""
+
+
+def test_placing_the_finger_keeps_the_tendons_taut(tensed: _Bench) -> None:
+    """Placing the finger sets the tendon lengths to its pose without loading them."""
+    tensed.world.place(7)
+    assert max(tensed.rig.tensions().values()) == 0.0
+    tensed.drive(_REST, 2)
+    assert max(tensed.rig.tensions().values()) < 5.0
+    np.testing.assert_allclose(tensed.lengths(), tensed.lengths_of_angles(), atol=5e-4)
+
+
+def test_unknown_tendons_and_faults_are_refused(tensed: _Bench) -> None:
+    """The error suggests the names of the profile."""
+    with pytest.raises(UnknownName, match=r"'FDPP'. Did you mean 'FDP'"):
+        tensed.rig.break_servo("FDPP", "mute")
+    with pytest.raises(UnknownName, match="fault of a servo"):
+        tensed.rig.break_servo("FDP", "hott")
 
 
 @pytest.mark.realtime
 def test_a_killed_guard_leaves_limp_servos(family: str, tmp_path: Path) -> None:
     """The guard is killed while it pulls; a second later only friction holds the tendons."""
     plan = read(finger_text(family)).guard_plan()
-    daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    heartbeat, its_heartbeat = socket.socketpair()
-    place = finger_place(NOMINAL)
     with (
-        start_board(plan, "twin", tmp_path, place=place) as board,
+        start_board(plan, "twin", tmp_path, place=finger_place(NOMINAL)) as board,
         Operator(board.socket_path) as operator,
-        daemon,
-        heartbeat,
-        its_end,
-        its_heartbeat,
+        guard_process(plan, board) as (guard, daemon),
     ):
-        fd = plan_fd(ServePlan(guard=plan, daemon={}, hardware=board.hardware))
-        command = [sys.executable, "-I", str(start.__file__), "guard", "--plan-fd", str(fd)]
-        command += ["--daemon-fd", str(its_end.fileno())]
-        command += ["--heartbeat-fd", str(its_heartbeat.fileno())]
-        fds = (fd, its_end.fileno(), its_heartbeat.fileno())
-        with subprocess.Popen(command, pass_fds=fds) as guard:
-            daemon.setblocking(False)
-            until(lambda: operator.advance(0.01) > 0 and _states(daemon) != [])
-            now_ns = operator.advance(0.5)  # The servos start.
-            daemon.send(encode(Order("arm", session=1, issued_ns=now_ns, person=True)))
-            now_ns = operator.advance(0.05)
-            assert any(state.armed for state in _states(daemon))
-            for seq in range(1, 41):
-                order = Order("command", 1, seq, issued_ns=now_ns, ttl_ms=1000, values=_ALL)
-                daemon.send(encode(order))
-                now_ns = operator.advance(0.02)
-            pulled = operator.tensions()["FDP"]
-            guard.kill()
-            guard.wait()
-            operator.advance(1.0)
-            left = operator.tensions()
+        until(lambda: operator.advance(0.01) > 0 and _states(daemon) != [])
+        now_ns = operator.advance(0.5)  # The servos start.
+        daemon.send(encode(Order("arm", session=1, issued_ns=now_ns, person=True)))
+        now_ns = operator.advance(0.05)
+        assert any(state.armed for state in _states(daemon))
+        for seq in range(1, 41):
+            order = Order("command", 1, seq, issued_ns=now_ns, ttl_ms=1000, values=_ALL)
+            daemon.send(encode(order))
+            now_ns = operator.advance(0.02)
+        pulled = operator.tensions()["FDP"]
+        guard.kill()
+        guard.wait()
+        operator.advance(1.0)
+        left = operator.tensions()
     friction_n = 0.5 if family == "Dynamixel" else 5.2
     assert pulled > 1.6 * friction_n
     assert max(left.values()) < 1.1 * friction_n

@@ -40,49 +40,33 @@ def _run(world: DrivingWorld, outputs: dict[str, float], seconds: float) -> None
 
 
 @_EACH_VEHICLE
-def test_full_throttle_goes_along_the_heading(kind: str) -> None:
-    """Forward outputs move the vehicle along its heading without turning it."""
-    ahead, _ = _VEHICLES[kind]
+def test_ahead_is_along_the_heading_and_left_is_counter_clockwise(kind: str) -> None:
+    """Outputs ahead do not turn; mirrored outputs turn right by the same angle; negated go back."""
+    ahead, left = _VEHICLES[kind]
     world = DrivingWorld(ahead, _SIZE, seed=1)
     start = world.inputs().pose
     _run(world, ahead, 0.8)
-    end = world.inputs().pose
-    along = (end.x - start.x) * math.cos(start.heading) + (end.y - start.y) * math.sin(
-        start.heading
-    )
-    across = (end.y - start.y) * math.cos(start.heading) - (end.x - start.x) * math.sin(
-        start.heading
-    )
-    assert along > 0.1
-    assert across == pytest.approx(0.0, abs=1e-9)
+    end, travelled_m = world.inputs().pose, world.inputs().travelled_m
+    assert travelled_m > 0.1
+    assert end.x - start.x == pytest.approx(travelled_m * math.cos(start.heading))
+    assert end.y - start.y == pytest.approx(travelled_m * math.sin(start.heading))
     assert end.heading == pytest.approx(start.heading)
-    assert world.inputs().travelled_m == pytest.approx(along)
 
-
-@_EACH_VEHICLE
-def test_left_is_counter_clockwise_seen_from_above(kind: str) -> None:
-    """Steering -1 turns left; mirrored outputs turn right by the same angle."""
-    ahead, left = _VEHICLES[kind]
-    turns: list[float] = []
-    mirrored = {"steering": "steering", "rudder": "rudder"}
-    swap = {
-        part: part.replace("left", "?").replace("right", "left").replace("?", "right")
-        for part in left
+    other = {"left": "right", "right": "left"}
+    signs = {"steering": -1.0, "rudder": -1.0}
+    right = {
+        " ".join(other.get(word, word) for word in part.split()): value * signs.get(part, 1.0)
+        for part, value in left.items()
     }
-    right = {swap[part]: -value if part in mirrored else value for part, value in left.items()}
+    turns: list[float] = []
     for outputs in (left, right):
         world = DrivingWorld(ahead, _SIZE, seed=1)
-        before = world.inputs().pose.heading
         _run(world, outputs, 0.5)
-        turns.append(math.remainder(world.inputs().pose.heading - before, math.tau))
+        turns.append(math.remainder(world.inputs().pose.heading - start.heading, math.tau))
         assert world.inputs().yaw_rate * turns[-1] > 0.0
     assert turns[0] > 0.05
     assert turns[1] == pytest.approx(-turns[0])
 
-
-@_EACH_VEHICLE
-def test_negated_outputs_reverse_the_vehicle(kind: str) -> None:
-    ahead, _ = _VEHICLES[kind]
     world = DrivingWorld(ahead, _SIZE, seed=1)
     _run(world, {part: -value for part, value in ahead.items()}, 0.3)
     assert world.inputs().speed < 0.0
@@ -90,7 +74,7 @@ def test_negated_outputs_reverse_the_vehicle(kind: str) -> None:
 
 
 def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
-    """At a wall the car stops, decelerates hard, and can reverse away."""
+    """At a wall the car stops, decelerates hard, and can reverse away or be put back."""
     world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=2)
     hardest = 0.0
     for _ in range(600):
@@ -101,12 +85,16 @@ def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
     assert seen.speed == 0.0
     assert _clearance(seen.pose) == pytest.approx(RADIUS, abs=0.005)
     assert hardest < -20.0
-    travelled = seen.travelled_m
     _run(world, {"wheels": 1.0}, 1.0)
-    assert world.inputs().travelled_m == pytest.approx(travelled, abs=1e-3)
+    assert world.inputs().travelled_m == pytest.approx(seen.travelled_m, abs=1e-3)
     _run(world, {"wheels": -0.5}, 0.5)
     assert not world.inputs().bumped
-    assert world.inputs().travelled_m < travelled - 0.1
+    assert world.inputs().travelled_m < seen.travelled_m - 0.1
+    travelled_m = world.inputs().travelled_m
+    world.put_back()
+    start = DrivingWorld({"wheels", "steering"}, _SIZE, seed=2).inputs().pose
+    assert (world.inputs().pose, world.inputs().speed) == (start, 0.0)
+    assert world.inputs().travelled_m == travelled_m
 
 
 @given(seed=_SEEDS, steps=st.lists(st.tuples(_VALUES, _VALUES), min_size=1, max_size=30))
