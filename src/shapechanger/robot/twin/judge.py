@@ -16,19 +16,12 @@ from shapechanger.robot.twin.wiring import TwinWiring
 
 
 class Interval(NamedTuple):
-    """A time interval in which an output was not at rest.
-
-    Attributes:
-        output: Name of the output.
-        start_ns: Start.
-        end_ns: End; infinite if it does not end.
-        value: Value of the largest size; 0 if unknown.
-    """
+    """A time interval in which an output was not at rest."""
 
     output: str
     start_ns: float
-    end_ns: float
-    value: float
+    end_ns: float  # Infinite if it does not end.
+    value: float  # Of the largest size; 0 if unknown.
 
 
 def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:

@@ -241,11 +241,9 @@ class PinBoard:
         return self.require_rig(device).write(data, at)
 
     def free(self, caller: BoardConnection, died: bool) -> None:
-        """Free the pins of a process that has ended; outputs keep their level of that moment.
+        """Free the pins of a process that has ended, or `died` without closing them.
 
-        Args:
-            caller: The process.
-            died: Whether it ended without closing its pins.
+        Outputs keep their level of that moment.
         """
         if died:
             self.record("gone", t=caller.t, pid=caller.pid)

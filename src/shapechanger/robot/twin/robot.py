@@ -110,7 +110,7 @@ class RunningRobot:
         path = self.folder / "log.txt"
         return path.read_text(errors="replace") if path.exists() else ""
 
-    def await_restart(self, timeout_s: float = _READY_S) -> dict[str, Any]:
+    def await_restart(self) -> dict[str, Any]:
         """Wait until the daemon can be reached, also after a restart.
 
         Returns:
@@ -120,7 +120,7 @@ class RunningRobot:
             RobotError: If it does not start in time.
         """
         path = self.folder / _READY
-        until_s = time.monotonic() + timeout_s
+        until_s = time.monotonic() + _READY_S
         while not path.exists():
             if self.supervisor.poll() is not None or time.monotonic() > until_s:
                 self._end()

@@ -36,13 +36,10 @@ _Result = TypeVar("_Result")
 
 
 class Call(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A call of a function of the board.
+    """A call of a function of the board, with encoded arguments.
 
-    Attributes:
-        function: Its name.
-        arguments: Its encoded arguments.
-        id: Id of the `Reply`; None if the client waits for none, and the board only logs failures.
-        t: Time of the call, ns; a board with a twin's clock uses its own.
+    Without an `id` the client waits for no `Reply`, and the board only logs failures. A board with
+    a twin's clock uses its own time, not `t`, the time of the call in nanoseconds.
     """
 
     function: str
@@ -130,15 +127,14 @@ class BoardClient:
         self.levels: dict[int, int] = {}
         self.watchers: dict[int, Callable[[int, int], None]] = {}
         self.while_held_up: Callable[[], object] = lambda: None
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ExitStack() as undo:
-            self._socket = undo.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
-            with translate_errors(
-                OSError,
-                to=lambda error: RobotError(
-                    f"No twin's board answers at {path}: {error.strerror}."
-                ),
-            ):
+            undo.callback(self._socket.close)
+            try:
                 self._socket.connect(path)
+            except OSError as error:
+                words = f"No twin's board answers at {path}: {error.strerror}."
+                raise RobotError(words) from error
             self._socket.settimeout(_HELD_UP_S)
             self.clock, self.now_ns = self.ask(Greeting, "greet", role, os.getpid())
             undo.pop_all()
@@ -225,27 +221,18 @@ class BoardConnection:
     """The board's end of the connection to a client, which never blocks.
 
     Two connections of one process are two callers.
-
-    Attributes:
-        socket: Its socket.
-        role: Kind of client.
-        pid: Process at the other end.
-        call_id: Id of the call that is executed; None if it waits for no reply.
-        t: Time of that call, ns.
-        waits: Id of its "wait" without a reply; None if it works.
-        executes: Whether its calls are being executed.
-        has_left: Whether it ends in order.
     """
 
     def __init__(self, connected: socket.socket) -> None:
         connected.setblocking(False)
         self.socket = connected
         self.role: Role = "clock"
-        self.pid = 0
-        self.call_id: int | None = None
-        self.t = 0
-        self.waits: int | None = None
-        self.executes = self.has_left = False
+        self.pid = 0  # Process at the other end.
+        self.call_id: int | None = None  # Of the call that is executed, if it waits for a reply.
+        self.t = 0  # Time of that call, ns.
+        self.waits: int | None = None  # Id of its "wait" without a reply; None if it works.
+        self.executes = False  # Whether its calls are being executed.
+        self.has_left = False  # Whether it ends in order.
         self._edges: list[Edge] = []
 
     @property

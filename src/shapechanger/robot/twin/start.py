@@ -49,7 +49,7 @@ def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, 
     Args:
         place: The place.
         parts: Parts that the robot's outputs move.
-        camera: Camera of the profile, as which the world is shown; None without one.
+        camera: Camera of the profile; None without one.
         seed: Seed of the surroundings and of the start.
 
     Raises:

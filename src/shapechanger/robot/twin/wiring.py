@@ -85,5 +85,4 @@ class TwinWiring:
         return OUTPUTS[plan.driver].wire(plan, rest, self._duty)
 
     def _duty(self, levels: Levels, pin: int) -> float:
-        duty = levels.duties.get(pin)
-        return float(self.idle_level(pin)) if duty is None else duty
+        return levels.duties.get(pin, float(self.idle_level(pin)))
