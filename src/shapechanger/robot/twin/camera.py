@@ -31,24 +31,19 @@ class FrontCameraPipe:
     """Takes images and writes them into a FIFO, without ever waiting for its reader.
 
     Attributes:
-        path: Path of the FIFO.
-        plan: The camera.
-        world: World to take images of.
-        start_ns: Time of the first image.
-        latest_only: Whether to drop an image while the one before is unread. Otherwise images
-            are dropped only if the pipe is full or has no reader.
-        barcode: Whether the first rows of an image show its capture time.
         next_ns: Time of the next image.
         newest_ns: Capture time of the newest image that was written; None before.
     """
 
-    path: Path
+    path: Path  # Of the FIFO.
     plan: CameraPlan
     world: World
-    start_ns: int
+    start_ns: int  # Time of the first image.
     _: KW_ONLY
+    # Whether to drop an image while the one before is unread. Otherwise images are dropped only if
+    # the pipe is full or has no reader.
     latest_only: bool
-    barcode: bool = True
+    barcode: bool = True  # Whether the first rows of an image show its capture time.
 
     def __post_init__(self) -> None:
         self.next_ns = self.start_ns

@@ -57,11 +57,9 @@ class PinBoard:
         wiring: What is attached; it gives undriven pins their level.
         ledger: File for the changes of outputs, unbuffered; None to keep none.
         seed: Seed of the phase of software PWM.
+        clock: Returns the time, ns.
 
     Attributes:
-        clock: Returns the time, ns.
-        world: World of the robot.
-        camera: Front camera; None without one.
         levels: State of all outputs.
         stop_held: Whether the stop button is pressed; its level follows at the next `advance`.
         dead_chips: Bus and address of the chips that do not answer.
@@ -175,8 +173,8 @@ class PinBoard:
         They raise RobotError if another process holds the pin, or this one has not claimed it, and
         OSError with the `errno` of the kernel's driver if no chip answers.
         """
-        pins = (self.claim, self.drive, self.pulse)
-        return (*pins, self.read_chip, self.write_chip, self.read_servos, self.write_servos)
+        chips = (self.read_chip, self.write_chip, self.read_servos, self.write_servos)
+        return (self.claim, self.drive, self.pulse, *chips)
 
     def claim(
         self,

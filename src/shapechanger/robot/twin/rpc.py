@@ -87,7 +87,6 @@ class Awake(NamedTuple):
 
 # The keys of a chip have their pins as integers of a class of their own, `Pin`.
 encode: Callable[[object], bytes] = msgspec.msgpack.Encoder(enc_hook=int).encode
-_decode_reply: Callable[[bytes], Reply] = msgspec.msgpack.Decoder(Reply).decode
 
 
 def encode_call(function: str, *arguments: object, id: int | None = None) -> bytes:
@@ -99,7 +98,7 @@ def decode_reply(data: bytes) -> Reply:
     """Return a reply; raise RobotError for the end of a connection."""
     if not data:
         raise RobotError(_GONE)
-    return _decode_reply(data)
+    return msgspec.msgpack.decode(data, type=Reply)
 
 
 def board_gone(_: OSError) -> RobotError:
