@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
+from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan, driven_pins
 from shapechanger.errors import RobotError
-from shapechanger.robot.check.report import Finding, judged
+from shapechanger.robot.check.report import Finding
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS, device_errors
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
-from shapechanger.robot.guard.outputs import enable_device
+from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.setup.install import needs_pins
 
@@ -32,15 +32,13 @@ def require_pins(plan: GuardPlan) -> None:
 
 def _pins_of(plan: GuardPlan) -> dict[int, str]:
     """Return the robot's pins and their uses."""
-    pulsed = [output for output in plan.outputs if "over" in output.settings]
-    chips = [
-        *((output, OUTPUTS[output.driver]) for output in plan.outputs),
-        *((output, PULSES[output.settings["over"]]) for output in pulsed),
-        *((sensor, SENSORS[sensor.driver]) for sensor in plan.sensors),
-    ]
     used: dict[int, str] = {}
-    for device, chip in chips:
-        used |= {pin: device.name for _, pin in chip.keys.of(device.settings).connected()}
+    for device in (*plan.outputs, *plan.sensors):
+        keys = [(SENSORS if isinstance(device, SensorPlan) else OUTPUTS)[device.driver].keys]
+        if "over" in device.settings:
+            keys.append(PULSES[device.settings["over"]].keys)
+        for kind in keys:
+            used |= {pin: device.name for _, pin in kind.of(device.settings).connected()}
     if plan.stop_pin is not None:
         used[plan.stop_pin] = "the emergency button"
     return used | driven_pins(plan)
@@ -63,12 +61,7 @@ def _require_free_pin(pin: int, plan: GuardPlan) -> None:
 
 
 def probed_pin(plan: GuardPlan, probe: int) -> int:
-    """Return the pin that a probe has to be joined to, at the motor that drives forward.
-
-    Args:
-        plan: The robot.
-        probe: BCM pin of the probe.
-    """
+    """Return the BCM pin that a probe has to be joined to, at the motor that drives forward."""
     _require_free_pin(probe, plan)
     for output in plan.outputs:
         weight = output.mix.get("throttle", 0.0)
@@ -80,15 +73,12 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
 
 
 def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:
-    """Toggle an output and check the input that is wired to it.
+    """Toggle a pin and check the one that is wired to it, and return a sentence about the result.
 
     Args:
         output: BCM pin to drive, unused by the robot.
         sensed: BCM pin to read, unused by the robot.
         plan: The robot.
-
-    Returns:
-        Description of the result.
     """
     from gpiozero import DigitalInputDevice, DigitalOutputDevice
 
@@ -157,19 +147,18 @@ def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
     """Return the LEDs of a bench, in the order of the outputs."""
     found: list[BenchLamp] = []
     for output in plan.outputs:
-        name, settings = output.name, output.settings
+        name, settings, lights = output.name, output.settings, OUTPUTS[output.driver].lights
         if "channel" in settings:
             place = f"channel {settings['channel']} of the {settings['over']}"
             found.append(BenchLamp(f"{name}, dimly", place, output, 1.0, None))
-        elif lights := OUTPUTS[output.driver].lights:
-            for key, words, value in lights:
-                if (pin := settings[key]) >= 0:
-                    found.append(BenchLamp(name + words, f"GPIO{pin}", output, value, pin))
-        else:
+        elif not lights:
             raise RobotError(
                 f"Output {name} is a servo on a bus ({output.driver}), and an LED cannot stand for "
                 "it: take a robot whose outputs are on pins, such as `init car`."
             )
+        else:
+            pins = [(settings[key], name + end, value) for key, end, value in lights]
+            found += [BenchLamp(n, f"GPIO{p}", output, v, p) for p, n, v in pins if p >= 0]
     if (pin := plan.enable_pin) is not None:
         found.append(BenchLamp("enable line", f"GPIO{pin}", None, 1.0, pin))
     return found
@@ -195,7 +184,7 @@ def check_lamps(
         check = f"LED {lamp.place}"
         try:
             # Opened afresh, because a closed output stays claimed.
-            with closing(connect_pins()) as hardware, _lit(lamp, hardware):
+            with closing(connect_pins()) as hardware, _lit(lamp, plan, hardware):
                 answer = ask(f"Is the LED on {lamp.place} lit ({lamp.name})?")
                 if answer is None:
                     time.sleep(shown_s)
@@ -206,23 +195,19 @@ def check_lamps(
         seen = {True: "lit", False: "NOT lit", None: "not asked"}[answer]
         if measured is not None:
             seen += f", measured as {'lit' if measured else 'NOT lit'}"
-        level, sentence = judged(False not in (answer, measured), f"{lamp.name}: {seen}.")
-        unknown = answer is None and measured is None
-        yield Finding(check, "unknown" if unknown else level, sentence)
+        known = {answer, measured} - {None}
+        level = "unknown" if not known else "good" if all(known) else "bad"
+        yield Finding(check, level, f"{lamp.name}: {seen}.")
 
 
 @contextmanager
-def _lit(lamp: BenchLamp, hardware: Hardware) -> Generator[None]:
-    """Light one LED, through the driver of its output, and put it out at the end."""
-    with ExitStack() as opened:
-        if lamp.output is None:
-            device = opened.enter_context(closing(enable_device(lamp.pin or 0, hardware)))
-            opened.callback(device.off)
-            device.on()
-        else:
-            driver = opened.enter_context(
-                closing(OUTPUTS[lamp.output.driver].open(lamp.output, hardware))
-            )
-            opened.callback(lambda: driver.write(0.0, hardware.clock.now_ns()))
+def _lit(lamp: BenchLamp, plan: GuardPlan, hardware: Hardware) -> Generator[None]:
+    """Light one LED, through the driver of its output, which puts it out when it is closed."""
+    if lamp.output is None:
+        with closing(Switches(plan, hardware)) as switches:
+            switches.toggle()  # From low to high.
+            yield
+    else:
+        with closing(OUTPUTS[lamp.output.driver].open(lamp.output, hardware)) as driver:
             driver.write(lamp.value, hardware.clock.now_ns())
-        yield
+            yield

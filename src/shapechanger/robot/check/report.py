@@ -21,11 +21,15 @@ from typing import Final, Literal, NamedTuple
 from shapechanger.errors import OutputError, ShapechangerError, translate_errors
 from shapechanger.files import cannot_write
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.setup.install import Machine
 
 Level = Literal["good", "bad", "unknown"]
 
-Results = Iterable[tuple[Level, str]]
-"""A check: its results, each a level and a sentence, which are found when they are asked for."""
+Result = tuple[Level, str]
+"""A level and a sentence."""
+
+Results = Iterable[Result]
+"""A check: its results, which are found when they are asked for."""
 
 Checks = Iterable[tuple[str, Results]]
 """Checks with their names; each begins when the one before has ended."""
@@ -42,7 +46,7 @@ class Finding(NamedTuple):
     sentence: str
 
 
-def judged(good: bool, sentence: str, otherwise: str = "") -> tuple[Level, str]:
+def judged(good: bool, sentence: str, otherwise: str = "") -> Result:
     """Return a good result, or a bad one with another sentence if there is one."""
     return ("good", sentence) if good else ("bad", otherwise or sentence)
 
@@ -60,8 +64,7 @@ def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding
             late = f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires "
             late += "and supply, restart the computer, and check again."
             results = finish_in_time(results, limit_s, late)
-        for level, sentence in results:
-            yield Finding(name, level, sentence)
+        yield from (Finding(name, *result) for result in results)
 
 
 def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
@@ -74,7 +77,7 @@ def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
         limit_s: Time for all of it, s.
         late: Sentence if it is late.
     """
-    found: SimpleQueue[tuple[Level, str] | None] = SimpleQueue()
+    found: SimpleQueue[Result | None] = SimpleQueue()
 
     def run() -> None:
         try:
@@ -95,26 +98,19 @@ def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
         yield "bad", late
 
 
-_PACKAGES: Final = ("shapechanger", "gpiozero", "lgpio", "smbus2", "picamera2")
-
-
 def facts(profile: Profile, *, twin: bool, root: Path = Path("/")) -> list[str]:
     """Return the lines of a report that describe the machine and the robot."""
-
-    def text(name: str) -> str:
-        path = root / name
-        return path.read_text(errors="replace").strip("\0\n ") if path.exists() else ""
-
-    system = re.search(r'^PRETTY_NAME="?([^"\n]*)', text("etc/os-release"), re.MULTILINE)
+    system = platform.system()
+    with suppress(OSError):
+        system = platform.freedesktop_os_release()["PRETTY_NAME"]
     lines = [
         f"date         {datetime.datetime.now(datetime.UTC):%Y-%m-%d}",
         f"on           {'a twin' if twin else 'hardware'}",
-        f"board        {text('proc/device-tree/model') or 'no Raspberry Pi'}",
-        f"system       {system[1] if system else platform.system()}, Linux {platform.release()}, "
-        f"{platform.machine()}",
+        f"board        {Machine(root=root).model or 'no Raspberry Pi'}",
+        f"system       {system}, Linux {platform.release()}, {platform.machine()}",
         f"python       {platform.python_version()}",
     ]
-    for package in _PACKAGES:
+    for package in ("shapechanger", "gpiozero", "lgpio", "smbus2", "picamera2"):
         with suppress(PackageNotFoundError):
             lines.append(f"{package:12} {version(package)}")
     return [*lines, f"body         {profile.body}, {profile.control_hz:g} Hz"]
@@ -153,12 +149,11 @@ def write_report(
         path = next(one for one in chain([path], names) if not one.exists())
 
     def write(text: str) -> None:
-        if path is None:
-            return
-        with translate_errors(OSError, to=partial(cannot_write, path)):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("a", encoding="utf-8") as file:
-                file.write(f"{text}\n")
+        if path is not None:
+            with translate_errors(OSError, to=partial(cannot_write, path)):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with path.open("a", encoding="utf-8") as file:
+                    print(text, file=file)
 
     def tell(line: str) -> None:
         write(anonymous(line))

@@ -24,7 +24,7 @@ from shapechanger.robot.check.pins import outside_level, pin_level
 from shapechanger.robot.check.report import (
     Checks,
     Finding,
-    Level,
+    Result,
     Results,
     finish_in_time,
     judged,
@@ -39,7 +39,7 @@ from shapechanger.robot.hardware import Hardware
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.install import (
     FAST_HZ,
-    BootConfig,
+    Machine,
     device_groups,
     servo_devices,
     unit_name,
@@ -117,29 +117,46 @@ def examine(robot: StandingRobot) -> Iterator[Finding]:
 
 def _checks(robot: StandingRobot) -> Checks:
     if not robot.on_twin:
-        yield from _computer_checks(robot)
+        if robot.installed:
+            yield from _installation(robot)
+        yield from _computer(robot)
     # The guard of a served robot has its pins and buses.
     if not robot.port_error and importlib.util.find_spec("gpiozero") is not None:
-        yield from _wiring_checks(robot)
+        yield from _wiring(robot)
     yield "wiring", _close(robot)
     if robot.installed and not robot.on_twin:
         otherwise = f"Port {robot.port} cannot be used ({robot.port_error}). Is the robot served?"
         yield "port", [judged(not robot.port_error, f"Port {robot.port} is free.", otherwise)]
 
 
-def _computer_checks(robot: StandingRobot) -> Checks:
+def _installation(robot: StandingRobot) -> Checks:
     profile = robot.profile
-    if robot.installed:
-        yield "profile", [("good", f"{profile.path} is valid.")]
-        yield "credentials", _credentials(robot)
-        if profile.calibrated is None:
-            remedy = f"Never calibrated: shapechanger robot calibrate {profile.path}"
-            yield "calibration", [("unknown", remedy)]
-        yield "systemd", _unit(robot)
-    yield "computer", _computer(robot)
-    yield "strict_gpiod", _strict_gpiod(BootConfig(robot.root))
+    yield "profile", [("good", f"{profile.path} is valid.")]
+    yield "credentials", _credentials(robot)
+    if profile.calibrated is None:
+        remedy = f"Never calibrated: shapechanger robot calibrate {profile.path}"
+        yield "calibration", [("unknown", remedy)]
+    yield "systemd", _unit(robot)
+
+
+def _computer(robot: StandingRobot) -> Checks:
+    profile, machine = robot.profile, Machine(root=robot.root)
+    model = ("good", f"{machine.model}.")
+    other = "This is not a Raspberry Pi: `serve --twin` runs on simulated pins here."
+    yield "computer", [model if machine.model else ("unknown", other)]
+
+    def setting(parameter: str, is_set: bool, good: str, bad: str) -> Result:
+        if machine.config is None:
+            return "unknown", f"This machine has no config.txt, which sets {parameter} on a Pi."
+        remedy = f"add `dtparam={parameter}` to {machine.config} and restart the computer"
+        return judged(is_set, f"{machine.config} sets it: {good}.", f"{bad}: {remedy}.")
+
+    good = "the pins of a process that dies go low"
+    bad = "A pin keeps its level when the process that set it dies"
+    is_strict = machine.sets("strict_gpiod")
+    yield "strict_gpiod", [setting("strict_gpiod", is_strict, good, bad)]
     yield "enable line", [_enable_line(profile)]
-    if any(board["output_enable"] == -1 for board in _boards(profile)):
+    if any(settings["output_enable"] == -1 for settings in _boards(profile)):
         reason = "A PCA9685 without output_enable keeps its last pulse: wire OE to a pin with "
         yield "output enable", [("bad", reason + "a pull-up and name it as output_enable.")]
     yield "latency timer", _latency_timers(robot)
@@ -149,10 +166,12 @@ def _computer_checks(robot: StandingRobot) -> Checks:
         yield "camera", _camera(camera)
         yield "camera's geometry", [_geometry(camera)]
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        yield "I2C speed", _bus_speed(BootConfig(robot.root))
+        good, is_fast = f"{machine.i2c_hz()} bits per second", machine.i2c_hz() >= FAST_HZ
+        bad = "Four encoders take 3 of every 10 ms at the default of 100000 bits per second"
+        yield "I2C speed", [setting(f"i2c_arm_baudrate={FAST_HZ}", is_fast, good, bad)]
 
 
-def _wiring_checks(robot: StandingRobot) -> Checks:
+def _wiring(robot: StandingRobot) -> Checks:
     profile = robot.profile
     if driven_pins(profile) or _servo_enables(profile):
         yield "resistors", _resistors(robot)
@@ -161,15 +180,13 @@ def _wiring_checks(robot: StandingRobot) -> Checks:
     for bus, address in sorted({(one["bus"], one["address"]) for one in _boards(profile)}):
         if robot.has_bus(bus):
             yield "servo board", _servo_board(robot, bus, address)
-    encoders: list[SensorPlan] = []
-    for plan in filter(robot.can_read, profile.sensors):
-        if plan.driver == "as5600":
-            encoders.append(plan)
-        elif plan.driver != DRIVER:  # The servos are checked themselves.
+    sensors = list(filter(robot.can_read, profile.sensors))
+    for plan in sensors:
+        if plan.driver not in {"as5600", DRIVER}:  # The servos are checked themselves.
             yield "sensor", (_speed_pins if plan.measures == "speed" else _sensor)(robot, plan)
     if any(output.driver == DRIVER for output in profile.outputs):
         yield "servo bus", _servo_bus(robot)
-    for plan in encoders:
+    for plan in (one for one in sensors if one.driver == "as5600"):
         for joint in plan.settings["rows"]:
             yield "encoders", _encoder(robot, plan, joint)
 
@@ -179,36 +196,13 @@ def _credentials(robot: StandingRobot) -> Results:
     yield "good", f"Key and certificate: {folder.key_file.parent}."
 
 
-def _computer(robot: StandingRobot) -> Results:
-    path = robot.root / "proc/device-tree/model"
-    if path.exists():
-        yield "good", path.read_text().strip("\0\n ") + "."
-    else:
-        yield "unknown", "This is not a Raspberry Pi: `serve --twin` runs on simulated pins here."
-
-
-def _strict_gpiod(config: BootConfig) -> Results:
-    if config.path is None:
-        yield "unknown", "This machine has no Raspberry Pi config.txt."
-    else:
-        yield judged(
-            config.sets("strict_gpiod"),
-            f"{config.path} sets it: the pins of a process that dies go low.",
-            "A pin keeps its level when the process that set it dies: add "
-            f"`dtparam=strict_gpiod` to {config.path} and restart the computer.",
-        )
-
-
 def _unit(robot: StandingRobot) -> Results:
     profile = robot.profile.path.absolute()
     path = robot.root / "etc/systemd/system" / unit_name(robot.profile.name)
     remedy = f"`shapechanger robot install {profile}` puts it there"
     if not path.exists():
-        yield (
-            "bad",
-            f"{path} does not exist, so after a crash nothing restarts the robot or makes its pins "
-            f"safe: {remedy}.",
-        )
+        reason = "so after a crash nothing restarts the robot or makes its pins safe"
+        yield "bad", f"{path} does not exist, {reason}: {remedy}."
         return
     text, word = path.read_text(), unit_word(str(profile))
     needed = ["Restart=always", f"ExecStart=…robot serve {word}"]
@@ -222,7 +216,7 @@ def _unit(robot: StandingRobot) -> Results:
     )
 
 
-def _enable_line(guard: GuardPlan) -> tuple[Level, str]:
+def _enable_line(guard: GuardPlan) -> Result:
     if all(map(stops_itself, guard.outputs)):
         return "good", "Each servo has its own watchdog, and releases when its bus is silent."
     return judged(
@@ -251,25 +245,23 @@ def _latency_timers(robot: StandingRobot) -> Results:
         )
 
 
+# Remedies for device files that do not exist, by their group.
 _WITHOUT_DEVICE: Final = {
     "gpio": "only a computer with GPIO pins, such as a Raspberry Pi, drives this robot",
     "i2c": "switch the bus on with `sudo raspi-config` (Interface Options), and restart",
     "dialout": "plug in the adapter of the servo bus",
 }
-"""Remedies for device files that do not exist, by their group."""
 
 
 def _devices(robot: StandingRobot) -> Results:
-    """Check that this user can open the device files."""
     for name, group in device_groups(robot.profile).items():
         path = robot.root / name.lstrip("/")
         if not path.exists():
             yield "bad", f"{path} does not exist: {_WITHOUT_DEVICE[group]}."
             continue
         remedy = f"`sudo adduser $USER {group}` and log in again"
-        can_open = os.access(path, os.R_OK | os.W_OK)
         otherwise = f"This user may not open {path}: {remedy}."
-        yield judged(can_open, f"{path} can be opened.", otherwise)
+        yield judged(os.access(path, os.R_OK | os.W_OK), f"{path} can be opened.", otherwise)
 
 
 def _packages(profile: Profile) -> Results:
@@ -298,8 +290,7 @@ def _camera(plan: CameraPlan) -> Results:
         yield from finish_in_time(frame(), _CAMERA_S, late)
 
 
-def _geometry(plan: CameraPlan) -> tuple[Level, str]:
-    """Judge whether policies that drive by waypoints can use the camera."""
+def _geometry(plan: CameraPlan) -> Result:
     if plan.pitch_deg is None or plan.fovy_deg is None:
         reason = "pitch_deg and fovy_deg are not stated, which policies with waypoints need: "
         return "unknown", reason + "`shapechanger robot camera` measures them."
@@ -307,24 +298,10 @@ def _geometry(plan: CameraPlan) -> tuple[Level, str]:
     return "good", view + "top to bottom; `shapechanger robot camera` draws it."
 
 
-def _bus_speed(config: BootConfig) -> Results:
-    """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
-    if config.path is None:
-        yield "unknown", f"The bus should have {FAST_HZ} bits per second; it cannot be read here."
-        return
-    yield judged(
-        config.i2c_hz() >= FAST_HZ,
-        f"{config.path} sets {config.i2c_hz()} bits per second.",
-        f"Four encoders take 3 of every 10 ms at the default of 100000 bits per second: add "
-        f"`dtparam=i2c_arm_baudrate={FAST_HZ}` to {config.path} and restart the computer.",
-    )
-
-
 def _close(robot: StandingRobot) -> Results:
     """Close the pins and buses, which may hang."""
     if robot.port_error:
-        reason = "The robot may be served now, so its pins and buses were left alone."
-        yield "unknown", reason
+        yield "unknown", "The robot may be served now, so its pins and buses were left alone."
     if "pins" in vars(robot):
         robot.pins.close()
 
@@ -341,7 +318,6 @@ def _boards(guard: GuardPlan) -> list[dict[str, Any]]:
 
 
 def _servo_enables(guard: GuardPlan) -> list[int]:
-    """Return the pins at OE of servo boards."""
     return sorted({one["output_enable"] for one in _boards(guard)} - {-1})
 
 
@@ -356,24 +332,18 @@ def _resistors(robot: StandingRobot) -> Results:
         lacks = "take the motors' supply off, and add --motors-off"
         yield "unknown", f"Not tested: {lacks if robot.has_pins else 'this computer has no pins'}."
         return
-    may_run = "it may run while no program holds the pin"
-    pulses = "the board sends pulses while no program holds it"
-    down = ("low", "high", "pull-down", "ground", may_run)
-    up = ("high", "low", "pull-up", "3.3 V", pulses)
-    pins = [(pin, use, down) for pin, use in driven_pins(robot.profile).items()]
-    pins += [(pin, "OE of the servo board", up) for pin in _servo_enables(robot.profile)]
-    for pin, use, (wanted, wrong, pull, place, reason) in pins:
-        level = {0: "low", 1: "high", None: ""}[outside_level(pin, robot.pins)]
-        problem = f"is held {wrong}" if level else f"has no {pull}"
-        yield judged(
-            level == wanted,
-            f"GPIO{pin}, {use}, is pulled {'down' if wanted == 'low' else 'up'}.",
-            f"GPIO{pin}, {use}, {problem}: fit 10 kOhm to {place}, because {reason}.",
-        )
+    down = ("down", "high", "ground, because it may run while no program holds the pin")
+    up = ("up", "low", "3.3 V, because the board sends pulses while no program holds it")
+    pins = [(pin, use, 0, *down) for pin, use in driven_pins(robot.profile).items()]
+    pins += [(pin, "OE of the servo board", 1, *up) for pin in _servo_enables(robot.profile)]
+    for pin, use, rest, pull, wrong, remedy in pins:
+        level = outside_level(pin, robot.pins)
+        problem = f"has no pull-{pull}" if level is None else f"is held {wrong}"
+        good = f"GPIO{pin}, {use}, is pulled {pull}."
+        yield judged(level == rest, good, f"GPIO{pin}, {use}, {problem}: fit 10 kOhm to {remedy}.")
 
 
 def _button(robot: StandingRobot, pin: int) -> Results:
-    """Check that the emergency button is released."""
     yield judged(
         bool(pin_level(pin, robot.pins, pull_up=True)),
         f"GPIO{pin} is high: released, or not fitted. Hold it down and check again to tell.",
@@ -393,7 +363,6 @@ def _speed_pins(robot: StandingRobot, plan: SensorPlan) -> Results:
 
 
 def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
-    """Read a sensor once, by its own driver, and judge its reading."""
     clock = robot.pins.clock
     with closing(SENSORS[plan.driver].open(plan, robot.pins)) as sensor:
         reading: dict[str, float] = {}
@@ -444,15 +413,11 @@ def _servo_bus(robot: StandingRobot) -> Results:
 
 
 def _encoder(robot: StandingRobot, plan: SensorPlan, joint: str) -> Results:
-    """Check the magnet of the encoder at a joint."""
     with closing(As5600(plan, robot.pins)) as sensor:
         _, magnet = sensor.measure(joint)
     if magnet == "gone":
         yield "bad", f"The encoder of {joint} detects no magnet: fit one above the chip."
         return
     where = "far from" if magnet == "weak" else "near to"
-    yield judged(
-        not magnet,
-        f"The encoder of {joint} detects its magnet.",
-        f"The magnet of {joint} is too {where} its encoder.",
-    )
+    otherwise = f"The magnet of {joint} is too {where} its encoder."
+    yield judged(not magnet, f"The encoder of {joint} detects its magnet.", otherwise)

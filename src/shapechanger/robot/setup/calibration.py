@@ -40,11 +40,9 @@ def reading(output: OutputPlan, value: float) -> str:
 
 
 def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
-    """Return the changes for a jogged output, whole microseconds by dotted name.
+    """Return the changes for an output that was jogged, whole microseconds by dotted name.
 
-    Args:
-        output: The output, with the settings for jogging.
-        found: Values of its low end, middle and high end, -1 to 1.
+    `found` has the values of its low end, middle and high end, -1 to 1.
     """
     jogged = pulsed_keys(output)
     widths = [round(jogged.width_us(value)) for value in found]
@@ -61,10 +59,7 @@ def motor_changes(
 ) -> dict[str, Any]:
     """Return the changes for a motor, by dotted name.
 
-    Args:
-        output: The motor.
-        went: Direction in which it turned at a forward command.
-        starts_at: Duty at which it began to turn, 0 to 1.
+    At a forward command it turned in the direction `went`, from a duty of `starts_at`, 0 to 1.
     """
     full: float = output.settings["full"]
     if not 0.0 <= starts_at < full:
@@ -72,20 +67,15 @@ def motor_changes(
             f"{output.name} must start at a duty from 0 to below its full duty of {full:g}, got "
             f"{starts_at:g}."
         )
-    changes: dict[str, Any] = {f"output.{output.name}.start": round(starts_at, 2)}
-    if went == "backward":
-        mix = {action: -weight for action, weight in output.mix.items()}
-        changes[f"output.{output.name}.mix"] = mix
-    return changes
+    start: dict[str, Any] = {f"output.{output.name}.start": round(starts_at, 2)}
+    mix = {action: -weight for action, weight in output.mix.items()}
+    return start if went == "forward" else start | {f"output.{output.name}.mix": mix}
 
 
 def wheel_changes(sensor: str, wheel_m: float, measured_m: float) -> dict[str, float]:
     """Return the changes for an encoder after the robot was pushed forward by 1 m.
 
-    Args:
-        sensor: Name of the encoder.
-        wheel_m: Distance of one turn in the profile, m.
-        measured_m: Distance measured by the encoder, m; negative for backward.
+    One turn is `wheel_m` in the profile; it measured `measured_m`, negative for backward.
     """
     if measured_m <= 0.0:
         raise RobotError(
@@ -107,13 +97,12 @@ def find_joint_zeros(
     """Average the encoder readings while a person holds the joints straight.
 
     Args:
-        plan: Settings of the robot.
+        plan: The robot.
         hardware: Gives access to its buses.
         wait: Waits for about 10 ms.
 
     Returns:
-        Counts of each encoder, 0 to 4095, by the names of sensor and joint, such as
-        `joints.MCP_flexion`; empty for a robot without encoders.
+        Counts of each encoder, 0 to 4095, by sensor and joint, such as `joints.MCP_flexion`.
     """
     zeros: dict[str, int] = {}
     counts_per_rad = COUNTS_PER_TURN / (2.0 * math.pi)
@@ -170,8 +159,7 @@ def home(
     Raises:
         RobotError: If a servo fails, or winds in too far or for too long.
     """
-    servos = {servo.name: servo for servo in settings.servos}
-    tensions = {name: servo.homing_n for name, servo in servos.items()}
+    tensions = {servo.name: servo.homing_n for servo in settings.servos}
     starts: dict[str, int] = {}
     zeros: dict[str, int] = {}
     moved: dict[str, tuple[int, int]] = {}  # Position and time at which each last moved.
@@ -180,36 +168,30 @@ def home(
         state = cycle(tensions)
         if state.faults:
             raise RobotError(f"No zero: {state.reason}")
-        now_ns = state.at_ns
-        began_ns = now_ns if began_ns is None else began_ns
-        for name, reading in state.servos.items():
-            servo, at = servos[name], reading.position
+        began_ns = state.at_ns if began_ns is None else began_ns
+        for servo in (one for one in settings.servos if one.name in state.servos):
+            name, at = servo.name, state.servos[servo.name].position
             zeros[name] = at
             wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
             if wound_m > travel_m:
                 reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
                 raise RobotError(f"{servo.words} has no zero: {reason}. Its tendon has come off.")
-            was_at, _ = moved.setdefault(name, (at, now_ns))
+            was_at, _ = moved.setdefault(name, (at, state.at_ns))
             if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
-                moved[name] = at, now_ns
-        still_ns = now_ns - still_ms * 1_000_000
-        moving = [name for name in servos if name not in moved or moved[name][1] > still_ns]
+                moved[name] = at, state.at_ns
+        still_ns = state.at_ns - still_ms * 1_000_000
+        moving = [name for name in tensions if name not in moved or moved[name][1] > still_ns]
         if not moving:
             return zeros
-        if now_ns - began_ns > within_ms * 1_000_000:
-            seconds = within_ms / 1e3
-            raise RobotError(f"No zero: {', '.join(moving)} still moved after {seconds:g} s.")
+        if state.at_ns - began_ns > within_ms * 1_000_000:
+            names = ", ".join(moving)
+            raise RobotError(f"No zero: {names} still moved after {within_ms / 1e3:g} s.")
 
 
 def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:
-    """Pull all tendons gently until nothing moves, and release them.
+    """Pull all tendons gently until nothing moves, and release them; see `find_joint_zeros`.
 
     A person holds the finger straight, and no other process may have the bus open.
-
-    Args:
-        plan: Settings of the robot.
-        hardware: Gives access to its bus.
-        wait: Waits for about 10 ms.
 
     Returns:
         Position of each servo, counts, by the name of its output.

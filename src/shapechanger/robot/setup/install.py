@@ -39,51 +39,7 @@ _LATENCY: Final = (
 )
 _MODULES: Final = "etc/modules-load.d/i2c-dev.conf"
 # Overlays of Raspberry Pi's cameras, for those that are not detected.
-_CAMERA_OVERLAYS: Final = tuple(f"dtoverlay={chip}" for chip in ("imx", "ov5647", "ov9281"))
-
-
-class BootConfig:
-    """The config.txt of a Raspberry Pi.
-
-    Args:
-        root: Root of the file system.
-
-    Attributes:
-        path: The file; None on other machines.
-    """
-
-    def __init__(self, root: Path) -> None:
-        paths = [root / name for name in ("boot/firmware/config.txt", "boot/config.txt")]
-        self.path = next((path for path in paths if path.exists()), None)
-
-    def lines(self) -> list[str]:
-        """Return the lines that apply to every model, without filtered ones."""
-        lines: list[str] = []
-        section = "all"
-        for line in _text(self.path).splitlines():
-            if match := re.match(r"\s*\[([^\]]*)\]", line):
-                section = match[1]
-            elif section == "all":
-                lines.append("".join(line.partition("#")[0].split()))
-        return lines
-
-    def parameters(self) -> dict[str, str]:
-        """Return the value of each device tree parameter; "on" if a line only names it."""
-        tree = [
-            line.removeprefix("dtparam=") for line in self.lines() if line.startswith("dtparam=")
-        ]
-        pairs = [one.partition("=") for line in tree for one in line.split(",")]
-        # The bus of the header has two names.
-        return {name.replace("i2c_arm", "i2c"): value or "on" for name, _, value in pairs}
-
-    def sets(self, parameter: str) -> bool:
-        """Return whether it switches a device tree parameter on, such as "i2c"."""
-        return self.parameters().get(parameter) in {"on", "1", "true", "yes"}
-
-    def i2c_hz(self) -> int:
-        """Return the speed of the I2C bus that it sets, bits per second; 0 without one."""
-        speed = self.parameters().get("i2c_baudrate", "")
-        return int(speed) if speed.isdecimal() else 0
+_CAMERAS: Final = ("dtoverlay.imx", "dtoverlay.ov5647", "dtoverlay.ov9281")
 
 
 def _text(path: Path | None) -> str:
@@ -148,15 +104,14 @@ def write_unit(
         The file, and True if it was written now.
     """
     path = profile.absolute().parent / unit_name(robot)
+    options = f" --credentials {unit_word(str(credentials.absolute()))}" if credentials else ""
     values = {
         "UNIT": path.stem,
         "ROBOT": _plain(robot),
         "PROFILE": unit_word(str(profile.absolute())),
         "PROGRAM": unit_word(shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"),
         "USER": user or getpass.getuser(),
-        "OPTIONS": f" --credentials {unit_word(str(credentials.absolute()))}"
-        if credentials
-        else "",
+        "OPTIONS": options,
     }
     template = (Path(__file__).parent / "robot.service").read_text(encoding="utf-8")
     # At once, because a path may hold what looks like another placeholder.
@@ -168,7 +123,7 @@ def write_unit(
 
 
 class RootCommand(NamedTuple):
-    """A command that needs root."""
+    """A command that needs root, with its input."""
 
     arguments: tuple[str, ...]
     text: str = ""
@@ -189,15 +144,20 @@ def run_as_root(command: RootCommand) -> str:
         )
     except OSError as error:
         return f"{arguments[0]}: {error.strerror or error}"
-    words = (done.stderr or done.stdout).strip().splitlines()
     if done.returncode == 0:
         return ""
-    return words[-1] if words else f"{arguments[0]} exited with {done.returncode}"
+    lines = (done.stderr or done.stdout).strip().splitlines()
+    return lines[-1] if lines else f"{arguments[0]} exited with {done.returncode}"
+
+
+def _root(command: str, *more: object, text: str = "") -> RootCommand:
+    """Return a command of some words and of arguments that may have blanks, with its input."""
+    return RootCommand((*command.split(), *map(str, more)), text)
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The computer on which a robot is put in place.
+    """The computer of a robot.
 
     Attributes:
         user: User that is to run the robot.
@@ -205,9 +165,54 @@ class Machine:
         run: Runs a command as root, and returns why it failed; empty if it did not.
     """
 
-    user: str
+    user: str = ""
     root: Path = Path("/")
     run: Callable[[RootCommand], str] = run_as_root
+
+    @property
+    def model(self) -> str:
+        """Model of a Raspberry Pi; "" for another machine."""
+        return _text(self.root / "proc/device-tree/model").strip("\0\n ")
+
+    @property
+    def config(self) -> Path | None:
+        """Its config.txt, which a Raspberry Pi has; None on other machines."""
+        paths = [self.root / name for name in ("boot/firmware/config.txt", "boot/config.txt")]
+        return next((path for path in paths if path.exists()), None)
+
+    def settings(self) -> dict[str, str]:
+        """Return the settings in config.txt that apply to every model, without filtered ones.
+
+        Parameters of the device tree are keyed as "dtparam.i2c", with "on" if a line only names
+        one, and overlays as "dtoverlay.imx219".
+        """
+        found: dict[str, str] = {}
+        section = "all"
+        for line in _text(self.config).splitlines():
+            if match := re.match(r"\s*\[([^\]]*)\]", line):
+                section = match[1]
+            elif section == "all":
+                key, _, values = "".join(line.partition("#")[0].split()).partition("=")
+                for value in values.split(",") if key in {"dtparam", "dtoverlay"} else ():
+                    # The bus of the header has two names.
+                    name, _, given = value.replace("i2c_arm", "i2c").partition("=")
+                    found[f"{key}.{name}"] = given or "on"
+                found[key] = values
+        return found
+
+    def sets(self, parameter: str) -> bool:
+        """Return whether it switches a parameter of the device tree on, such as "i2c"."""
+        return self.settings().get(f"dtparam.{parameter}") in {"on", "1", "true", "yes"}
+
+    def finds_camera(self) -> bool:
+        """Return whether a camera on the ribbon cable is detected, or named by its overlay."""
+        found = self.settings()
+        return found.get("camera_auto_detect") == "1" or any(k.startswith(_CAMERAS) for k in found)
+
+    def i2c_hz(self) -> int:
+        """Return the speed of the I2C bus that it sets, bits per second; 0 without one."""
+        speed = self.settings().get("dtparam.i2c_baudrate", "")
+        return int(speed) if speed.isdecimal() else 0
 
     def require_systemd(self) -> None:
         """Refuse a machine that systemd does not manage (sd_booted(3))."""
@@ -220,7 +225,7 @@ class Machine:
     def require_pi(self) -> None:
         """Refuse a machine that is not a Raspberry Pi with systemd."""
         self.require_systemd()
-        if "Raspberry Pi" not in _text(self.root / "proc/device-tree/model"):
+        if "Raspberry Pi" not in self.model:
             raise RobotError(
                 "This machine is not a Raspberry Pi: installing needs one with Raspberry Pi OS; "
                 "`shapechanger robot serve --twin` runs the robot on simulated pins here."
@@ -228,9 +233,8 @@ class Machine:
 
     def by_raspi_config(self, *call: str) -> tuple[RootCommand, ...]:
         """Return a call of raspi-config, which supports all models, if it exists."""
-        if not (self.root / "usr/bin/raspi-config").exists():
-            return ()
-        return (RootCommand(("raspi-config", "nonint", *call)),)
+        exists = (self.root / "usr/bin/raspi-config").exists()
+        return (_root("raspi-config nonint", *call),) if exists else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,9 +300,9 @@ def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
         f"{path} does not exist, and the robot does not start with the computer.",
         lambda: not path.exists() and not os.path.lexists(root / _WANTED / unit_name),
         (
-            RootCommand(("systemctl", "disable", "--now", unit_name)),
-            RootCommand(("rm", "-f", str(path))),
-            RootCommand(("systemctl", "daemon-reload")),
+            _root("systemctl disable --now", unit_name),
+            _root("rm -f", path),
+            _root("systemctl daemon-reload"),
         ),
     )
 
@@ -311,47 +315,42 @@ def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterat
         unit: Its systemd unit, next to the profile.
         machine: The computer.
     """
-    config = BootConfig(machine.root)
+    root = machine.root
     groups = {*device_groups(profile).values(), *(["video"] if profile.camera else [])}
-    for group in sorted(groups):
-        yield _group(group, machine)
-    yield from _interfaces(profile, machine, config)
-    if profile.camera is not None and profile.camera.driver == "picamera2":
-        package = machine.root / "usr/lib/python3/dist-packages/picamera2"
-        install = RootCommand(("apt-get", "install", "-y", "python3-picamera2"))
-        yield SystemChange(
-            "picamera2", "python3-picamera2 is installed.", package.is_dir, (install,)
-        )
-    rule = machine.root / _UDEV
+    yield from (_group(group, machine) for group in sorted(groups))
+    yield from _interfaces(profile, machine)
+    if _has_ribbon(profile):
+        package = root / "usr/lib/python3/dist-packages/picamera2"
+        install = _root("apt-get install -y python3-picamera2")
+        state = "python3-picamera2 is installed."
+        yield SystemChange("picamera2", state, package.is_dir, (install,))
+    rule, path, wanted = root / _UDEV, root / _UNITS / unit.name, root / _WANTED / unit.name
     for device in servo_devices(profile):
         if Path(device).name.startswith(_UARTS):
-            yield from _serial_port(device, machine, config)
+            yield from _serial_port(device, machine)
         else:
             yield SystemChange(
                 "latency timer",
                 "USB adapters that are plugged in from now on pass on answers within 1 ms.",
                 lambda: _text(rule) == _LATENCY,
-                (
-                    RootCommand(("tee", str(rule)), _LATENCY),
-                    RootCommand(("udevadm", "control", "--reload")),
-                ),
+                (_root("tee", rule, text=_LATENCY), _root("udevadm control --reload")),
             )
-    path = machine.root / _UNITS / unit.name
     yield SystemChange(
         "service",
         f"{path} is the unit next to the profile.",
         lambda: path.exists() and path.read_bytes() == unit.read_bytes(),
-        (
-            RootCommand(("install", "-m", "644", str(unit), str(path))),
-            RootCommand(("systemctl", "daemon-reload")),
-        ),
+        (_root("install -m 644", unit, path), _root("systemctl daemon-reload")),
     )
     yield SystemChange(
         "start",
         "The robot starts with the computer, not armed.",
-        lambda: os.path.lexists(machine.root / _WANTED / unit.name),
-        (RootCommand(("systemctl", "enable", unit.name)),),
+        lambda: os.path.lexists(wanted),
+        (_root("systemctl enable", unit.name),),
     )
+
+
+def _has_ribbon(profile: Profile) -> bool:
+    return profile.camera is not None and profile.camera.driver == "picamera2"
 
 
 def _group(group: str, machine: Machine) -> SystemChange:
@@ -359,82 +358,69 @@ def _group(group: str, machine: Machine) -> SystemChange:
         line = re.search(rf"^{group}:.*:(.*)$", _text(machine.root / "etc/group"), re.MULTILINE)
         return line and line[1].split(",")
 
-    exists = members() is not None
     return SystemChange(
         f"group {group}",
         f"{machine.user} is in the group {group}.",
         lambda: machine.user in (members() or ()),
-        (RootCommand(("usermod", "-aG", group, machine.user)),) if exists else (),
+        () if members() is None else (_root("usermod -aG", group, machine.user),),
         then="log in",
         instead=f"There is no group {group} here, which Raspberry Pi OS has.",
     )
 
 
-def _interfaces(profile: Profile, machine: Machine, config: BootConfig) -> Iterator[SystemChange]:
+def _interfaces(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
     """Yield the lines that config.txt needs."""
 
     def line(
         name: str, state: str, text: str, is_made: Callable[[], bool], *more: RootCommand
     ) -> SystemChange:
         # After a filter, such as [pi4], the line would apply to one model only.
-        added = RootCommand(("tee", "-a", str(config.path)), f"\n[all]\n{text}\n")
-        commands = (added, *more) if config.path else ()
-        words = f"There is no config.txt of Raspberry Pi OS here; it would need {text}."
-        return SystemChange(name, state, is_made, commands, "restart", words)
+        added = _root("tee -a", machine.config, text=f"\n[all]\n{text}\n")
+        otherwise = f"There is no config.txt of Raspberry Pi OS here; it would need {text}."
+        commands = (added, *more) if machine.config else ()
+        return SystemChange(name, state, is_made, commands, "restart", otherwise)
 
     if needs_pins(profile):
         state = "The pins of a process that dies go low."
-        is_strict = partial(config.sets, "strict_gpiod")
+        is_strict = partial(machine.sets, "strict_gpiod")
         yield line("strict_gpiod", state, "dtparam=strict_gpiod", is_strict)
     for device in (name for name, group in device_groups(profile).items() if group == "i2c"):
         bus = int(device.rpartition("-")[2])
+        state = f"I2C bus {bus} is on."
         if bus == _ARM_BUS:
-            is_on = partial(config.sets, "i2c")
-            module = RootCommand(("tee", str(machine.root / _MODULES)), "i2c-dev\n")
-            change = line("I2C", f"I2C bus {bus} is on.", "dtparam=i2c_arm=on", is_on, module)
+            module = _root("tee", machine.root / _MODULES, text="i2c-dev\n")
+            is_on = partial(machine.sets, "i2c")
+            change = line("I2C", state, "dtparam=i2c_arm=on", is_on, module)
             by_raspi_config = machine.by_raspi_config("do_i2c", "0")
             yield replace(change, commands=by_raspi_config or change.commands)
         else:
-            yield SystemChange(
-                f"I2C bus {bus}",
-                f"I2C bus {bus} is on.",
-                (machine.root / device.lstrip("/")).exists,
-                instead=f"Bus {bus} needs an overlay that depends on its pins, as "
-                f"dtoverlay=i2c{bus}.",
-            )
+            exists = (machine.root / device.lstrip("/")).exists
+            reason = f"Bus {bus} needs an overlay that depends on its pins, as dtoverlay=i2c{bus}."
+            yield SystemChange(f"I2C bus {bus}", state, exists, instead=reason)
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
-        yield line(
-            "I2C speed",
-            f"The I2C bus has {FAST_HZ} bits per second.",
-            f"dtparam=i2c_arm_baudrate={FAST_HZ}",
-            lambda: config.i2c_hz() >= FAST_HZ,
-        )
-    if profile.camera is not None and profile.camera.driver == "picamera2":
-        finds = ("camera_auto_detect=1", *_CAMERA_OVERLAYS)
-        yield line(
-            "camera",
-            "The camera on the ribbon cable is detected.",
-            "camera_auto_detect=1",
-            lambda: any(text.startswith(finds) for text in config.lines()),
-        )
+        state, text = f"The I2C bus has {FAST_HZ} bits per second.", f"i2c_arm_baudrate={FAST_HZ}"
+        yield line("I2C speed", state, f"dtparam={text}", lambda: machine.i2c_hz() >= FAST_HZ)
+    if _has_ribbon(profile):
+        state = "The camera on the ribbon cable is detected."
+        yield line("camera", state, "camera_auto_detect=1", machine.finds_camera)
 
 
-def _serial_port(device: str, machine: Machine, config: BootConfig) -> Iterator[SystemChange]:
+def _serial_port(device: str, machine: Machine) -> Iterator[SystemChange]:
     """Yield the changes for servos at the header's own serial port."""
     yield SystemChange(
         "serial port",
         f"{device} is on.",
-        lambda: "enable_uart=1" in config.lines() or config.sets("uart0"),
+        lambda: machine.settings().get("enable_uart") == "1" or machine.sets("uart0"),
         machine.by_raspi_config("do_serial_hw", "0"),
-        then="restart",
-        instead="Add enable_uart=1 to config.txt.",
+        "restart",
+        "Add enable_uart=1 to config.txt.",
     )
-    command_line = config.path and config.path.with_name("cmdline.txt")
+    command_line = machine.config and machine.config.with_name("cmdline.txt")
     yield SystemChange(
         "serial console",
         f"No console uses {device}.",
         lambda: bool(command_line) and "console=serial0" not in _text(command_line),
         machine.by_raspi_config("do_serial_cons", "1"),
-        then="restart",
-        instead="Remove console=serial0,115200 from cmdline.txt.",
+        "restart",
+        "Remove console=serial0,115200 from cmdline.txt.",
     )

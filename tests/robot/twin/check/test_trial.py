@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -155,10 +156,10 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A bench on pins without a robot, driver and network; `events` has its calls."""
     events: list[str] = []
     robot: Any = SimpleNamespace(port=1, known_at=lambda _: None)
+    robot.client = lambda **_: nullcontext(MagicMock())
     driver = SimpleNamespace(sent=[], await_commands=lambda _: None)
     for name in ("SHOWN_S", "_STAYS_S", "_DRIVES_S"):
         monkeypatch.setattr(module, name, 0.0)
-    monkeypatch.setattr(module, "_calm", lambda _: None)
     monkeypatch.setattr(module, "BadNetwork", lambda port: SimpleNamespace(port=port, close=int))
     monkeypatch.setattr(module, "Driver", lambda *_, **__: nullcontext(driver))
     made: Any = Bench(shipped("car"), twin=False)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final, Self
+from typing import Final
 
 import msgspec
 
@@ -34,8 +34,8 @@ FAILURES: Final = {
 """Signal at which a policy fails, keyed by how it fails."""
 
 
-class Driver:
-    """The driving process.
+class Driver(subprocess.Popen[bytes]):
+    """The driving process, which a `with` kills at its end.
 
     Args:
         robot: The robot.
@@ -52,16 +52,12 @@ class Driver:
         address.write_bytes(msgspec.json.encode(robot))
         with address.open() as asked, self._sent.open("wb") as sent, self._log.open("wb") as log:
             command = [*within, sys.executable, "-P", "-m", pilot or _PROGRAM]
-            self.process = subprocess.Popen(command, stdin=asked, stdout=sent, stderr=log)
-
-    def __enter__(self) -> Self:
-        """Return the driver."""
-        return self
+            super().__init__(command, stdin=asked, stdout=sent, stderr=log)
 
     def __exit__(self, *_: object) -> None:
         """Kill it."""
-        self.process.kill()
-        self.process.wait()
+        self.kill()
+        self.wait()
         self._folder.cleanup()
 
     @property
@@ -73,7 +69,7 @@ class Driver:
         """Wait until it has sent `count` commands."""
         until_s = time.monotonic() + _STARTED_S
         while len(self.sent) < count:
-            if self.process.poll() is not None or time.monotonic() > until_s:
+            if self.poll() is not None or time.monotonic() > until_s:
                 log = self._log.read_text(errors="replace").strip()
                 raise RobotError(f"The driver did not drive: {log}")
             time.sleep(0.002)

@@ -8,7 +8,7 @@ import signal
 import socket
 import struct
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -27,8 +27,6 @@ from shapechanger.robot.twin.robot import RunningRobot
 
 _POLL_S: Final = 0.001
 _MOST_BYTES: Final = 65536
-# Linger for 0 s: closing then sends a reset instead of an orderly end.
-_RESET: Final = struct.pack("ii", 1, 0)
 
 
 class BadNetwork:
@@ -50,15 +48,23 @@ class BadNetwork:
         self.silent = False
         self._robot_port = port
         self._ends: list[asyncio.StreamWriter] = []  # The driver's and the robot's in turn.
-        self._loop = asyncio.new_event_loop()
-        self._thread = Thread(target=self._loop.run_forever, name="bad network", daemon=True)
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int = listener.getsockname()[1]
+        self._closed = asyncio.Event()
+        self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
+        self._loop = self._runner.get_loop()
+        serve = partial(self._runner.run, self._serve(listener))
+        self._thread = Thread(target=serve, name="bad network", daemon=True)
         self._thread.start()
-        self._server = self._run(asyncio.start_server(self._join, "127.0.0.1", 0))
-        self.port: int = self._server.sockets[0].getsockname()[1]
 
     def reset(self) -> None:
         """Reset all connections, as a router does after a restart."""
-        self._run(self._reset())
+        for end in self._ends:
+            if not end.is_closing():
+                # Lingers for 0 s, so that closing sends a reset instead of an orderly end.
+                option = (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                end.get_extra_info("socket").setsockopt(*option)
+                self._loop.call_soon_threadsafe(end.transport.abort)
 
     def half_close(self) -> None:
         """End the direction towards the robot of all connections."""
@@ -68,13 +74,14 @@ class BadNetwork:
 
     def close(self) -> None:
         """End all connections and the thread."""
-        self._run(self._close())
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._closed.set)
         self._thread.join()
-        self._loop.close()
+        self._runner.close()  # Cancels the tasks of the connections.
 
-    def _run(self, act: Coroutine[Any, Any, Any]) -> Any:
-        return asyncio.run_coroutine_threadsafe(act, self._loop).result()
+    async def _serve(self, listener: socket.socket) -> None:
+        server = await asyncio.start_server(self._join, sock=listener)
+        await self._closed.wait()
+        server.close()
 
     async def _join(self, read: asyncio.StreamReader, driver: asyncio.StreamWriter) -> None:
         try:
@@ -95,20 +102,6 @@ class BadNetwork:
                 for at in range(0, len(data), self.slice_bytes):
                     sink.write(data[at : at + self.slice_bytes])
                 await sink.drain()
-
-    async def _reset(self) -> None:
-        for end in self._ends:
-            if not end.is_closing():
-                linger = (socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
-                end.get_extra_info("socket").setsockopt(*linger)
-                end.transport.abort()
-
-    async def _close(self) -> None:
-        self._server.close()
-        ended = asyncio.all_tasks() - {asyncio.current_task()}
-        for task in ended:
-            task.cancel()
-        await asyncio.gather(*ended, return_exceptions=True)
 
 
 class NotTried(RobotError):
@@ -190,7 +183,7 @@ def _at_once(act: Callable[[], object]) -> int:
 
 
 def _to_driver(number: signal.Signals) -> Make:
-    return lambda scene: _at_once(lambda: scene.driver.process.send_signal(number))
+    return lambda scene: _at_once(lambda: scene.driver.send_signal(number))
 
 
 def _to_program(program: Literal["guard", "daemon"], number: signal.Signals) -> Make:
@@ -261,57 +254,57 @@ def _connect_silently(scene: Scene) -> None:
         scene.opened.enter_context(stranger)
 
 
-def _list_faults() -> list[Fault]:
-    by_deadline = partial(Fault, after="deadline")
-    by_policy = partial(by_deadline, by_policy=True)
-    harmless = partial(by_deadline, harms=False)
-    silences = partial(Fault, silences=True)
-    camera = partial(Fault, within_ms=70.0, after="camera", needs="camera")
-    restarts = partial(Fault, then="starts afresh", on_pins=True)
-    guard = partial(restarts, within_ms=100.0, guards_late=True)
-    gone = partial(Fault, then="is gone", on_pins=True)
-    return [
-        by_deadline("driver killed", _to_driver(signal.SIGKILL), on_pins=True),
-        by_deadline("driver stopped", _to_driver(signal.SIGSTOP), on_pins=True),
-        by_policy("policy is killed", _to_driver(signal.SIGKILL)),
-        *(by_policy(f"policy {how}", _to_driver(number)) for how, number in FAILURES.items()),
-        by_deadline("network silent", _set_network("silent", True)),
-        by_deadline("network reset", lambda s: _at_once(s.network.reset)),
-        by_deadline("network half closed", lambda s: _at_once(s.network.half_close)),
+_by_deadline = partial(Fault, after="deadline")
+_by_policy = partial(_by_deadline, by_policy=True)
+_harmless = partial(_by_deadline, harms=False)
+_silences = partial(Fault, silences=True)
+_camera = partial(Fault, within_ms=70.0, after="camera", needs="camera")
+_restarts = partial(Fault, then="starts afresh", on_pins=True)
+_guard = partial(_restarts, within_ms=100.0, guards_late=True)
+_gone = partial(Fault, then="is gone", on_pins=True)
+
+FAULTS: Final = {
+    fault.name: fault
+    for fault in (
+        _by_deadline("driver killed", _to_driver(signal.SIGKILL), on_pins=True),
+        _by_deadline("driver stopped", _to_driver(signal.SIGSTOP), on_pins=True),
+        _by_policy("policy is killed", _to_driver(signal.SIGKILL)),
+        *(_by_policy(f"policy {how}", _to_driver(number)) for how, number in FAILURES.items()),
+        _by_deadline("network silent", _set_network("silent", True)),
+        _by_deadline("network reset", lambda s: _at_once(s.network.reset)),
+        _by_deadline("network half closed", lambda s: _at_once(s.network.half_close)),
         # Answers to an observation of a second ago are refused, so the last command that acts is
         # one that had arrived already.
-        by_deadline("network late by 1 s", _set_network("latency_s", 1.0)),
-        silences(
+        _by_deadline("network late by 1 s", _set_network("latency_s", 1.0)),
+        _silences(
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
             on_pins=True,
         ),
-        silences("a person takes over", _by_another("person", lambda c: c.take())),
-        silences("a person disarms", _by_another("person", lambda c: c.disarm()), on_pins=True),
-        harmless("network in slices of 1 byte", _set_network("slice_bytes", 1)),
-        harmless("a stranger with a wrong key", _knock_with_a_wrong_key),
-        harmless("a message of 1 MB", _say_too_much),
-        harmless("a second program commands", _by_another("program", _command_without_the_lease)),
-        harmless("strangers who say nothing", _connect_silently),
-        camera("camera frozen", _on_board(Operator.break_camera, "freeze", "")),
-        camera("camera garbage", _on_board(Operator.break_camera, "garbage", "")),
-        camera("camera sends half pictures", _on_board(Operator.break_camera, "short", "")),
-        camera("camera off", _on_board(Operator.break_camera, "off", "")),
+        _silences("a person takes over", _by_another("person", lambda c: c.take())),
+        _silences("a person disarms", _by_another("person", lambda c: c.disarm()), on_pins=True),
+        _harmless("network in slices of 1 byte", _set_network("slice_bytes", 1)),
+        _harmless("a stranger with a wrong key", _knock_with_a_wrong_key),
+        _harmless("a message of 1 MB", _say_too_much),
+        _harmless("a second program commands", _by_another("program", _command_without_the_lease)),
+        _harmless("strangers who say nothing", _connect_silently),
+        _camera("camera frozen", _on_board(Operator.break_camera, "freeze", "")),
+        _camera("camera garbage", _on_board(Operator.break_camera, "garbage", "")),
+        _camera("camera sends half pictures", _on_board(Operator.break_camera, "short", "")),
+        _camera("camera off", _on_board(Operator.break_camera, "off", "")),
         Fault(
             "bumper pressed", _on_board(Operator.press_bumper, True, False), 40.0, needs="bumper"
         ),
-        silences(
+        _silences(
             "emergency button", _on_board(Operator.press_stop, True, False), 40.0, needs="button"
         ),
-        restarts("daemon killed", _to_program("daemon", signal.SIGKILL)),
-        restarts("daemon stopped", _to_program("daemon", signal.SIGSTOP), after="deadline"),
-        guard("guard killed", _to_program("guard", signal.SIGKILL)),
-        guard("guard stopped", _to_program("guard", signal.SIGSTOP), after="deadline"),
-        gone("supervisor killed", lambda s: _at_once(s.robot.supervisor.kill), 100.0),
+        _restarts("daemon killed", _to_program("daemon", signal.SIGKILL)),
+        _restarts("daemon stopped", _to_program("daemon", signal.SIGSTOP), after="deadline"),
+        _guard("guard killed", _to_program("guard", signal.SIGKILL)),
+        _guard("guard stopped", _to_program("guard", signal.SIGSTOP), after="deadline"),
+        _gone("supervisor killed", lambda s: _at_once(s.robot.supervisor.kill), 100.0),
         # Only hardware remains: the one-shot of the enable line, 100 ms, and its tolerance.
-        gone("guard and supervisor killed", _kill_both, 120.0, needs="one-shot", guards_late=True),
-    ]
-
-
-FAULTS: Final = {fault.name: fault for fault in _list_faults()}
+        _gone("guard and supervisor killed", _kill_both, 120.0, needs="one-shot", guards_late=True),
+    )
+}
 """All faults, keyed by name."""

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, suppress
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Literal
@@ -78,14 +78,9 @@ class _BoardWatcher(Watcher):
 
 
 class _ProbeWatcher(Watcher):
-    """Watches the pin of a motor through a wire to a free pin.
+    """Watches the pin `probed` of a motor through a wire to the free pin `probe`.
 
     Edges are stamped here when they arrive, about a millisecond late.
-
-    Args:
-        probe: Free BCM pin at the end of the wire.
-        probed: BCM pin of the motor.
-        hardware: The pins.
     """
 
     def __init__(self, probe: int, probed: int, hardware: Hardware) -> None:
@@ -108,49 +103,41 @@ class _ProbeWatcher(Watcher):
         self._hardware.close()
 
     def _changed(self, at_s: float, level: int) -> None:
-        del at_s, level  # lgpio's clock is not stated.
+        del at_s, level  # The clock of lgpio is not stated.
         self._last_ns = time.monotonic_ns()
 
 
+@dataclass
 class Bench:
     """A robot to check, on its twin or on the pins of this machine, until `close`.
 
-    Args:
+    Attributes:
         profile: The robot.
         twin: Whether on its twin.
         one_shot: Whether a twin has the one-shot of the enable line, if the profile has one.
         probe: Free BCM pin with a wire to the pin of the motor that drives forward; None without.
         arguments: Further arguments of `serve`.
-        pilot: Module of the program that drives as a policy on board; see `Driver`.
+        pilot: Module of the program that drives as a policy on board; see `run_driver`.
         ask: Asks a person.
-
-    Attributes:
-        wiring: Wiring of a twin.
         restarts: How often the robot has restarted since it was served.
     """
 
-    def __init__(
-        self,
-        profile: Profile,
-        *,
-        twin: bool = True,
-        one_shot: bool = True,
-        probe: int | None = None,
-        arguments: tuple[str, ...] = (),
-        pilot: str = "",
-        ask: Ask = lambda _: None,
-    ) -> None:
-        if twin and probe is not None:
+    profile: Profile
+    _: KW_ONLY
+    twin: bool = True
+    one_shot: bool = True
+    probe: int | None = None
+    arguments: tuple[str, ...] = ()
+    pilot: str = ""
+    ask: Ask = lambda _: None
+    restarts: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        if self.twin and self.probe is not None:
             raise RobotError("A twin needs no --probe: its ledger has every change of a pin.")
-        self.profile = profile
-        self.twin = twin
-        self.pilot = pilot
-        self.ask = ask
-        self.restarts = 0
-        self._one_shot_ms = float(profile.enable_hold_ms) if one_shot else None
-        self.wiring = TwinWiring(profile, self._one_shot_ms)
-        self._probe = None if probe is None else (probe, probed_pin(profile, probe))
-        self._arguments = arguments
+        self._probed = None if self.probe is None else probed_pin(self.profile, self.probe)
+        self._one_shot_ms = float(self.profile.enable_hold_ms) if self.one_shot else None
+        self.wiring = TwinWiring(self.profile, self._one_shot_ms)
         self._board: BoardAt | None = None
         self._robot: RunningRobot | None = None
         self._stack = ExitStack()
@@ -177,16 +164,18 @@ class Bench:
         """Open a watcher of the outputs."""
         if self.twin:
             return _BoardWatcher(self.board(), self.wiring)
-        return Watcher() if self._probe is None else _ProbeWatcher(*self._probe, Hardware())
+        if self.probe is None or self._probed is None:
+            return Watcher()
+        return _ProbeWatcher(self.probe, self._probed, Hardware())
 
     def robot(self) -> RunningRobot:
         """Return the robot, served now if it is not."""
         if self._robot is None:
             folder = self.board().folder if self.twin else None
-            robot = run_robot(
-                self.profile, twin=self.twin, folder=folder, arguments=self._arguments
+            served = run_robot(
+                self.profile, twin=self.twin, folder=folder, arguments=self.arguments
             )
-            self._robot = self._stack.enter_context(robot)
+            self._robot = self._stack.enter_context(served)
         return self._robot
 
     def close(self) -> list[str]:
@@ -222,8 +211,8 @@ class Bench:
 _MOST_RESTARTS: Final = 4
 # A busy machine can make a robot restart, or pause while a fault is made.
 _ATTEMPTS: Final = 10
-# Retries of a trial in which the robot was not moving before the fault.
-_MORE_TRIES: Final = 2
+# Times a trial is tried in which the robot was not moving before the fault.
+_TRIES: Final = 3
 _COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
 _STARTS_S: Final = 30.0
@@ -294,15 +283,28 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
         board = opened.enter_context(robot.operator()) if bench.twin else None
         network = opened.enter_context(closing(BadNetwork(robot.port)))
         watcher = opened.enter_context(closing(bench.watcher()))
-        with translate_errors(ShapechangerError, to=lambda error: NotTried(str(error))):
-            _calm(robot)
+        with (
+            translate_errors(ShapechangerError, to=lambda error: NotTried(str(error))),
+            robot.client(role="person", frames=False, name="trial") as person,
+        ):
+            # Clears the state of the last trial: an emergency stop, or being armed.
+            person.take()
+            person.arm()
+            person.disarm()
+            person.release()
+            person.ping()
             if board is not None:
                 board.place(0)
             known = robot.known_at(f"127.0.0.1:{network.port}")
             pilot = bench.pilot if fault.by_policy else ""
             driver = opened.enter_context(Driver(known, pilot=pilot))
             if fault.by_policy:
-                _arm_for_program(robot)
+                until_s = time.monotonic() + _STARTS_S
+                while not person.ask().message.holder:
+                    if time.monotonic() > until_s:
+                        raise RobotError("The policy did not take control.")
+                    time.sleep(_LOOK_S)
+                person.arm()
             driver.await_commands(_COMMANDS)
         _await_drive(watcher)
         drove = watcher.moves() is not False
@@ -315,7 +317,7 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
             driver.await_commands(len(driver.sent) + _COMMANDS)
             _await_drive(watcher)
             at_ns = time.monotonic_ns()
-            driver.process.kill()
+            driver.kill()
         _await_rest(watcher, limit_ms)
         if bench.twin:
             return _judged(bench, fault, began_ns, at_ns, driver.sent)
@@ -325,27 +327,6 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
             question = "Did a motor's LED light up, and are all of them out now"
             answer = bench.ask(f"{question} ({fault.name})?")
         return TrialResult(stopped_ms, limit_ms, drove, answer=answer)
-
-
-def _calm(robot: RunningRobot) -> None:
-    """Clear the state of the last trial: an emergency stop, or being armed."""
-    with robot.client(role="person", frames=False, name="trial") as person:
-        person.take()
-        person.arm()
-        person.disarm()
-        person.release()
-        person.ping()
-
-
-def _arm_for_program(robot: RunningRobot) -> None:
-    """Arm the robot as a person, once a program has control."""
-    until_s = time.monotonic() + _STARTS_S
-    with robot.client(role="person", frames=False, name="trial") as person:
-        while not person.ask().message.holder:
-            if time.monotonic() > until_s:
-                raise RobotError("The policy did not take control.")
-            time.sleep(_LOOK_S)
-        person.arm()
 
 
 def _await_drive(watcher: Watcher) -> None:
@@ -397,20 +378,37 @@ def _judged(
     )
 
 
+def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]:
+    """Yield trials until the robot drove in as many as asked, or too many were void.
+
+    Args:
+        bench: The robot.
+        fault: The fault.
+        trials: How often the robot has to be driving at the fault.
+    """
+    drove = 0
+    for _ in range(_TRIES * trials):
+        result = run_trial(bench, fault)
+        yield result
+        drove += result.drove
+        if drove == trials:
+            return
+
+
 def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
     """Try a fault as often as asked, and return the level and sentence of its finding."""
     if why := bench.lacks("throttle") or bench.lacks(fault.needs):
         return "unknown", why
     try:
-        results = [_moving(bench, fault) for _ in range(trials)]
+        tried = list(run_trials(bench, fault, trials))
     except ShapechangerError as error:
         # The next robot begins at rest.
         return "bad", " ".join([str(error), *bench.close()])
+    results = [result for result in tried if result.drove or result.unauthorised]
+    if len(results) < trials or not all(result.drove for result in results):
+        return "bad", "It did not drive before the fault."
     promised = f"{results[0].limit_ms:.0f} ms are promised"
     times = sorted(result.stopped_ms for result in results)
-    answers = {result.answer for result in results}
-    if not all(result.drove for result in results):
-        return "bad", "It did not drive before the fault."
     if not any(map(math.isnan, times)):
         stopped = f"{times[len(times) // 2]:.0f} ms later"
         if len(times) > 1:
@@ -420,22 +418,21 @@ def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
         moved = f" It moved {strangers} times without a fresh command." if strangers else ""
         good = all(result.kept for result in results)
         return judged(good, f"At rest {stopped}; {promised}.{moved}")
+    answers = {result.answer for result in results}
     if answers == {None}:
         return "unknown", f"Not measured: a wire to a free pin does, with --probe; {promised}."
     otherwise = "NOT lit, or NOT out afterwards."
     return judged(answers == {True}, "The LEDs were lit, and then out.", otherwise)
 
 
-def _moving(bench: Bench, fault: Fault) -> TrialResult:
-    """Run a trial, and repeat it if the robot was not moving before the fault."""
-    for _ in range(_MORE_TRIES):
-        result = run_trial(bench, fault)
-        if result.drove or result.unauthorised:
-            return result
-    return run_trial(bench, fault)
-
-
 CheckLevel = Literal["wiring", "plain", "leds", "faults"]
+
+_PARTS: Final[dict[CheckLevel, tuple[str, ...]]] = {
+    "wiring": ("wiring",),
+    "plain": ("wiring", "driving"),
+    "leds": ("wiring", "LEDs", "driving", "faults"),
+    "faults": ("faults",),
+}
 
 
 def require_level(level: CheckLevel, bench: Bench) -> None:
@@ -452,7 +449,7 @@ def check_robot(
 ) -> Iterator[tuple[str, Iterator[Finding]]]:
     """Yield each part of a level, and its findings, before its first question.
 
-    Nothing moves in the part "wiring"; all others drive outputs.
+    Nothing moves in the part "wiring"; all others drive outputs. Each ends at rest.
 
     Args:
         level: The level.
@@ -472,21 +469,19 @@ def check_robot(
         with bench.robot() as served:
             yield from check_driving(served, bench.profile, cap)
 
+    def leave_at_rest(findings: Iterator[Finding]) -> Iterator[Finding]:
+        with closing(bench):
+            yield from findings
+            failures = bench.close()
+        if failures:
+            yield Finding("safe pins", "bad", " ".join(failures))
+
     faults = [fault for fault in FAULTS.values() if level == "faults" or fault.on_pins]
-    tried = (Finding(one.name, *fault_finding(bench, one, trials)) for one in faults)
-    if level != "faults":
-        yield "wiring", _leaving_at_rest(bench, examine(standing))
-    if level == "leds":
-        yield "LEDs", _leaving_at_rest(bench, light_lamps())
-    if level in {"plain", "leds"}:
-        yield "driving", _leaving_at_rest(bench, drive())
-    if level in {"leds", "faults"}:
-        yield "faults", _leaving_at_rest(bench, tried)
-
-
-def _leaving_at_rest(bench: Bench, findings: Iterator[Finding]) -> Iterator[Finding]:
-    with closing(bench):
-        yield from findings
-        failures = bench.close()
-    if failures:
-        yield Finding("safe pins", "bad", " ".join(failures))
+    parts: dict[str, Iterator[Finding]] = {
+        "wiring": examine(standing),
+        "LEDs": light_lamps(),
+        "driving": drive(),
+        "faults": (Finding(one.name, *fault_finding(bench, one, trials)) for one in faults),
+    }
+    for part in _PARTS[level]:
+        yield part, leave_at_rest(parts[part])
