@@ -7,11 +7,14 @@ ends; trials on the same code are not repeated. `ONLY` names faults, with hyphen
 from __future__ import annotations
 
 import hashlib
+import json
+import math
 import multiprocessing
 import os
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
+from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
@@ -23,37 +26,15 @@ from benchmarks.row import Row, asked
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.twin.check.faults import FAULTS, Fault
-from shapechanger.robot.twin.check.trial import Bench, run_trial
+from shapechanger.robot.twin.check.trial import Bench, TrialResult, run_trials
 from tests.robots import CAR
 
 TRIALS: Final = 100
 KEPT: Final = Path("results", "robot-faults")
 PILOT: Final = "shapechanger.vehicles.remote.full_throttle"
 BARE: Final = "guard and supervisor killed"
-# Code that the time to stop depends on.
-_CODE: Final = ("cli/robot", "vehicles/remote", "link", "remote", "robot", "twin")
-
-
-class _Tried(msgspec.Struct, frozen=True):
-    """One trial.
-
-    Attributes:
-        stopped_ms: See `TrialResult`; None for never.
-        limit_ms: Limit of the fault.
-        drove: Whether the robot was driving at the fault; other trials do not count.
-        unauthorised_ms: Durations of motion without a fresh command; None for unlimited.
-    """
-
-    stopped_ms: float | None
-    limit_ms: float
-    drove: bool
-    unauthorised_ms: tuple[float | None, ...]
-
-    @property
-    def kept(self) -> bool:
-        """Return whether the robot stopped in time and never moved without a command."""
-        stopped = self.stopped_ms is not None and self.stopped_ms <= self.limit_ms
-        return stopped and not self.unauthorised_ms
+# Code that the time to stop depends on: the robot, its plan, its commands, and the policy.
+_CODE: Final = ("cli/robot", "contract", "layout.py", "robot", "vehicles/remote")
 
 
 def faults(trials: int = int(os.environ.get("TRIALS", TRIALS))) -> list[Row]:
@@ -82,49 +63,37 @@ def _hyphened(name: str) -> str:
     return name.replace(" ", "-")
 
 
-def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) -> list[_Tried]:
+def _tried(
+    profile: Path, name: str, one_shot: bool, trials: int, folder: Path
+) -> list[TrialResult]:
     """Run trials until enough of them drove, and return all."""
     fault = FAULTS[name]
     path = folder / f"{fault.name}{'' if one_shot else ', no one-shot'}.jsonl".replace(" ", "-")
-    found: list[_Tried] = []
-    if path.exists():
-        found = msgspec.json.Decoder(_Tried).decode_lines(path.read_bytes())
-    with ExitStack() as opened, path.open("ab") as file:
-        bench: Bench | None = None
-        while sum(one.drove for one in found) < trials and len(found) < 2 * trials:
-            if bench is None:
-                bench = Bench(load_profile(profile), one_shot=one_shot, pilot=PILOT)
-                opened.callback(bench.close)
+    lines = path.read_text().splitlines() if path.exists() else []
+    # The library of Python writes infinity, which stands for never.
+    found = [msgspec.convert(json.loads(line), TrialResult) for line in lines]
+
+    def keep(result: TrialResult) -> None:
+        found.append(result)
+        file.write(json.dumps(asdict(result)) + "\n")
+        file.flush()
+
+    bench = Bench(load_profile(profile), one_shot=one_shot, pilot=PILOT)
+    with closing(bench), path.open("a") as file:
+        while (drove := sum(one.drove for one in found)) < trials and len(found) < 2 * trials:
             try:
-                tried = _as_tried(bench, fault)
+                for result in run_trials(bench, fault, trials - drove):
+                    keep(result)
             except RobotError:  # The driver lost the link or never drove: start another robot.
-                opened.close()
-                bench, tried = None, _Tried(None, 0.0, False, ())
-            found.append(tried)
-            file.write(msgspec.json.encode(tried) + b"\n")
-            file.flush()
+                bench.close()
+                keep(TrialResult(math.inf, fault.limit_ms(bench.profile.limits), drove=False))
     return found
 
 
-def _as_tried(bench: Bench, fault: Fault) -> _Tried:
-    result = run_trial(bench, fault)
-    return _Tried(
-        _finite(result.stopped_ms),
-        result.limit_ms,
-        result.drove,
-        tuple(_finite((one.end_ns - one.start_ns) / 1e6) for one in result.unauthorised),
-    )
-
-
-def _finite(number: float) -> float | None:
-    """Return a number that JSON can hold; None for infinity."""
-    return None if np.isinf(number) else number
-
-
-def _row(fault: Fault, found: list[_Tried]) -> Row:
+def _row(fault: Fault, found: list[TrialResult]) -> Row:
     drove = [one for one in found if one.drove]
-    times = np.array([np.inf if one.stopped_ms is None else one.stopped_ms for one in drove])
-    strangers = sum(bool(one.unauthorised_ms) for one in drove)
+    times = np.array([one.stopped_ms for one in drove])
+    strangers = sum(bool(one.unauthorised) for one in drove)
     idle = len(found) - len(drove)
     return Row(
         f"at rest after: {fault.name}",
@@ -136,10 +105,10 @@ def _row(fault: Fault, found: list[_Tried]) -> Row:
     )
 
 
-def _without_one_shot(fault: Fault, found: list[_Tried]) -> Row:
+def _without_one_shot(fault: Fault, found: list[TrialResult]) -> Row:
     """Return how often a pin keeps its level when nothing cuts its power."""
     drove = [one for one in found if one.drove]
-    never = sum(one.stopped_ms is None for one in drove)
+    never = sum(math.isinf(one.stopped_ms) for one in drove)
     return Row(
         f"{fault.name}, no one-shot fitted: motors that never stop",
         f"{never} of {len(drove)}",
@@ -153,7 +122,9 @@ def _digest() -> str:
     """Return a digest of the code that stops a robot."""
     root = Path(shapechanger.__file__).parent
     whole = hashlib.sha256()
-    for part in _CODE:
-        for path in sorted((root / part).rglob("*.py")):
+    whole.update(CAR.encode())
+    for part in (root / name for name in _CODE):
+        paths = sorted(part.rglob("*.py")) or [part]
+        for path in paths:  # A part that is gone is an error.
             whole.update(path.read_bytes())
     return whole.hexdigest()[:12]

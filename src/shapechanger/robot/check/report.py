@@ -68,14 +68,10 @@ def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding
 
 
 def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
-    """Yield the results of a check until it ends, fails or is late.
+    """Yield the results of a check until it ends, fails, or has taken `limit_s` seconds.
 
-    The check runs in a separate thread, which is left behind if its driver hangs.
-
-    Args:
-        results: The check.
-        limit_s: Time for all of it, s.
-        late: Sentence if it is late.
+    The check runs in a separate thread, which is left behind if its driver hangs; `late` is the
+    sentence about that.
     """
     found: SimpleQueue[Result | None] = SimpleQueue()
 

@@ -41,6 +41,7 @@ from shapechanger.robot.setup.install import (
     FAST_HZ,
     Machine,
     device_groups,
+    has_ribbon,
     servo_devices,
     unit_name,
     unit_word,
@@ -83,12 +84,10 @@ class StandingRobot:
     @cached_property
     def port_error(self) -> str:
         """Why its port cannot be used; "" if it can."""
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("", self.port))
-            except OSError as error:
-                return f"{error.strerror}"
+        try:
+            socket.create_server(("", self.port)).close()
+        except OSError as error:
+            return os.strerror(error.errno or 0)
         return ""
 
     @property
@@ -99,12 +98,6 @@ class StandingRobot:
     def has_bus(self, bus: int) -> bool:
         """Return whether this user may open an I2C bus."""
         return self.on_twin or os.access(self.root / f"dev/i2c-{bus}", os.R_OK | os.W_OK)
-
-    def can_read(self, sensor: SensorPlan) -> bool:
-        """Return whether the pins or the bus of a sensor exist."""
-        if "bus" in sensor.settings:
-            return self.has_bus(sensor.settings["bus"])
-        return self.has_pins or sensor.driver == "cpu_temperature"
 
 
 def examine(robot: StandingRobot) -> Iterator[Finding]:
@@ -180,7 +173,12 @@ def _wiring(robot: StandingRobot) -> Checks:
     for bus, address in sorted({(one["bus"], one["address"]) for one in _boards(profile)}):
         if robot.has_bus(bus):
             yield "servo board", _servo_board(robot, bus, address)
-    sensors = list(filter(robot.can_read, profile.sensors))
+    sensors = [
+        plan
+        for plan in profile.sensors
+        if plan.driver == "cpu_temperature"
+        or (robot.has_bus(plan.settings["bus"]) if "bus" in plan.settings else robot.has_pins)
+    ]
     for plan in sensors:
         if plan.driver not in {"as5600", DRIVER}:  # The servos are checked themselves.
             yield "sensor", (_speed_pins if plan.measures == "speed" else _sensor)(robot, plan)
@@ -221,9 +219,8 @@ def _enable_line(guard: GuardPlan) -> Result:
         return "good", "Each servo has its own watchdog, and releases when its bus is silent."
     return judged(
         guard.enable_pin is not None,
-        f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors "
-        "lose power, as servos without a watchdog must. Measure that once, because it cannot "
-        "be checked here.",
+        f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors lose "
+        "power, as servos without a watchdog must. Measure that once: it cannot be checked here.",
         "The profile has no [enable] pin: if guard and supervisor are killed together, only "
         "strict_gpiod and pull-downs are left. Fit the one-shot of the hardware guide.",
     )
@@ -265,20 +262,19 @@ def _devices(robot: StandingRobot) -> Results:
 
 
 def _packages(profile: Profile) -> Results:
-    remedies = {"gpiozero": "pip install 'shapechanger[robot]'"}
-    remedies["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
-    if any("bus" in plan.settings for plan in (*profile.outputs, *profile.sensors)):
-        remedies["smbus2"] = remedies["gpiozero"]
-    if servo_devices(profile):
-        remedies["dynamixel_sdk"] = "pip install 'shapechanger[robot,finger]'"
-    if profile.camera is not None and profile.camera.driver == "picamera2":
-        remedies["picamera2"] = (
-            "sudo apt install python3-picamera2, and make the virtual environment with "
-            "--system-site-packages"
-        )
-    for name, remedy in remedies.items():
-        is_there = importlib.util.find_spec(name) is not None
-        yield judged(is_there, f"{name} is installed.", f"{name} is not installed: {remedy}.")
+    plans = (*profile.outputs, *profile.sensors)
+    ours = "pip install 'shapechanger[robot]'"
+    venv = "make the virtual environment with --system-site-packages"
+    for name, is_needed, remedy in (
+        ("gpiozero", True, ours),
+        ("lgpio", True, "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"),
+        ("smbus2", any("bus" in plan.settings for plan in plans), ours),
+        ("dynamixel_sdk", servo_devices(profile), "pip install 'shapechanger[robot,finger]'"),
+        ("picamera2", has_ribbon(profile), f"sudo apt install python3-picamera2, and {venv}"),
+    ):
+        if is_needed:
+            is_there = importlib.util.find_spec(name) is not None
+            yield judged(is_there, f"{name} is installed.", f"{name} is not installed: {remedy}.")
 
 
 def _camera(plan: CameraPlan) -> Results:

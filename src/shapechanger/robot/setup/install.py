@@ -91,17 +91,13 @@ def unit_word(text: str) -> str:
 def write_unit(
     robot: str, profile: Path, credentials: Path | None = None, user: str = ""
 ) -> tuple[Path, bool]:
-    """Write the unit next to a profile; an existing file stays.
+    """Write the unit next to a profile, and return it and whether it is new; an old one stays.
 
     Args:
         robot: Name of the robot.
         profile: Its profile, which need not exist yet.
         credentials: Folder of its key and certificate; None for the default.
-        user: User that runs it, a member of the groups of its devices; "" for the one of this
-            process.
-
-    Returns:
-        The file, and True if it was written now.
+        user: User that runs it, a member of the groups of its devices; "" for this one.
     """
     path = profile.absolute().parent / unit_name(robot)
     options = f" --credentials {unit_word(str(credentials.absolute()))}" if credentials else ""
@@ -269,12 +265,10 @@ class Outcome(NamedTuple):
 def make_changes(
     changes: Iterable[SystemChange], run: Callable[[RootCommand], str], *, dry: bool = False
 ) -> Iterator[Outcome]:
-    """Make each change that is not made yet, in order.
+    """Make each change that is not made yet, in order; say only what would be done if `dry`.
 
-    Args:
-        changes: The changes; a generator sees the effect of those before.
-        run: Runs commands as root; see `Machine.run`.
-        dry: Whether to say only what would be done.
+    Commands run as root by `run`; see `Machine.run`. A generator of changes sees the effect of
+    those before.
     """
     for change in changes:
         typed = " && ".join(map(str, change.commands))
@@ -308,18 +302,15 @@ def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
 
 
 def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterator[SystemChange]:
-    """Yield what puts a robot in place; each change is planned when those before are made.
+    """Yield what puts a robot in place, whose systemd unit is next to its profile.
 
-    Args:
-        profile: The robot.
-        unit: Its systemd unit, next to the profile.
-        machine: The computer.
+    Each change is planned when those before are made.
     """
     root = machine.root
     groups = {*device_groups(profile).values(), *(["video"] if profile.camera else [])}
     yield from (_group(group, machine) for group in sorted(groups))
     yield from _interfaces(profile, machine)
-    if _has_ribbon(profile):
+    if has_ribbon(profile):
         package = root / "usr/lib/python3/dist-packages/picamera2"
         install = _root("apt-get install -y python3-picamera2")
         state = "python3-picamera2 is installed."
@@ -349,7 +340,8 @@ def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterat
     )
 
 
-def _has_ribbon(profile: Profile) -> bool:
+def has_ribbon(profile: Profile) -> bool:
+    """Return whether a robot's camera is on the ribbon cable of its Raspberry Pi."""
     return profile.camera is not None and profile.camera.driver == "picamera2"
 
 
@@ -400,7 +392,7 @@ def _interfaces(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
     if any(sensor.driver == "as5600" for sensor in profile.sensors):
         state, text = f"The I2C bus has {FAST_HZ} bits per second.", f"i2c_arm_baudrate={FAST_HZ}"
         yield line("I2C speed", state, f"dtparam={text}", lambda: machine.i2c_hz() >= FAST_HZ)
-    if _has_ribbon(profile):
+    if has_ribbon(profile):
         state = "The camera on the ribbon cable is detected."
         yield line("camera", state, "camera_auto_detect=1", machine.finds_camera)
 

@@ -379,13 +379,7 @@ def _judged(
 
 
 def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]:
-    """Yield trials until the robot drove in as many as asked, or too many were void.
-
-    Args:
-        bench: The robot.
-        fault: The fault.
-        trials: How often the robot has to be driving at the fault.
-    """
+    """Yield trials until the robot drove in as many as asked, or thrice as many were made."""
     drove = 0
     for _ in range(_TRIES * trials):
         result = run_trial(bench, fault)
