@@ -19,7 +19,6 @@ from shapechanger.robot.check import standing
 from shapechanger.robot.check.report import Finding
 from shapechanger.robot.check.standing import StandingRobot, examine
 from shapechanger.robot.drivers.as5600 import Magnet
-from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.profile.profile import Profile
@@ -305,18 +304,6 @@ def test_the_battery_is_measured(
     found = next(one for one in _wired(car, hardware)["sensor"] if "pack" in one[1])
     assert found[0] == level
     assert words in found[1]
-
-
-def test_dead_sensors_do_not_hide_others(car: Profile) -> None:
-    """Each is reported by its own driver's error."""
-    board = _board(car)
-    board.pins.dead_chips.add((1, 0x40))
-    for sensor in board.pins.of_kind(SimulatedHcsr04):
-        sensor.dead = True
-    found = _wired(car, board.hardware)["sensor"]
-    assert [level for level, _ in found] == ["unknown", "good", "bad", "bad"]
-    assert "receives no echo" in found[2][1]
-    assert "0x40" in found[3][1]
 
 
 @pytest.mark.parametrize("dead", [False, True])

@@ -16,7 +16,6 @@ class FakePi:
         groups: Its groups, none with members.
 
     Attributes:
-        root: Folder of its files.
         ran: The commands so far, as typed.
         refuses: Program that fails.
     """
@@ -33,10 +32,9 @@ class FakePi:
         self.write("proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.5\0")
         self.write("etc/group", "".join(f"{name}:x:1:\n" for name in groups))
         self.write("usr/lib/python3/dist-packages/picamera2/__init__.py", "")
-        for folder in ("run/systemd/system", "etc/systemd/system/multi-user.target.wants"):
-            (root / folder).mkdir(parents=True)
-        for folder in ("etc/modules-load.d", "etc/udev/rules.d"):
-            (root / folder).mkdir(parents=True)
+        for folder in ("run/systemd", "etc/modules-load.d", "etc/udev/rules.d"):
+            (root / folder / "system").mkdir(parents=True)
+        (root / "etc/systemd/system/multi-user.target.wants").mkdir(parents=True)
         if config is not None:
             self.write("boot/firmware/config.txt", config)
             self.write("boot/firmware/cmdline.txt", "console=serial0,115200 console=tty1\n")
@@ -79,12 +77,11 @@ class FakePi:
                 (wanted / unit).symlink_to(wanted.parent / unit)
             case ("systemctl", "disable", "--now", unit):
                 (wanted / unit).unlink(missing_ok=True)
-            case ("raspi-config", "nonint", "do_i2c", "0"):
-                self.write("boot/firmware/config.txt", f"dtparam=i2c_arm=on\n{self.config}")
-            case ("raspi-config", "nonint", "do_serial_hw", "0"):
-                self.write("boot/firmware/config.txt", f"enable_uart=1\n{self.config}")
             case ("raspi-config", "nonint", "do_serial_cons", "1"):
                 self.write("boot/firmware/cmdline.txt", "console=tty1\n")
+            case ("raspi-config", "nonint", name, "0"):
+                line = {"do_i2c": "dtparam=i2c_arm=on", "do_serial_hw": "enable_uart=1"}[name]
+                self.write("boot/firmware/config.txt", f"{line}\n{self.config}")
             case ("systemctl", "daemon-reload") | ("udevadm", "control", "--reload"):
                 pass
             case ("apt-get", "install", "-y", package):

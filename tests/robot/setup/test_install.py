@@ -18,7 +18,6 @@ from shapechanger.robot.setup.install import (
     changes_to_remove,
     make_changes,
     run_as_root,
-    unit_word,
     write_unit,
 )
 from tests.robot.check.held_pins import shipped
@@ -32,7 +31,7 @@ def _blind(kind: str) -> Profile:
 
 
 def _install(pi: FakePi, robot: Profile, *, dry: bool = False) -> dict[str, tuple[str, str]]:
-    unit, _ = write_unit(robot.name, pi.root / "home" / f"{robot.name}.toml")
+    unit, _ = write_unit(robot.name, pi.root / "my home" / f"{robot.name}.toml")
     changes = changes_to_install(robot, unit, pi.machine)
     return {o.change.name: (o.level, o.sentence) for o in make_changes(changes, pi.run, dry=dry)}
 
@@ -63,7 +62,7 @@ def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
 
 def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
     """What the checks find bad in the computer's settings is what `install` puts in place."""
-    profile = replace(shipped("car"), camera=None, path=pi.root / "home" / "car.toml")
+    profile = replace(_blind("car"), path=pi.root / "my home" / "car.toml")
     for expected in ("bad", "good"):
         found = examine(StandingRobot(profile, root=pi.root))
         levels = {one.check: one.level for one in found}
@@ -125,30 +124,23 @@ def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:
     """The other changes are made."""
     pi.refuses = "usermod"
     found = _install(pi, _blind("car"))
-    assert found["group gpio"] == (
-        "failed",
-        "usermod: permission denied. By hand: sudo usermod -aG gpio pi",
-    )
-    assert found["service"][0] == "did"
+    sentence = "usermod: permission denied. By hand: sudo usermod -aG gpio pi"
+    assert (found["group gpio"], found["service"][0]) == (("failed", sentence), "did")
 
 
-def test_a_command_without_an_effect_is_told(pi: FakePi) -> None:
+def test_a_command_without_an_effect_is_told(pi: FakePi, monkeypatch: pytest.MonkeyPatch) -> None:
     """An exit code of 0 is not proof."""
-    unit, _ = write_unit("car", pi.root / "home" / "car.toml")
-    changes = changes_to_install(_blind("car"), unit, pi.machine)
-    outcomes = list(make_changes(changes, lambda _: ""))
-    assert {outcome.level for outcome in outcomes} == {"failed"}
-    assert all("the command had no effect" in outcome.sentence for outcome in outcomes)
+    monkeypatch.setattr(pi, "run", lambda _: "")
+    found = _install(pi, _blind("car"))
+    assert set(_levels(found).values()) == {"failed"}
+    assert all("the command had no effect" in sentence for _, sentence in found.values())
 
 
 def test_without_groups_and_config(tmp_path: Path) -> None:
     """What Raspberry Pi OS would have is named."""
-    pi = FakePi(tmp_path, config=None, groups=())
-    found = _install(pi, shipped("car"))
-    assert found["group gpio"] == (
-        "failed",
-        "There is no group gpio here, which Raspberry Pi OS has.",
-    )
+    found = _install(FakePi(tmp_path, config=None, groups=()), shipped("car"))
+    sentence = "There is no group gpio here, which Raspberry Pi OS has."
+    assert found["group gpio"] == ("failed", sentence)
     assert "no config.txt" in found["strict_gpiod"][1]
     assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
 
@@ -206,11 +198,11 @@ def test_the_unit_names_profile_program_and_user(
 ) -> None:
     """All placeholders are replaced, and what systemd would split or expand is quoted."""
     monkeypatch.setattr("shutil.which", lambda _: "/opt/venv/bin/shapechanger")
-    profile = tmp_path / "@USER@ 1" / "a\nUser=root.toml"
+    profile = tmp_path / "@USER@ 1" / 'a\nUser=$1 100% "b\\c".toml'
     path, is_new = write_unit("my car", profile, tmp_path, "pi")
     assert (path, is_new) == (profile.parent / "shapechanger-my-car.service", True)
     text = path.read_text()
-    word = f'"{tmp_path}/@USER@ 1/a\\nUser=root.toml"'
+    word = f'"{tmp_path}/@USER@ 1/a\\nUser=$$1 100%% \\"b\\\\c\\".toml"'
     start = f"ExecStart=/opt/venv/bin/shapechanger robot serve {word} --credentials {tmp_path}\n"
     assert start in text
     assert [line for line in text.splitlines() if line.startswith("User=")] == ["User=pi"]
@@ -218,21 +210,3 @@ def test_the_unit_names_profile_program_and_user(
     path.write_text("mine")
     assert write_unit("my car", profile) == (path, False)
     assert path.read_text() == "mine"
-
-
-def test_words_of_a_unit_are_quoted() -> None:
-    assert unit_word("/home/pi/car-2.toml") == "/home/pi/car-2.toml"
-    assert unit_word("/my robots/100%.toml") == '"/my robots/100%%.toml"'
-    assert unit_word('/a"b\\c$d\ne') == '"/a\\"b\\\\c$$d\\ne"'
-
-
-@pytest.mark.parametrize("folder", ["robots", "my robots"])
-def test_the_check_accepts_the_unit_of_init(pi: FakePi, folder: str) -> None:
-    """The written unit passes its check, unless it is for another profile."""
-    car = replace(shipped("car"), camera=None)
-    unit, _ = write_unit("car", pi.root / folder / "car.toml")
-    pi.write(_UNIT, unit.read_text())
-    for name, level in (("car.toml", "good"), ("other.toml", "bad")):
-        robot = StandingRobot(replace(car, path=unit.with_name(name)), root=pi.root)
-        finding = next(one for one in examine(robot) if one.check == "systemd")
-        assert (finding.level, "for another profile" in finding.sentence) == (level, level == "bad")
