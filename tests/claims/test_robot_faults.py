@@ -127,7 +127,7 @@ def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
     fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
     with contextlib.closing(Bench(write_profile(tmp_path), one_shot=False)) as bench:
         result = run_trial(bench, fault)
-        levels = frozen(read_ledger(bench.board().ledger_path), (22, 27))
+        levels = frozen(read_ledger(bench.board.ledger_path), (22, 27))
     assert result.drove
     assert levels[22] in {0.0, 1.0}
     assert levels[27] == 0.0

@@ -181,7 +181,7 @@ def _wiring(robot: StandingRobot) -> Checks:
     ]
     for plan in sensors:
         if plan.driver not in {"as5600", DRIVER}:  # The servos are checked themselves.
-            yield "sensor", (_speed_pins if plan.measures == "speed" else _sensor)(robot, plan)
+            yield "sensor", _sensor(robot, plan)
     if any(output.driver == DRIVER for output in profile.outputs):
         yield "servo bus", _servo_bus(robot)
     for plan in (one for one in sensors if one.driver == "as5600"):
@@ -347,18 +347,14 @@ def _button(robot: StandingRobot, pin: int) -> Results:
     )
 
 
-def _speed_pins(robot: StandingRobot, plan: SensorPlan) -> Results:
-    """Read the levels of a wheel's encoder, which only a turning wheel changes."""
-    levels = [
-        f"GPIO{pin} is {'high' if pin_level(pin, robot.pins, pull_up=True) else 'low'}"
-        for pin in (plan.settings["a"], plan.settings["b"])
-        if pin >= 0
-    ]
-    remedy = "turn the wheel a little by hand and check again: each must change now and then"
-    yield "unknown", f"{plan.name}: {', '.join(levels)}; {remedy}."
-
-
 def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
+    if plan.measures == "speed":  # Only a turning wheel changes the levels of its encoder.
+        pins = [plan.settings[key] for key in ("a", "b") if plan.settings[key] >= 0]
+        high = [pin_level(pin, robot.pins, pull_up=True) for pin in pins]
+        levels = [f"GPIO{p} is {'high' if h else 'low'}" for p, h in zip(pins, high, strict=True)]
+        remedy = "turn the wheel a little by hand and check again: each must change now and then"
+        yield "unknown", f"{plan.name}: {', '.join(levels)}; {remedy}."
+        return
     clock = robot.pins.clock
     with closing(SENSORS[plan.driver].open(plan, robot.pins)) as sensor:
         reading: dict[str, float] = {}

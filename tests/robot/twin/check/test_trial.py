@@ -130,7 +130,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(module, "BadNetwork", lambda port: SimpleNamespace(port=port, close=int))
     monkeypatch.setattr(module, "Driver", lambda *_, **__: nullcontext(driver))
     made: Any = Bench(shipped("car"), twin=False)
-    made.robot = lambda: robot
+    made.robot = robot
     made.watcher = Watcher
     made.close = lambda: events.append("closed") or []
     made.events = events

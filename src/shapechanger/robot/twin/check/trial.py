@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, suppress
 from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Literal
@@ -138,45 +139,39 @@ class Bench:
         self._probed = None if self.probe is None else probed_pin(self.profile, self.probe)
         self._one_shot_ms = float(self.profile.enable_hold_ms) if self.one_shot else None
         self.wiring = TwinWiring(self.profile, self._one_shot_ms)
-        self._board: BoardAt | None = None
-        self._robot: RunningRobot | None = None
         self._stack = ExitStack()
 
+    @cached_property
     def board(self) -> BoardAt:
-        """Return the board of the twin; it outlives the robot's processes, as hardware does."""
-        if self._board is None:
-            folder = self._stack.enter_context(TemporaryDirectory(prefix="shapechanger-check-"))
-            board = start_board(
-                self.profile.guard_plan(),
-                clock="real",
-                folder=Path(folder),
-                camera=self.profile.camera,
-                one_shot_ms=self._one_shot_ms,
-            )
-            self._board = self._stack.enter_context(board)
-        return self._board
+        """Board of the twin; it outlives the robot's processes, as hardware does."""
+        folder = self._stack.enter_context(TemporaryDirectory(prefix="shapechanger-check-"))
+        board = start_board(
+            self.profile.guard_plan(),
+            clock="real",
+            folder=Path(folder),
+            camera=self.profile.camera,
+            one_shot_ms=self._one_shot_ms,
+        )
+        return self._stack.enter_context(board)
+
+    @cached_property
+    def robot(self) -> RunningRobot:
+        """The robot, served now if it is not."""
+        folder = self.board.folder if self.twin else None
+        served = run_robot(self.profile, twin=self.twin, folder=folder, arguments=self.arguments)
+        return self._stack.enter_context(served)
 
     def pins(self) -> Hardware:
         """Open the pins and buses."""
-        return connect(self.board().socket_path) if self.twin else Hardware()
+        return connect(self.board.socket_path) if self.twin else Hardware()
 
     def watcher(self) -> Watcher:
         """Open a watcher of the outputs."""
         if self.twin:
-            return _BoardWatcher(self.board(), self.wiring)
+            return _BoardWatcher(self.board, self.wiring)
         if self.probe is None or self._probed is None:
             return Watcher()
         return _ProbeWatcher(self.probe, self._probed, Hardware())
-
-    def robot(self) -> RunningRobot:
-        """Return the robot, served now if it is not."""
-        if self._robot is None:
-            folder = self.board().folder if self.twin else None
-            served = run_robot(
-                self.profile, twin=self.twin, folder=folder, arguments=self.arguments
-            )
-            self._robot = self._stack.enter_context(served)
-        return self._robot
 
     def close(self) -> list[str]:
         """End everything, and put the pins of this machine at rest after any fault.
@@ -184,8 +179,8 @@ class Bench:
         Returns:
             Outputs that could not be put at rest.
         """
-        was_served = self._robot is not None
-        self._robot = self._board = None
+        was_served = vars(self).pop("robot", None) is not None
+        vars(self).pop("board", None)
         self.restarts = 0
         self._stack.close()
         if self.twin or not was_served:
@@ -262,7 +257,7 @@ def run_trial(bench: Bench, fault: Fault) -> TrialResult:
     else:
         result = _try(bench, fault)
     if fault.then == "starts afresh":
-        bench.robot().await_restart()
+        bench.robot.await_restart()
         bench.restarts += 1
     if fault.then == "is gone" or bench.restarts >= _MOST_RESTARTS:
         _replace(bench)
@@ -276,7 +271,7 @@ def _replace(bench: Bench) -> None:
 
 
 def _try(bench: Bench, fault: Fault) -> TrialResult:
-    robot = bench.robot()
+    robot = bench.robot
     began_ns = time.monotonic_ns()
     limit_ms = fault.limit_ms(bench.profile.limits)
     with ExitStack() as opened:
@@ -355,7 +350,7 @@ def _judged(
     bench: Bench, fault: Fault, began_ns: int, at_ns: int, sent: Sequence[int]
 ) -> TrialResult:
     """Judge a trial on a twin by its ledger."""
-    profile, ledger = bench.profile, read_ledger(bench.board().ledger_path)
+    profile, ledger = bench.profile, read_ledger(bench.board.ledger_path)
     if fault.needs in {"camera", "bumper", "button"}:
         # It begins with its line of the ledger, which of a switch is its edge. Until then the
         # request waits for this process and the board, neither of which is part of a robot.
@@ -460,7 +455,7 @@ def check_robot(
             yield from check_lamps(bench.profile, bench.pins, bench.ask, watcher.sees, shown_s)
 
     def drive() -> Iterator[Finding]:
-        with bench.robot() as served:
+        with bench.robot as served:
             yield from check_driving(served, bench.profile, cap)
 
     def leave_at_rest(findings: Iterator[Finding]) -> Iterator[Finding]:
