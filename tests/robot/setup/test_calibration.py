@@ -41,29 +41,23 @@ def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
     }
 
 
-def test_a_middle_outside_the_ends_is_refused() -> None:
+def test_impossible_measurements_are_refused() -> None:
+    """A middle beyond an end, a motor that starts at its full duty, and an encoder's wrong wire."""
     with pytest.raises(RobotError, match="must lie between"):
         pulse_changes(_SERVO, (0.2, 0.2, 0.2))
-
-
-def test_a_motor_that_turned_backward_gets_a_negative_mix() -> None:
-    """The pins of the profile do not change."""
-    assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
-    assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}
-
-
-@pytest.mark.parametrize("duty", [-0.1, 1.0, 2.0])
-def test_a_motor_starts_below_its_full_duty(duty: float) -> None:
-    with pytest.raises(RobotError, match="must start at a duty"):
-        motor_changes(_MOTOR, "forward", duty)
-
-
-def test_a_wheel_is_scaled_by_the_pushed_distance() -> None:
-    """A measured 0.5 m for 1 m doubles the distance per turn; none or less is a wrong wire."""
-    assert wheel_changes("wheel", 0.21, 0.5) == {"sensor.wheel.wheel_m": 0.42}
+    for duty in (-0.1, 1.0, 2.0):
+        with pytest.raises(RobotError, match="must start at a duty"):
+            motor_changes(_MOTOR, "forward", duty)
     for measured_m in (0.0, -0.8):
         with pytest.raises(RobotError, match="check its wires"):
             wheel_changes("wheel", 0.21, measured_m)
+
+
+def test_motors_and_wheels_change_what_was_measured() -> None:
+    """A motor that turned backward gets a negative mix; 0.5 m for 1 m doubles a wheel's turn."""
+    assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
+    assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}
+    assert wheel_changes("wheel", 0.21, 0.5) == {"sensor.wheel.wheel_m": 0.42}
 
 
 def test_an_output_is_described_in_its_own_units() -> None:
