@@ -157,15 +157,11 @@ def test_the_service_is_removed(pi: FakePi) -> None:
     assert "dtparam=strict_gpiod" in pi.config
 
 
-@pytest.mark.parametrize(
-    ("missing", "words"),
-    [("run/systemd", "not run by systemd"), ("proc/device-tree/model", "not a Raspberry Pi")],
-)
-def test_other_machines_are_refused(pi: FakePi, missing: str, words: str) -> None:
+def test_other_machines_are_refused(pi: FakePi) -> None:
     """The error names what is needed."""
     pi.machine.require_pi()
-    (pi.root / missing).rename(pi.root / "away")
-    with pytest.raises(RobotError, match=f"{words}.*Raspberry Pi OS"):
+    (pi.root / "proc/device-tree/model").unlink()
+    with pytest.raises(RobotError, match=r"not a Raspberry Pi.*Raspberry Pi OS"):
         pi.machine.require_pi()
 
 
