@@ -318,7 +318,7 @@ def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterat
     rule, path, wanted = root / _UDEV, root / _UNITS / unit.name, root / _WANTED / unit.name
     for device in servo_devices(profile):
         if Path(device).name.startswith(_UARTS):
-            yield from _serial_port(device, machine)
+            yield _serial_port(device, machine)
         else:
             yield SystemChange(
                 "latency timer",
@@ -328,15 +328,13 @@ def changes_to_install(profile: Profile, unit: Path, machine: Machine) -> Iterat
             )
     yield SystemChange(
         "service",
-        f"{path} is the unit next to the profile.",
-        lambda: path.exists() and path.read_bytes() == unit.read_bytes(),
-        (_root("install -m 644", unit, path), _root("systemctl daemon-reload")),
-    )
-    yield SystemChange(
-        "start",
-        "The robot starts with the computer, not armed.",
-        lambda: os.path.lexists(wanted),
-        (_root("systemctl enable", unit.name),),
+        f"{path} is the unit next to the profile, and starts with the computer, not armed.",
+        lambda: os.path.lexists(wanted) and _text(path) == _text(unit),
+        (
+            _root("install -m 644", unit, path),
+            _root("systemctl daemon-reload"),
+            _root("systemctl enable", unit.name),
+        ),
     )
 
 
@@ -397,22 +395,22 @@ def _interfaces(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
         yield line("camera", state, "camera_auto_detect=1", machine.finds_camera)
 
 
-def _serial_port(device: str, machine: Machine) -> Iterator[SystemChange]:
-    """Yield the changes for servos at the header's own serial port."""
-    yield SystemChange(
+def _serial_port(device: str, machine: Machine) -> SystemChange:
+    """Return the change for servos at the header's own serial port."""
+    lines = machine.config and machine.config.with_name("cmdline.txt")
+
+    def is_made() -> bool:
+        is_on = machine.settings().get("enable_uart") == "1" or machine.sets("uart0")
+        return is_on and bool(lines) and "console=serial0" not in _text(lines)
+
+    return SystemChange(
         "serial port",
-        f"{device} is on.",
-        lambda: machine.settings().get("enable_uart") == "1" or machine.sets("uart0"),
-        machine.by_raspi_config("do_serial_hw", "0"),
+        f"{device} is on, and no console uses it.",
+        is_made,
+        (
+            *machine.by_raspi_config("do_serial_hw", "0"),
+            *machine.by_raspi_config("do_serial_cons", "1"),
+        ),
         "restart",
-        "Add enable_uart=1 to config.txt.",
-    )
-    command_line = machine.config and machine.config.with_name("cmdline.txt")
-    yield SystemChange(
-        "serial console",
-        f"No console uses {device}.",
-        lambda: bool(command_line) and "console=serial0" not in _text(command_line),
-        machine.by_raspi_config("do_serial_cons", "1"),
-        "restart",
-        "Remove console=serial0,115200 from cmdline.txt.",
+        "Add enable_uart=1 to config.txt, and remove console=serial0,115200 from cmdline.txt.",
     )
