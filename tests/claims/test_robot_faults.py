@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.twin.check.faults import FAULTS
-from shapechanger.robot.twin.check.trial import Bench, run_trial, run_trials
+from shapechanger.robot.twin.check.trial import Bench, run_trials
 from shapechanger.robot.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
@@ -126,7 +126,7 @@ def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
     # Keep the robot after the trial, to inspect it.
     fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
     with contextlib.closing(Bench(write_profile(tmp_path), one_shot=False)) as bench:
-        result = run_trial(bench, fault)
+        *_, result = run_trials(bench, fault, 1)
         levels = frozen(read_ledger(bench.board.ledger_path), (22, 27))
     assert result.drove
     assert levels[22] in {0.0, 1.0}

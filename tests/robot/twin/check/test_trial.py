@@ -25,7 +25,7 @@ from shapechanger.robot.twin.check.trial import (
     Watcher,
     check_robot,
     fault_finding,
-    run_trial,
+    run_trials,
 )
 from tests.robot.check.held_pins import HeldPins, shipped
 
@@ -88,7 +88,7 @@ def test_a_fault_is_a_check(
     monkeypatch: pytest.MonkeyPatch, results: list[Any], level: str, sentence: str
 ) -> None:
     """It is good only if each stop was in time, and was measured or seen."""
-    monkeypatch.setattr(module, "run_trial", MagicMock(side_effect=results))
+    monkeypatch.setattr(module, "_try", MagicMock(side_effect=results))
     trials = sum(result is not _VOID for result in results) or 1
     found = fault_finding(Bench(shipped("car")), FAULTS["driver killed"], trials)
     assert found == (level, sentence)
@@ -164,13 +164,13 @@ def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
 
 def test_a_probe_is_asked_first(bench: Any) -> None:
     """If it never saw the motor driven, the trial is void; unmeasured promises are not kept."""
-    result = run_trial(bench, _fault(bench))
+    result = next(run_trials(bench, _fault(bench), 1))
     assert (math.isnan(result.stopped_ms), result.kept) == (True, False)
     asked: list[str] = []
     watcher: Any = Watcher()
     watcher.moves, watcher.rest_ms = (lambda: False), (lambda _: 7.0)
     bench.watcher, bench.ask = (lambda: watcher), asked.append
-    result = run_trial(bench, _fault(bench))
+    result = next(run_trials(bench, _fault(bench), 1))
     assert (result.stopped_ms, result.drove, result.kept, asked) == (7.0, False, False, [])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -243,25 +243,30 @@ class TrialResult:
         return self.drove and self.stopped_ms <= self.limit_ms and not self.unauthorised
 
 
-def run_trial(bench: Bench, fault: Fault) -> TrialResult:
-    """Drive, let a fault happen, and judge.
+def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]:
+    """Drive, let a fault happen, and judge, until the robot drove in as many trials as asked.
 
-    A robot that cannot be driven, because a busy machine made it restart, is replaced first; so is
-    one whose fault has an unknown time.
+    Thrice as many are made at most. A robot that cannot be driven, because a busy machine made it
+    restart, is replaced first; so is one whose fault has an unknown time.
     """
-    for _ in range(_ATTEMPTS - 1):
-        with suppress(NotTried):
+    drove = tried = not_tried = 0
+    while drove < trials and tried < _TRIES * trials:
+        try:
             result = _try(bench, fault)
-            break
-        _replace(bench)
-    else:
-        result = _try(bench, fault)
-    if fault.then == "starts afresh":
-        bench.robot.await_restart()
-        bench.restarts += 1
-    if fault.then == "is gone" or bench.restarts >= _MOST_RESTARTS:
-        _replace(bench)
-    return result
+        except NotTried:
+            not_tried += 1
+            if not_tried == _ATTEMPTS:
+                raise
+            _replace(bench)
+            continue
+        tried, not_tried = tried + 1, 0
+        drove += result.drove
+        if fault.then == "starts afresh":
+            bench.robot.await_restart()
+            bench.restarts += 1
+        if fault.then == "is gone" or bench.restarts >= _MOST_RESTARTS:
+            _replace(bench)
+        yield result
 
 
 def _replace(bench: Bench) -> None:
@@ -371,17 +376,6 @@ def _judged(
         drove=any(i.start_ns < at_ns < i.end_ns for i in propelled(ledger, bench.wiring)),
         unauthorised=tuple(i for i in strangers if i.end_ns > began_ns),
     )
-
-
-def run_trials(bench: Bench, fault: Fault, trials: int) -> Iterator[TrialResult]:
-    """Yield trials until the robot drove in as many as asked, or thrice as many were made."""
-    drove = 0
-    for _ in range(_TRIES * trials):
-        result = run_trial(bench, fault)
-        yield result
-        drove += result.drove
-        if drove == trials:
-            return
 
 
 def fault_finding(bench: Bench, fault: Fault, trials: int) -> tuple[Level, str]:
