@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -215,113 +216,86 @@ def _below(pid: int) -> list[int]:
     return [one for child in map(int, children) for one in (child, *_below(child))]
 
 
+def _calibrate(folder: Path, text: str, *steps: tuple[str, str], code: int = 0) -> tuple[str, str]:
+    """Press keys after each prompt, and return what was said and the profile afterwards."""
+    profile = write_profile(folder, text)
+    with Person(("robot", "calibrate", str(profile.path), "--twin"), folder, {}) as person:
+        read = 0
+        for prompt, keys in steps:
+            read = person.read_until(prompt, read)
+            person.press(keys)
+        assert person.end() == code, person.text
+        return person.text, profile.path.read_text()
+
+
+def _output(text: str, name: str) -> dict[str, Any]:
+    return tomllib.loads(text)["output"][name]
+
+
 def test_calibrating_a_servo(tmp_path: Path) -> None:
     """Ends and centre are written, and other lines kept."""
-    profile = write_profile(tmp_path, SERVO)
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("full left")
-        person.press("a" * 25)  # From 1500 us to the left, 2 % of 900 us each.
-        person.press("\r")
-        read = person.read_until("straight", read)
-        person.press("d")
-        person.press("\r")
-        read = person.read_until("full right", read)
-        person.press("d" * 20 + "\r")
-        assert person.end() == 0, person.text
-    text = profile.path.read_text()
-    steer = tomllib.loads(text)["output"]["steer"]
+    steps = (
+        ("full left", "a" * 25 + "\r"),  # From 1500 us to the left, 2 % of 900 us each.
+        ("straight", "d\r"),
+        ("full right", "d" * 20 + "\r"),
+    )
+    _, text = _calibrate(tmp_path, SERVO, *steps)
+    steer = _output(text, "steer")
     assert steer["left_us"] == pytest.approx(1500 - 0.5 * 900)
     assert steer["centre_us"] == pytest.approx(1500 + 0.02 * 900)
     assert steer["right_us"] == pytest.approx(1500 + 0.4 * 900)
-    assert "# Full left." in text
-    assert "# Not touched." in text
-    assert "calibrated = " in text
+    for kept in ("# Full left.", "# Not touched.", "calibrated = "):
+        assert kept in text
 
 
 def test_calibrating_a_motor(tmp_path: Path) -> None:
     """The start duty is written; a reversed motor gets a negative mix."""
-    profile = write_profile(tmp_path, MOTOR)
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("begins to move")
-        person.press("d" * 4 + "\r")
-        person.read_until("Y or N", read)
-        person.press("n")
-        assert person.end() == 0, person.text
-    text = profile.path.read_text()
-    drive = tomllib.loads(text)["output"]["drive"]
+    steps = (("begins to move", "d" * 4 + "\r"), ("Y or N", "n"))
+    _, text = _calibrate(tmp_path, MOTOR, *steps)
+    drive = _output(text, "drive")
     assert drive["start"] == pytest.approx(4 * 0.05 * 0.8)
     assert drive["mix"] == {"throttle": -0.8}
     assert "# Header place 15." in text
 
 
-def test_skipping_everything_writes_nothing(tmp_path: Path) -> None:
-    """The file is unchanged."""
-    profile = write_profile(tmp_path, SERVO)
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        person.read_until("full left")
-        person.press("n")
-        assert person.end() == 0
-        assert "nothing was written" in person.text
-    assert profile.path.read_text() == SERVO
-
-
 def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
     """Values are limited to the cap until the person confirms."""
-    profile = write_profile(tmp_path, ESC)
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("fastest backward")
-        person.press("a" * 40)
-        read = person.read_until("Go beyond it?", read)
-        person.press("\r")
-        read = person.read_until("surely at rest", read)
-        person.press("\r")
-        read = person.read_until("fastest forward", read)
-        person.press("d" * 40)
-        read = person.read_until("Go beyond it?", read)
-        person.press("y" + "d" * 5 + "\r")
-        assert person.end() == 0, person.text
-    drive = tomllib.loads(profile.path.read_text())["output"]["drive"]
+    steps = (
+        ("fastest backward", "a" * 40),
+        ("Go beyond it?", "\r"),
+        ("surely at rest", "\r"),
+        ("fastest forward", "d" * 40),
+        ("Go beyond it?", "y" + "d" * 5 + "\r"),
+    )
+    _, text = _calibrate(tmp_path, ESC, *steps)
+    drive = _output(text, "drive")
     assert drive["backward_us"] == pytest.approx(1500 - 0.4 * 900)
     assert drive["forward_us"] == pytest.approx(1500 + 0.5 * 900)
 
 
-@pytest.mark.parametrize("key", ["q", " ", "\x1b"])
+@pytest.mark.parametrize("key", ["q", " ", "\x1b", "n"])
 def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> None:
     """Q, Space and Escape end the calibration and discard results; N skips one output."""
     second = MOTOR.partition("[action.throttle]")
-    text = SERVO + "\n" + second[1] + second[2]
-    profile = write_profile(tmp_path, text)
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("full left")
-        person.press("n")
-        read = person.read_until("begins to move", read)
-        person.press("dddd\r")
-        read = person.read_until("Y or N", read)
-        person.press(key)
-        assert person.end() == 0
-        assert "nothing was written" in person.text
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        person.read_until("full left")
-        person.press(key)
-        assert person.end() == 0
-        assert "begins to move" not in person.text
-    assert profile.path.read_text() == text
+    both = SERVO + "\n" + second[1] + second[2]
+    if key == "n":
+        steps = (("full left", "n"), ("begins to move", "n"))
+        said, text = _calibrate(tmp_path, both, *steps)
+    else:
+        found = (("full left", "n"), ("begins to move", "dddd\r"), ("Y or N", key))
+        said, text = _calibrate(tmp_path, both, *found)
+        assert (text, "nothing was written" in said) == (both, True)
+        said, text = _calibrate(tmp_path, both, ("full left", key))
+        assert "begins to move" not in said
+    assert (text, "nothing was written" in said) == (both, True)
 
 
 def test_an_action_that_is_capped(tmp_path: Path) -> None:
     """The value written is the one applied, not the one requested."""
     capped = changed("gain = 1.0  # Not touched.", "low = -0.3", SERVO)
-    profile = write_profile(tmp_path, capped)
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("full left")
-        person.press("a" * 40 + "\r")
-        read = person.read_until("straight", read)
-        person.press("\r")
-        read = person.read_until("full right", read)
-        person.press("d" * 10 + "\r")
-        assert person.end() == 0, person.text
-    steer = tomllib.loads(profile.path.read_text())["output"]["steer"]
-    assert steer["left_us"] == pytest.approx(1500 - 0.3 * 900)
+    steps = (("full left", "a" * 40 + "\r"), ("straight", "\r"), ("full right", "d" * 10 + "\r"))
+    _, text = _calibrate(tmp_path, capped, *steps)
+    assert _output(text, "steer")["left_us"] == pytest.approx(1500 - 0.3 * 900)
 
 
 @pytest.mark.slow
@@ -341,25 +315,16 @@ def test_faults_on_a_twin(tmp_path: Path) -> None:
 def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
     """The motor's results are written, and the robot does not count as calibrated."""
     second = SERVO.partition("[action.steering]")
-    profile = write_profile(tmp_path, MOTOR + "\n" + second[1] + second[2])
-    with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
-        read = person.read_until("begins to move")
-        person.press("dddd")
-        read = person.read_until("duty 0.16", read)
-        person.press("\r")
-        read = person.read_until("Y or N", read)
-        person.press("y")
-        for place in ("full left", "straight", "full right"):
-            read = person.read_until(place, read)
-            read = person.read_until("1500 µs", read)
-            person.press("\r")
-        assert person.end() == 2
-        assert "must lie between" in person.text
-        assert "Results so far" in person.text
-    written = tomllib.loads(profile.path.read_text())
-    assert written["output"]["drive"]["start"] == pytest.approx(4 * 0.05 * 0.8)
-    assert written["output"]["steer"]["left_us"] == 1150
-    assert "calibrated" not in written["robot"]
+    steps = [("begins to move", "dddd"), ("duty 0.16", "\r"), ("Y or N", "y")]
+    for place in ("full left", "straight", "full right"):
+        steps += [(place, ""), ("1500 µs", "\r")]
+    both = MOTOR + "\n" + second[1] + second[2]
+    said, text = _calibrate(tmp_path, both, *steps, code=2)
+    assert "must lie between" in said
+    assert "Results so far" in said
+    assert _output(text, "drive")["start"] == pytest.approx(4 * 0.05 * 0.8)
+    assert _output(text, "steer")["left_us"] == 1150
+    assert "calibrated" not in tomllib.loads(text)["robot"]
 
 
 def test_a_cap_below_a_threshold_is_reported(
