@@ -89,6 +89,9 @@ _START_TICKS: Final = 50  # Half a second, in which servos start that get their 
 _READINGS: Final = 50  # Half a second; single readings differ by a count or two.
 # Chosen: half a percent of the longest excursion of a finger's tendon.
 _STILL_M: Final = 0.2e-3
+_STILL_MS: Final = 300  # Time for which no servo may move.
+_WITHIN_MS: Final = 10_000
+_TRAVEL_M: Final = 0.06  # Limit of winding in.
 
 
 def find_joint_zeros(
@@ -134,14 +137,7 @@ def require_homing(settings: BusSettings) -> None:
             )
 
 
-def home(
-    settings: BusSettings,
-    cycle: Callable[[Mapping[str, float]], BusState],
-    *,
-    still_ms: int = 300,
-    within_ms: int = 10_000,
-    travel_m: float = 0.06,
-) -> dict[str, int]:
+def home(settings: BusSettings, cycle: Callable[[Mapping[str, float]], BusState]) -> dict[str, int]:
     """Pull all tendons of a held bus until nothing moves, so that they hold a known posture.
 
     Slack tendons are taken up meanwhile.
@@ -149,9 +145,6 @@ def home(
     Args:
         settings: The bus.
         cycle: Sends the tension of each tendon, N, and returns the state of the bus.
-        still_ms: Time for which no servo may move, ms.
-        within_ms: Time limit, ms.
-        travel_m: Limit of winding in, m.
 
     Returns:
         Position of each servo at the zero of its tendon, in counts, by name.
@@ -173,19 +166,19 @@ def home(
             name, at = servo.name, state.servos[servo.name].position
             zeros[name] = at
             wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
-            if wound_m > travel_m:
+            if wound_m > _TRAVEL_M:
                 reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
                 raise RobotError(f"{servo.words} has no zero: {reason}. Its tendon has come off.")
             was_at, _ = moved.setdefault(name, (at, state.at_ns))
             if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
                 moved[name] = at, state.at_ns
-        still_ns = state.at_ns - still_ms * 1_000_000
+        still_ns = state.at_ns - _STILL_MS * 1_000_000
         moving = [name for name in tensions if name not in moved or moved[name][1] > still_ns]
         if not moving:
             return zeros
-        if state.at_ns - began_ns > within_ms * 1_000_000:
+        if state.at_ns - began_ns > _WITHIN_MS * 1_000_000:
             names = ", ".join(moving)
-            raise RobotError(f"No zero: {names} still moved after {within_ms / 1e3:g} s.")
+            raise RobotError(f"No zero: {names} still moved after {_WITHIN_MS / 1e3:g} s.")
 
 
 def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) -> dict[str, int]:

@@ -3,6 +3,7 @@
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.setup import calibration
 from shapechanger.robot.setup.calibration import home, require_homing
 from tests.robot.drivers.servos.rigs import NAMES, Rig, servo, settings
 
@@ -28,15 +29,18 @@ def test_homing_finds_the_position_at_the_homing_tension(rig: Rig) -> None:
     assert length == pytest.approx(0.0, abs=1e-4)
 
 
-def test_a_tendon_without_load_is_named(rig: Rig) -> None:
+def test_a_tendon_without_load_is_named(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibration, "_TRAVEL_M", 0.03)
     rig.twin("EDC").motor.snapped = True
     with pytest.raises(RobotError, match=r"EDC \(id 4\) has no zero: it was wound in by 3"):
-        home(rig.settings, rig.cycle, travel_m=0.03)
+        home(rig.settings, rig.cycle)
 
 
-def test_homing_times_out(rig: Rig) -> None:
+def test_homing_times_out(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibration, "_WITHIN_MS", 100)
+    monkeypatch.setattr(calibration, "_STILL_MS", 1000)
     with pytest.raises(RobotError, match=f"zero: {', '.join(NAMES)} still moved after 0.1 s"):
-        home(rig.settings, rig.cycle, within_ms=100, still_ms=1000)
+        home(rig.settings, rig.cycle)
 
 
 def test_a_fault_ends_homing(rig: Rig) -> None:
