@@ -217,7 +217,7 @@ def _below(pid: int) -> list[int]:
 
 
 def _calibrate(folder: Path, text: str, *steps: tuple[str, str], code: int = 0) -> tuple[str, str]:
-    """Press keys after each prompt, and return what was said and the profile afterwards."""
+    """Press keys after each prompt, and return its output and the profile afterwards."""
     profile = write_profile(folder, text)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), folder, {}) as person:
         read = 0
