@@ -18,8 +18,17 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.chip import Claim, KeyMistake, Keys, SensorChip, device_errors
-from shapechanger.robot.drivers.i2c import BusNumber, i2c_claims
+from shapechanger.robot.drivers.chip import (
+    BusNumber,
+    Claim,
+    I2cDevice,
+    I2cKeys,
+    KeyMistake,
+    Keys,
+    SensorChip,
+    device_errors,
+    i2c_claims,
+)
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 
@@ -92,8 +101,8 @@ Magnet = Literal["", "gone", "weak", "strong"]
 """State of the magnet: in order (""), missing, too weak or too strong."""
 
 
-class As5600:
-    """Encoders of several joints; see `SensorDriver`.
+class As5600(I2cDevice):
+    """Encoders of several joints, behind the multiplexer; see `SensorDriver`.
 
     Attributes:
         joints: Keys of each joint, by name.
@@ -101,20 +110,16 @@ class As5600:
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = As5600Keys.of(plan.settings)
+        mux = I2cKeys(bus=keys.bus, address=keys.mux)
+        super().__init__(f"The multiplexer of sensor {plan.name!r}", mux, hardware)
         self.joints = keys.rows
-        self._mux = keys.mux
-        self._mux_name = (
-            f"The multiplexer of sensor {plan.name!r} at 0x{keys.mux:02x} on I2C bus {keys.bus}"
-        )
         self._missed = dict.fromkeys(keys.rows, 0)
-        with device_errors(self._mux_name):
-            self._bus = hardware.i2c(keys.bus)
 
     def measure(self, joint: str) -> tuple[int, Magnet]:
         """Read the raw angle of one joint, 0 to 4095, which a missing magnet makes meaningless."""
         channel = self.joints[joint].channel
-        with device_errors(self._mux_name):
-            self._bus.write_byte(self._mux, 1 << channel)
+        with device_errors(self.name):
+            self._bus.write_byte(self._address, 1 << channel)
         with device_errors(f"The encoder of {joint}, on channel {channel},"):
             status, high, low = self._bus.read_i2c_block_data(ADDRESS, _STATUS, 3)
         magnet: Magnet = "strong" if status & _TOO_STRONG else "weak" if status & _TOO_WEAK else ""
@@ -151,10 +156,6 @@ class As5600:
         if failures:
             raise RobotError(" ".join(failures))
         return said
-
-    def close(self) -> None:
-        """Close the bus."""
-        self._bus.close()
 
 
 def open_and_read(plan: SensorPlan, hardware: Hardware) -> As5600:

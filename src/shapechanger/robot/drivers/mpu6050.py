@@ -15,8 +15,7 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import SensorChip
-from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, simulated_at_address
+from shapechanger.robot.drivers.chip import I2cDevice, I2cKeys, SensorChip, simulated_at_address
 from shapechanger.robot.drivers.simulation import SimulatedChip
 from shapechanger.robot.hardware import Hardware
 

@@ -18,8 +18,15 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.chip import Claim, PulseChannel, PulseSource, device_errors
-from shapechanger.robot.drivers.i2c import I2cDevice, I2cKeys, i2c_claims
+from shapechanger.robot.drivers.chip import (
+    Claim,
+    I2cDevice,
+    I2cKeys,
+    PulseChannel,
+    PulseSource,
+    device_errors,
+    i2c_claims,
+)
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin
 from shapechanger.robot.drivers.simulation import (
     NO_PULSE,
