@@ -75,31 +75,20 @@ def test_missing_hardware_is_reported_on_opening(
     assert hardware.bus.closed == 1
 
 
-def test_a_short_dropout_is_tolerated() -> None:
+@pytest.mark.parametrize("lost", [_MUX, _ENCODER])
+def test_a_short_dropout_is_tolerated(lost: int) -> None:
     """A joint is absent at first, and a fault from the fifth failed reading in a row."""
     hardware, bus = _rig()
     sensor = hardware.sensor("as5600", **_TWO)
+    chip = bus.chips.pop(lost)
     for _ in range(2):
-        bus.chips[_ENCODER][0x0B] = 0x10
-        for _ in range(4):
-            assert sensor.read(0, 0.0) == {}
-        bus.chips[_ENCODER][0x0B] = 0x20
+        assert [sensor.read(0, 0.0) for _ in range(4)] == [{}] * 4
+        bus.chips[lost] = chip
         assert set(sensor.read(0, 0.0)) == {"knee/angle", "ankle/angle"}
-    bus.chips[_ENCODER][0x0B] = 0x10
-    for _ in range(4):
-        assert sensor.read(0, 0.0) == {}
+        del bus.chips[lost]
+    assert [sensor.read(0, 0.0) for _ in range(4)] == [{}] * 4
     for _ in range(2):
-        with pytest.raises(RobotError, match=r"knee, .* no magnet\. The encoder of ankle"):
+        with pytest.raises(RobotError) as caught:
             sensor.read(0, 0.0)
-
-
-def test_a_missing_multiplexer_is_reported_once() -> None:
-    """The error does not repeat it for each joint."""
-    hardware, bus = _rig()
-    sensor = hardware.sensor("as5600", **_TWO)
-    del bus.chips[_MUX]
-    for _ in range(4):
-        assert sensor.read(0, 0.0) == {}
-    with pytest.raises(RobotError) as caught:
-        sensor.read(0, 0.0)
-    assert str(caught.value).count("does not answer") == 1
+        # The multiplexer is reported once, not for each joint.
+        assert str(caught.value).count("does not answer") == (1 if lost == _MUX else 2)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,14 @@ class _Bench:
     def open(self) -> OutputDriver:
         return self.hardware.output(self.driver, **self.settings)
 
+    @contextlib.contextmanager
+    def failing(self, operation: int, takes_effect: bool) -> Iterator[None]:
+        """Let an operation fail."""
+        self.hardware.fault.arm(operation, takes_effect)
+        with contextlib.suppress(RobotError):
+            yield
+        self.hardware.fault.disarm()
+
     def state(self) -> dict[str, Any]:
         """Return what reaches the motor."""
         chip = self.hardware.bus.chips[0x40]
@@ -90,6 +99,15 @@ def _state_after(bench: Bench, *values: float) -> dict[str, Any]:
     return sound.state()
 
 
+def _benches(bench: Bench) -> Iterator[tuple[int, _Bench]]:
+    """Make benches, each with a number, until every operation has failed once."""
+    for operation in range(1, _MOST_OPERATIONS):
+        tried = bench()
+        yield operation, tried
+        if not tried.hardware.fault.happened:
+            return
+
+
 # `servos/test_faults.py` covers these.
 _ON_A_BUS = {"bus_servo"}
 
@@ -99,88 +117,67 @@ def test_every_driver_is_covered() -> None:
     assert {driver for driver, _ in _OUTPUTS.values()} == set(OUTPUTS) - _ON_A_BUS
 
 
-@pytest.mark.parametrize("takes_effect", [False, True])
+_takes_effect = pytest.mark.parametrize("takes_effect", [False, True])
+
+
+@_takes_effect
 @pytest.mark.parametrize(("before", "asked"), [(0.0, 0.6), (0.6, -0.6), (-0.6, 0.0), (0.3, 0.6)])
 def test_after_a_failure_the_next_write_reaches_the_hardware(
     bench: Bench, before: float, asked: float, takes_effect: bool
 ) -> None:
     """Whichever operation fails, and whether or not it took effect, the next write applies."""
-    expected = {after: _state_after(bench, before, after) for after in (0.0, before, asked)}
-    for after in expected:
-        for operation in range(1, _MOST_OPERATIONS):
-            tried = bench()
+    for after in (0.0, before, asked):
+        expected = _state_after(bench, before, after)
+        for operation, tried in _benches(bench):
             output = tried.open()
             output.write(before, 0)
-            tried.hardware.fault.arm(operation, takes_effect)
-            try:
+            with tried.failing(operation, takes_effect):
                 output.write(asked, 1)
-            except RobotError:
-                pass
-            else:
                 assert not tried.hardware.fault.happened, "a failure was hidden"
-            tried.hardware.fault.disarm()
             output.write(after, 2)
-            assert tried.state() == expected[after], (operation, after)
-            if not tried.hardware.fault.happened:
-                break  # All operations of a write have failed once.
+            assert tried.state() == expected, (operation, after)
 
 
-@pytest.mark.parametrize("takes_effect", [False, True])
+@_takes_effect
 def test_after_a_failed_release_the_next_one_reaches_the_hardware(
     bench: Bench, takes_effect: bool
 ) -> None:
     """After a failed release, a second release and a write both take effect."""
     expected: list[dict[str, Any]] = []
-    for operation in range(_MOST_OPERATIONS):  # None of them is number 0.
-        tried = bench()
+    for operation, tried in chain([(0, bench())], _benches(bench)):  # None is number 0.
         output = tried.open()
         output.write(0.6, 0)
-        tried.hardware.fault.arm(operation, takes_effect)
-        with contextlib.suppress(RobotError):
+        with tried.failing(operation, takes_effect):
             output.release()
-        tried.hardware.fault.disarm()
         output.release()
         states = [tried.state()]
         output.write(0.0, 1)
         states.append(tried.state())
         expected = expected or states
         assert states == expected, operation
-        if operation and not tried.hardware.fault.happened:
-            break
 
 
-@pytest.mark.parametrize("takes_effect", [False, True])
+@_takes_effect
 def test_after_a_failed_opening_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
     """The supervisor can retry opening with the same pins."""
     expected = _state_after(bench)
-    for operation in range(1, _MOST_OPERATIONS):
-        tried = bench()
-        tried.hardware.fault.arm(operation, takes_effect)
+    for operation, tried in _benches(bench):
         output = None
-        with contextlib.suppress(RobotError):
+        with tried.failing(operation, takes_effect):
             output = tried.open()
-        tried.hardware.fault.disarm()
         output = output or tried.open()
         assert tried.state() == expected, operation
         output.close()
-        if not tried.hardware.fault.happened:
-            break
 
 
-@pytest.mark.parametrize("takes_effect", [False, True])
+@_takes_effect
 def test_after_a_failed_close_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
     """A driver whose close failed holds no pin, and the next one brings the output to rest."""
     expected = _state_after(bench, 0.0)
-    for operation in range(1, _MOST_OPERATIONS):
-        tried = bench()
+    for operation, tried in _benches(bench):
         output = tried.open()
         output.write(0.6, 0)
-        tried.hardware.fault.arm(operation, takes_effect)
-        with contextlib.suppress(RobotError):
+        with tried.failing(operation, takes_effect):
             output.close()
-        tried.hardware.fault.disarm()
-        output = tried.open()
-        output.write(0.0, 1)
+        tried.open().write(0.0, 1)
         assert tried.state() == expected, operation
-        if not tried.hardware.fault.happened:
-            break

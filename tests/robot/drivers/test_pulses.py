@@ -100,39 +100,33 @@ def test_controller_brakes_before_it_reverses() -> None:
     assert esc.write(0.5, 1050 * MS) == 0.5  # Forward acts at once.
 
 
-def test_chip_is_set_up_asleep_and_woken() -> None:
-    """The prescaler is set while asleep, and stale channels are off before waking."""
-    hardware = FakeHardware({0x40: _asleep()})
+_SETUP = [(0xFD, [0x10]), (0x00, [0x30]), (0xFE, [121])]
+
+
+@pytest.mark.parametrize(
+    ("registers", "first"), [(_asleep(), _SETUP), ({0x00: 0x20, 0xFE: 121}, [])]
+)
+def test_chip_is_set_up_asleep_and_woken(
+    registers: dict[int, int], first: list[tuple[int, list[int]]]
+) -> None:
+    """Stale channels are off before waking; a configured chip pulses its other channels on."""
+    hardware = FakeHardware({0x40: registers})
     hardware.output("servo", **_ON_CHIP, channel=3)
-    assert [(register, data) for _, register, data in hardware.bus.writes] == [
-        (0xFD, [0x10]),
-        (0x00, [0x30]),
-        (0xFE, [121]),
-        (0x01, [0x04]),
-        (0x00, [0x20]),
-        (0x06 + 12, [0, 0, 0, 0x10]),
-    ]
+    last = [(0x01, [0x04]), (0x00, [0x20]), (0x06 + 12, [0, 0, 0, 0x10])]
+    assert [(register, data) for _, register, data in hardware.bus.writes] == first + last
 
 
-@pytest.mark.parametrize("simulated", [False, True])
+@pytest.mark.parametrize(("is_real", "pauses"), [(True, [500e-6]), (False, [])])
 def test_a_simulated_chip_wakes_up_without_a_pause(
-    monkeypatch: pytest.MonkeyPatch, simulated: bool
+    monkeypatch: pytest.MonkeyPatch, is_real: bool, pauses: list[float]
 ) -> None:
     """A real oscillator needs 500 us; in simulated time nothing sleeps."""
     slept: list[float] = []
     monkeypatch.setattr(pca9685.time, "sleep", slept.append)
     hardware = FakeHardware({0x40: _asleep()})
-    if simulated:
-        monkeypatch.setattr(hardware, "clock", SimpleNamespace(is_real=False))
+    monkeypatch.setattr(hardware, "clock", SimpleNamespace(is_real=is_real))
     hardware.output("servo", **_ON_CHIP, channel=3)
-    assert slept == ([] if simulated else [500e-6])
-
-
-def test_a_running_chip_is_not_put_to_sleep() -> None:
-    """A chip that is already configured keeps pulsing its other channels."""
-    hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121}})
-    hardware.output("servo", **_ON_CHIP, channel=3)
-    assert [register for _, register, _ in hardware.bus.writes] == [0x01, 0x00, 0x06 + 12]
+    assert slept == pauses
 
 
 def test_pulse_is_in_whole_steps() -> None:
@@ -179,19 +173,6 @@ def test_output_enable_is_low_only_while_something_is_sent() -> None:
     assert enable.state == 1.0
 
 
-def test_outputs_are_off_when_the_bus_fails() -> None:
-    hardware = FakeHardware({0x40: _asleep()})
-    servo = hardware.output("servo", **_ON_CHIP | {"output_enable": 26}, channel=0)
-    servo.write(1.0, 0)
-    chip = hardware.bus.chips.pop(0x40)
-    with pytest.raises(RobotError, match="does not answer"):
-        servo.write(0.0, 1)
-    assert hardware.factory.pin(26).state == 1.0
-    hardware.bus.chips[0x40] = chip
-    servo.write(0.0, 2)
-    assert hardware.factory.pin(26).state == 0.0
-
-
 def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
@@ -232,12 +213,6 @@ def test_a_chip_that_lost_power_is_configured_again() -> None:
     assert (chip[0x00], chip[0xFE]) == (0x20, 121)
     assert _width_us(hardware, 0) == pytest.approx(1500, abs=5)
     assert _width_us(hardware, 1) == pytest.approx(1750, abs=5)
-
-
-def test_a_missing_chip_is_named() -> None:
-    """The error gives address and bus, as for i2cdetect."""
-    with pytest.raises(RobotError, match="PCA9685 at 0x40 on I2C bus 1 does not answer"):
-        FakeHardware().output("servo", **_ON_CHIP, channel=3)
 
 
 _KERNEL = {"over": "sysfs", "channel": 1, "hz": 50}

@@ -203,29 +203,25 @@ class SimulatedAs5600(SimulatedChip):
 class Tca9548a(SimulatedChip):
     """TCA9548A: multiplexer of one I2C bus to eight; all are closed at power-on.
 
-    Args:
+    Attributes:
         channels: Chip behind each channel, 0 to 7; all chips have the same address.
+        control: Its register, with a bit for each channel.
     """
 
     is_logged = False  # It moves nothing, and hundreds of writes a second would fill the ledger.
 
     def __init__(self, channels: Mapping[int, SimulatedChip]) -> None:
-        self._channels = channels
-        self._control = 0
-
-    @property
-    def open(self) -> list[SimulatedChip]:
-        """Chips behind the open channels."""
-        return [chip for channel, chip in self._channels.items() if self._control >> channel & 1]
+        self.channels = channels
+        self.control = 0
 
     def read(self, register: int, length: int) -> list[int]:
         """Read the control register; sending the register byte writes it first."""
-        self._control = register
-        return [self._control] * length
+        self.control = register
+        return [self.control] * length
 
     def write(self, register: int, data: Sequence[int]) -> None:
         """Write the control register; of all bytes, the register byte included, the last counts."""
-        self._control = (register, *data)[-1]
+        self.control = (register, *data)[-1]
 
 
 class ChannelsBehind(SimulatedChip):
@@ -240,7 +236,9 @@ class ChannelsBehind(SimulatedChip):
         Raises:
             OSError: If no channel is open, with the `errno` of the kernel's driver.
         """
-        if not (chips := self._mux.open):
+        mux = self._mux
+        chips = [chip for channel, chip in mux.channels.items() if mux.control >> channel & 1]
+        if not chips:
             raise OSError(errno.EREMOTEIO, "no chip answers")
         data = [0xFF] * length
         for chip in chips:
@@ -287,4 +285,3 @@ AS5600: Final = SensorChip(
     features=_features,
     rows=JointKeys,
 )
-"""Magnetic encoders at joints."""

@@ -59,9 +59,7 @@ FilePath = Annotated[str, _printable(4096)]
 class KeyMistake(ValueError):
     """A value of a key that the other keys of its table do not allow.
 
-    Args:
-        key: Name of the key.
-        words: What is wrong, as the end of a sentence that begins with the key and its table.
+    `words` say what is wrong, as the end of a sentence that begins with the key and its table.
     """
 
     def __init__(self, key: str, words: str) -> None:
@@ -130,14 +128,7 @@ class I2cKeys(Keys, frozen=True, kw_only=True):
 
 
 def i2c_claims(bus: int, key: str, address: int, group: str = "") -> Iterator[Claim]:
-    """Return the claims of a chip on an I2C bus.
-
-    Args:
-        bus: Number of the bus.
-        key: Key of the address.
-        address: The address.
-        group: What the chip shares its address with; "" for nothing.
-    """
+    """Return the claims of an address, which has a key, and of its bus; see `Claim` for groups."""
     yield Claim(key, f"address {address:#x} of I2C bus {bus}", group)
     for pin in I2C_PINS.get(bus, ()):
         yield Claim("bus", f"GPIO{pin}", f"I2C bus {bus}", f", a wire of I2C bus {bus},")

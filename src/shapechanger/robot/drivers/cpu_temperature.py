@@ -53,4 +53,3 @@ class CpuTemperature:
 CPU_TEMPERATURE: Final = SensorChip(
     measures="temperature", keys=CpuTemperatureKeys, open=CpuTemperature
 )
-"""The temperature of the CPU."""

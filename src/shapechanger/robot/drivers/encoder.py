@@ -159,4 +159,3 @@ class SimulatedEncoder(SimulatedSensor):
 ENCODER: Final = SensorChip(
     measures="speed", keys=EncoderKeys, open=Encoder, simulate=SimulatedEncoder
 )
-"""A wheel encoder."""

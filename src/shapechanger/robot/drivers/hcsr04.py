@@ -144,4 +144,3 @@ class SimulatedHcsr04(SimulatedSensor):
 HCSR04: Final = SensorChip(
     measures="distance", keys=Hcsr04Keys, open=Hcsr04, simulate=SimulatedHcsr04
 )
-"""An ultrasonic distance sensor."""

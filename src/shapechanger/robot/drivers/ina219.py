@@ -71,4 +71,3 @@ INA219: Final = SensorChip(
     open=Ina219,
     simulate=simulated_at_address(SimulatedIna219),
 )
-"""A voltage sensor."""

@@ -211,7 +211,6 @@ HBRIDGE: Final = OutputChip(
     unpowered=_OFF,
     lights=(("forward", " forward", 1.0), ("backward", " backward", -1.0), _LIT_ENABLE),
 )
-"""A motor on an H-bridge."""
 
 PHASE_ENABLE: Final = OutputChip(
     keys=PhaseEnableKeys,
@@ -220,4 +219,3 @@ PHASE_ENABLE: Final = OutputChip(
     unpowered=_OFF,
     lights=(_LIT_ENABLE, ("phase", " backward", -1.0)),
 )
-"""A motor on a driver in phase/enable mode."""

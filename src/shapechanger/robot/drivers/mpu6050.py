@@ -138,4 +138,3 @@ MPU6050: Final = SensorChip(
     open=Mpu6050,
     simulate=simulated_at_address(SimulatedMpu6050),
 )
-"""An inertial sensor."""

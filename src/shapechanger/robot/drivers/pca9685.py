@@ -90,8 +90,6 @@ class Pca9685(I2cDevice):
     if there is a pin for it, until all channels have been rewritten.
 
     Attributes:
-        hz: Frequency of the pulses, Hz.
-        output_enable: Pin at the OE input; -1 for none.
         steps: Width of the pulses of each open channel, steps of 1/4096 of the period; None for a
             channel in doubt.
         step_us: Width of a step, µs: 4.88 µs at 50 Hz.
@@ -302,4 +300,3 @@ PCA9685: Final = PulseSource(
     pulse_us=_pulse_us,
     chips=lambda plan: {(plan.settings["bus"], plan.settings["address"]): SimulatedPca9685()},
 )
-"""A board with 16 channels of pulses."""

@@ -104,7 +104,6 @@ def _pulse_us(plan: OutputPlan, duty: DutyOf, levels: Levels) -> float:
 
 
 LGPIO: Final = PulseSource(keys=_LgpioKeys, open=_PinChannel, pulse_us=_pulse_us)
-"""Pulses on a pin, by lgpio."""
 
 
 _ROOT: Final = Path("/sys/class/pwm")
@@ -162,7 +161,6 @@ class SysfsPwm(PulseChannel):
 
 
 SYSFS: Final = PulseSource(keys=_SysfsKeys, open=SysfsPwm)
-"""Pulses of the kernel's PWM."""
 
 
 # Dead band of a speed controller on each side of neutral, µs; makers state 10 to 50.
@@ -272,7 +270,6 @@ SERVO: Final = OutputChip(
     lights=_LIT_PIN,
     differs="it turns no faster than its profile allows",
 )
-"""A hobby servo."""
 
 
 class EscKeys(PulsedKeys, frozen=True, kw_only=True):
@@ -413,4 +410,3 @@ ESC: Final = OutputChip(
     differs="its controller waits, brakes or changes direction",
     drives=True,
 )
-"""A hobby speed controller."""

@@ -83,4 +83,3 @@ class SimulatedSwitch(SimulatedSensor):
 
 
 SWITCH: Final = SensorChip(measures="bump", keys=SwitchKeys, open=Switch, simulate=SimulatedSwitch)
-"""Bumper switches."""
