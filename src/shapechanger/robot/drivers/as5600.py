@@ -231,15 +231,11 @@ class ChannelsBehind(SimulatedChip):
         self._mux = mux
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read all chips behind open channels: a bit that one of them pulls low is low.
-
-        Raises:
-            OSError: If no channel is open, with the `errno` of the kernel's driver.
-        """
+        """Read all chips behind open channels: a bit that one of them pulls low is low."""
         mux = self._mux
         chips = [chip for channel, chip in mux.channels.items() if mux.control >> channel & 1]
         if not chips:
-            raise OSError(errno.EREMOTEIO, "no chip answers")
+            raise OSError(errno.EREMOTEIO, "no chip answers")  # As the kernel's driver.
         data = [0xFF] * length
         for chip in chips:
             data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]

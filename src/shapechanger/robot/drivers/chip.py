@@ -156,13 +156,8 @@ def _kinds() -> tuple[type[BaseException], ...]:
 class I2cDevice:
     """A chip on an I2C bus, whose errors name it; the base of its driver.
 
-    Args:
-        name: Name of the device, such as "Sensor 'imu'".
-        keys: Its bus and address.
-        hardware: The buses of this robot.
-
     Attributes:
-        name: The name with the address, for messages.
+        name: The name, such as "Sensor 'imu'", with the address, for messages.
     """
 
     def __init__(self, name: str, keys: I2cKeys, hardware: Hardware) -> None:
@@ -281,11 +276,9 @@ def simulated_at_address(
     chip: Callable[[World], SimulatedChip],
 ) -> Callable[[SensorPlan, World], SimulatedSensor]:
     """Return the simulation of a sensor that is one chip, at the address in its settings."""
-
-    def simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
-        return SimulatedSensor({(plan.settings["bus"], plan.settings["address"]): chip(world)})
-
-    return simulate
+    return lambda plan, world: SimulatedSensor(
+        {(plan.settings["bus"], plan.settings["address"]): chip(world)}
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,11 +336,7 @@ _Chip = TypeVar("_Chip", SensorChip, OutputChip, PulseSource)
 
 @cache
 def _others() -> dict[str, SensorChip | OutputChip | PulseSource]:
-    """Return the chips of other packages.
-
-    Raises:
-        RobotError: If an entry point names no chip.
-    """
+    """Return the chips of other packages."""
     found = {point.name: point.load() for point in entry_points(group=_GROUP)}
     for name, chip in found.items():
         if not isinstance(chip, SensorChip | OutputChip | PulseSource):

@@ -22,9 +22,6 @@ if TYPE_CHECKING:  # Only a twin has a world.
 # Time without an edge after which the wheel counts as standing.
 _STANDS_AFTER_S: Final = 0.5
 
-# A count has four edges; whole counts even out their unequal lengths.
-_EDGES_PER_COUNT: Final = 4
-
 # Levels of the channels, a and b, as the wheel rolls forward: a leads.
 _FORWARD: Final = ((0, 0), (1, 0), (1, 1), (0, 1))
 
@@ -60,7 +57,8 @@ class Encoder:
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = EncoderKeys.of(plan.settings)
         self._two_channels = keys.b != NO_PIN
-        edges_per_count = _EDGES_PER_COUNT if self._two_channels else 1
+        # Whole counts even out the unequal lengths of their edges.
+        edges_per_count = len(_FORWARD) if self._two_channels else 1
         self._edge_m = keys.count_m / edges_per_count
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._levels = [0, 0]  # A missing channel stays low.

@@ -81,11 +81,8 @@ class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
 class _DutyMotor:
     """Bidirectional motor on two pins; see `OutputDriver`.
 
-    Args:
-        plan: The output.
-        hardware: Its pins.
-        hz: Frequency of the PWM of each pin, Hz; 0 for a plain output. The inputs of the motor are
-            the last two, after a pin that enables them.
+    `hz` has the frequency of the PWM of each pin, Hz, 0 for a plain output. The inputs of the motor
+    are the last two, after a pin that enables them.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware, hz: Mapping[Pin, int]) -> None:
@@ -201,7 +198,6 @@ def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], Wi
 
 
 _OFF: Final = WiredOutput(0.0, True)
-
 _LIT_ENABLE: Final = ("enable", " enable", 1.0)
 
 HBRIDGE: Final = OutputChip(

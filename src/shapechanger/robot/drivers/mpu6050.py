@@ -92,7 +92,6 @@ class Mpu6050(I2cDevice):
         }
 
 
-_GYRO_ZOUT_L: Final = 0x48
 _SLEEP: Final = 0x40  # PWR_MGMT_1.
 _LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)  # Section 4.17.
 _LSB_PER_DEG_PER_S: Final = (131.0, 65.5, 32.8, 16.4)  # Section 4.19.
@@ -109,7 +108,7 @@ class SimulatedMpu6050(SimulatedChip):
 
     def read(self, register: int, length: int) -> list[int]:
         """Read bytes, starting at a register."""
-        if register <= _GYRO_ZOUT_L and register + length > _ACCEL_XOUT_H:
+        if not self._registers[_PWR_MGMT_1] & _SLEEP:
             self._measure()
         return [self._registers[(register + i) % 128] for i in range(length)]
 
@@ -120,8 +119,6 @@ class SimulatedMpu6050(SimulatedChip):
                 self._registers[at % 128] = byte
 
     def _measure(self) -> None:
-        if self._registers[_PWR_MGMT_1] & _SLEEP:
-            return
         seen = self._world.inputs()
         per_g = _LSB_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
         per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]

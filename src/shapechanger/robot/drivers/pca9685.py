@@ -100,7 +100,7 @@ class Pca9685(I2cDevice):
         self.hz = hz
         self.output_enable = keys.output_enable
         self.steps: dict[int, int | None] = {}
-        self._wakes_up_s = _WAKE_UP_S if hardware.clock.is_real else 0.0
+        self._clock = hardware.clock
         self._prescale = round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1  # Section 7.3.5.
         self.step_us = (self._prescale + 1) / _OSCILLATOR_MHZ
         self._must_start = False
@@ -158,8 +158,8 @@ class Pca9685(I2cDevice):
             self.write_registers(_PRESCALE, self._prescale)
         self.write_registers(_MODE2, _TOTEM_POLE)
         self.write_registers(_MODE1, _AUTO_INCREMENT)
-        if asleep and self._wakes_up_s:
-            time.sleep(self._wakes_up_s)
+        if asleep and self._clock.is_real:
+            time.sleep(_WAKE_UP_S)
         self._must_start = False
 
     def _write(self, channel: int, steps: int) -> None:
@@ -195,9 +195,8 @@ _OPEN: Final = WeakValueDictionary[tuple[Hardware, int, int], Pca9685]()
 class Pca9685Channel(PulseChannel):
     """One channel, opened without pulses.
 
-    Raises:
-        RobotError: If the chip does not respond, the channel is used twice, or another channel of
-            the chip has another frequency or enable pin.
+    RobotError is raised if the chip does not respond, the channel is used twice, or another channel
+    of the chip has another frequency or enable pin.
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:

@@ -306,8 +306,7 @@ class Esc(_PulsedOutput):
         keys = EscKeys.of(plan.settings)
         super().__init__(plan, hardware)
         self._reverse = keys.reverse
-        self._arm_ns = round(keys.arm_s * 1e9)
-        self._brake_ns = keys.brake_ms * 1_000_000
+        self._arm_ns, self._brake_ns = round(keys.arm_s * 1e9), keys.brake_ms * 1_000_000
         self._neutral_since_ns: int | None = None
         self._backward_since_ns: int | None = None
         self._reverses = False
@@ -367,9 +366,7 @@ class SpeedController:
         self._reverse = keys.reverse
         self._arm_ns = keys.arm_s * 1e9 * _ARM_SHARE
         self._neutral_since_ns: int | None = None
-        self._armed = False
-        self._braked = False
-        self._reverses = False
+        self._armed = self._braked = self._reverses = False
 
     def __call__(self, value: float | None, now_ns: int) -> float:
         """Return the value for the motor, -1 to 1.
