@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
-from shapechanger.robot.link.address import DEFAULT_PORT, Address, is_loopback, parse_address
+from shapechanger.robot.link.address import Address, is_loopback, parse_address
 
 
 @pytest.mark.parametrize(
@@ -49,10 +49,6 @@ def test_any_text_is_an_address_or_an_error(text: str) -> None:
     except LinkError:
         return
     assert parse_address(str(address)) == address
-
-
-def test_the_port_of_2017_is_the_default() -> None:
-    assert DEFAULT_PORT == 5000
 
 
 def test_loopback_addresses() -> None:

@@ -44,10 +44,8 @@ def test_a_card_states_the_numbers_of_the_profile() -> None:
     assert (card.camera_pitch_deg, card.camera_fovy_deg) == (0.0, 48.8)
     assert card.turning == pytest.approx((math.radians(108.0), 0.0))
     assert (card.arming, card.clock, card.reset) == ("person", "real", ())
-    assert card.reward == {
-        **{"velocity": 1.0, "collision": -10.0, "stall": -1.0},
-        "collision_ends_episode": 1.0,
-    }
+    weights = {"velocity": 1.0, "collision": -10.0, "stall": -1.0}
+    assert card.reward == weights | {"collision_ends_episode": 1.0}
 
 
 def test_a_twin_may_be_armed_by_anyone_and_needs_no_pictures() -> None:

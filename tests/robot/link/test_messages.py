@@ -12,23 +12,15 @@ from hypothesis import strategies as st
 
 from shapechanger.errors import LinkError
 from shapechanger.robot.link import messages
-from shapechanger.robot.link.messages import (
-    MAX_CLIENT_MESSAGE,
-    ClientMessage,
-    Command,
-    Observation,
-    RobotMessage,
-    decode_client_message,
-    decode_robot_message,
-    encode,
-)
+from shapechanger.robot.link.messages import decode_client_message, decode_robot_message, encode
 from tests.robot.link.messages import client_messages, robot_messages
 
+COMMAND = {"kind": "command", "seq": 1, "answers": 0, "values": [0]}
 DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
 
 
 @given(asked=client_messages, answer=robot_messages)
-def test_messages_round_trip(asked: ClientMessage, answer: RobotMessage) -> None:
+def test_messages_round_trip(asked: messages.ClientMessage, answer: messages.RobotMessage) -> None:
     assert decode_client_message(encode(asked)) == asked
     assert decode_robot_message(encode(answer)) == answer
 
@@ -42,7 +34,7 @@ def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
 
 @given(message=client_messages | robot_messages, data=st.data())
 def test_a_truncated_message_is_refused(
-    message: ClientMessage | RobotMessage, data: st.DataObject
+    message: messages.ClientMessage | messages.RobotMessage, data: st.DataObject
 ) -> None:
     whole = encode(message)
     cut = whole[: data.draw(st.integers(0, len(whole) - 1))]
@@ -53,7 +45,7 @@ def test_a_truncated_message_is_refused(
 
 @given(message=client_messages, data=st.data())
 def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
-    message: ClientMessage, data: st.DataObject
+    message: messages.ClientMessage, data: st.DataObject
 ) -> None:
     damaged = bytearray(encode(message))
     bit = data.draw(st.integers(0, 8 * len(damaged) - 1))
@@ -65,14 +57,9 @@ def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
     assert encode(decode_client_message(encode(decoded))) == encode(decoded)
 
 
-def test_trailing_bytes_are_refused() -> None:
-    with pytest.raises(LinkError):
-        decode_client_message(encode(messages.Take()) + b"\x00")
-
-
 def test_a_large_message_is_refused_before_it_is_read() -> None:
     with pytest.raises(LinkError, match="larger than the 65536 allowed"):
-        decode_client_message(bytes(MAX_CLIENT_MESSAGE + 1))
+        decode_client_message(bytes(messages.MAX_CLIENT_MESSAGE + 1))
 
 
 @pytest.mark.parametrize(
@@ -84,6 +71,7 @@ def test_a_large_message_is_refused_before_it_is_read() -> None:
         b"\xdf\xff\xff\xff\xff\xa4kind\xa4take",
         b"\x82\xa4kind\xa4take\xa1x" + b"\x91" * 60_000,
         b"\x82\xa4kind\xa4take\xa1x" + b"\x81\xa1x" * 20_000,
+        encode(messages.Take()) + b"\x00",
     ],
 )
 def test_a_false_length_costs_no_memory(data: bytes) -> None:
@@ -94,17 +82,13 @@ def test_a_false_length_costs_no_memory(data: bytes) -> None:
 @pytest.mark.parametrize(
     "fields",
     [
-        {"kind": "command", "seq": -1, "answers": 0, "values": [0.0]},
-        {"kind": "command", "seq": 2**63, "answers": 0, "values": [0.0]},
-        {"kind": "command", "seq": 1.5, "answers": 0, "values": [0.0]},
-        {"kind": "command", "seq": 1, "answers": 0, "values": ["0"]},
-        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0] * 65},
-        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "ttl_ms": 0},
-        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "ttl_ms": 10**6},
-        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "scale": 1.01},
-        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "scale": float("nan")},
+        *(COMMAND | {"seq": seq} for seq in (-1, 2**63, 1.5)),
+        *(COMMAND | {"values": values} for values in (["0"], [0.0] * 65)),
+        *(COMMAND | {"ttl_ms": ttl_ms} for ttl_ms in (0, 10**6)),
+        *(COMMAND | {"scale": scale} for scale in (1.01, float("nan"))),
         {"kind": "hello", "version": 1, "proof": b"", "role": "king"},
         {"kind": "hello", "version": 1, "proof": b"", "name": "x" * 65},
+        {"kind": "arm", "emergency": 0},  # It must answer an observation.
         {"kind": "observation", "seq": 1},
         {"kind": "dance"},
         {"seq": 1},
@@ -118,14 +102,14 @@ def test_values_out_of_bounds_are_refused(fields: object) -> None:
 
 
 def test_unknown_keys_are_ignored() -> None:
-    fields = {"kind": "command", "seq": 1, "answers": 2, "values": [1], "mood": {"is": ["good"]}}
+    fields = COMMAND | {"mood": {"is": ["good"]}}
     decoded = decode_client_message(msgspec.msgpack.encode(fields))
-    assert decoded == Command(seq=1, answers=2, values=(1.0,))
+    assert decoded == messages.Command(seq=1, answers=0, values=(0.0,))
 
 
 def test_a_frame_is_sent_as_bytes() -> None:
     jpeg = bytes(range(256)) * 20
-    fields = {name: 0 for name in Observation.__struct_fields__}
+    fields = {name: 0 for name in messages.Observation.__struct_fields__}
     empty = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": b""})
     full = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": jpeg})
     assert len(full) - len(empty) <= len(jpeg) + 4
@@ -133,8 +117,8 @@ def test_a_frame_is_sent_as_bytes() -> None:
 
 
 def test_bytes_are_not_in_the_repr() -> None:
-    fields = {name: 0 for name in Observation.__struct_fields__}
-    seen = Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
+    fields = {name: 0 for name in messages.Observation.__struct_fields__}
+    seen = messages.Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
     assert "frame=<5000 bytes>" in repr(seen)
     assert "holder='Grace'" in repr(seen)
     assert len(repr(seen)) < 400
@@ -143,12 +127,7 @@ def test_bytes_are_not_in_the_repr() -> None:
     assert repr(hello).startswith("Hello(version=1, proof=<30 bytes>, name='', role='program'")
 
 
-def test_a_request_to_arm_must_answer_an_observation() -> None:
-    with pytest.raises(LinkError, match="answers"):
-        decode_client_message(msgspec.msgpack.encode({"kind": "arm", "emergency": 0}))
-
-
 def test_the_page_has_the_numbers_of_the_wire() -> None:
     page = (Path(__file__).parents[3] / "docs" / "wire.md").read_text()
     assert f"`version` ({messages.VERSION})" in page
-    assert f"| size of a client's message | {MAX_CLIENT_MESSAGE // 1024} KiB |" in page
+    assert f"| size of a client's message | {messages.MAX_CLIENT_MESSAGE // 1024} KiB |" in page

@@ -23,14 +23,8 @@ from typing import Final, Self, TypeVar
 import aiohttp
 
 from shapechanger.errors import LinkError, RobotRefused, translate_errors
-from shapechanger.robot.client.connection import (
-    CLOSE_S,
-    Inbox,
-    Received,
-    lost,
-    open_connection,
-    receive,
-)
+from shapechanger.robot.client import connection
+from shapechanger.robot.client.connection import Inbox, Received
 from shapechanger.robot.client.known_robots import KnownRobot, untrusted
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import parse_address
@@ -418,7 +412,7 @@ class RobotClient(Inbox):
     async def _exchange(self) -> None:
         """Connect, receive and send until `_stop` is set."""
         self._loop = asyncio.get_running_loop()
-        async with open_connection(*self._settings) as (websocket, welcome):
+        async with connection.open_connection(*self._settings) as (websocket, welcome):
             self.put(welcome)
             self._heard_at = self._loop.time()
             links = (self._receive(websocket), self._send(websocket), self._watch())
@@ -431,13 +425,13 @@ class RobotClient(Inbox):
                 task.result()
             # Should this fail, the robot notices the end of the connection anyway.
             with contextlib.suppress(LinkError, TimeoutError):
-                async with asyncio.timeout(CLOSE_S):
+                async with asyncio.timeout(connection.CLOSE_S):
                     await self._send_pending(websocket)
                     await websocket.close()
 
     async def _receive(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
         while True:
-            message = await receive(websocket)
+            message = await connection.receive(websocket)
             self._heard_at = asyncio.get_running_loop().time()
             self.put(message)
 
@@ -448,7 +442,7 @@ class RobotClient(Inbox):
             if silent_s > _PING_AFTER * limit_s:
                 self._enqueue(messages.Ping())
             await asyncio.sleep(_CHECK_EVERY * limit_s)
-        raise lost(f"no message for {silent_s:.1f} s")
+        raise connection.lost(f"no message for {silent_s:.1f} s")
 
     async def _send(self, websocket: aiohttp.ClientWebSocketResponse) -> None:
         while True:
@@ -462,6 +456,6 @@ class RobotClient(Inbox):
             with translate_errors(
                 ConnectionError,
                 aiohttp.ClientError,
-                to=lambda error: lost(str(error) or "the connection broke"),
+                to=lambda error: connection.lost(str(error) or "the connection broke"),
             ):
                 await websocket.send_bytes(messages.encode(message))

@@ -20,16 +20,6 @@ from shapechanger.robot.client.known_robots import KnownRobot, parse_trust
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import Address, parse_address
 from shapechanger.robot.link.authentication import make_proof, parse_key
-from shapechanger.robot.link.messages import (
-    Challenge,
-    Event,
-    Hello,
-    Observation,
-    RecorderState,
-    Refused,
-    RobotMessage,
-    Welcome,
-)
 
 try:
     import aiohttp
@@ -42,14 +32,14 @@ CLOSE_S: Final = 0.5
 # attrs makes aiohttp's class in a way that pyright does not understand.
 _CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=CLOSE_S)  # pyright: ignore[reportCallIssue]
 
-_M = TypeVar("_M", bound=RobotMessage)
+_M = TypeVar("_M", bound=messages.RobotMessage)
 _T = TypeVar("_T")
 
 
 @asynccontextmanager
 async def open_connection(
-    robot: KnownRobot, hello: Hello, timeout_s: float
-) -> AsyncGenerator[tuple[aiohttp.ClientWebSocketResponse, Welcome]]:
+    robot: KnownRobot, hello: messages.Hello, timeout_s: float
+) -> AsyncGenerator[tuple[aiohttp.ClientWebSocketResponse, messages.Welcome]]:
     """Connect and authenticate within a time limit; `hello` needs no proof."""
     address, expected = parse_address(robot.address), parse_trust(robot.fingerprint)
     sockets: list[socket.socket] = []
@@ -70,7 +60,7 @@ async def open_connection(
                 max_msg_size=messages.MAX_ROBOT_MESSAGE,
                 timeout=_CLOSING,
             )
-            challenge = await _expect(websocket, Challenge)
+            challenge = await _expect(websocket, messages.Challenge)
             if challenge.version != messages.VERSION:
                 older = "robot" if challenge.version < messages.VERSION else "workstation"
                 raise LinkError(
@@ -81,7 +71,7 @@ async def open_connection(
             proof = make_proof(key, challenge.nonce, expected or b"", hello.role)
             answer = msgspec.structs.replace(hello, proof=proof)
             await websocket.send_bytes(messages.encode(answer))
-            welcome = await _expect(websocket, Welcome)
+            welcome = await _expect(websocket, messages.Welcome)
             limit.reschedule(None)
             yield websocket, welcome
     except LinkError:
@@ -105,7 +95,7 @@ async def open_connection(
                     await asyncio.sleep(0)
 
 
-async def receive(websocket: aiohttp.ClientWebSocketResponse) -> RobotMessage:
+async def receive(websocket: aiohttp.ClientWebSocketResponse) -> messages.RobotMessage:
     """Receive the next message."""
     received = await websocket.receive()
     match received.type:
@@ -127,7 +117,7 @@ def lost(why: str) -> LinkError:
 async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
     """Receive a message of one type."""
     message = await receive(websocket)
-    if isinstance(message, Refused):
+    if isinstance(message, messages.Refused):
         raise RobotRefused(message.reason)
     if not isinstance(message, kind):
         raise LinkError(f"Expected a {kind.__name__} from the robot, got {type(message).__name__}.")
@@ -170,7 +160,7 @@ class Received:
         jpeg: Frame number `message.frame_seq`, whichever message brought it; None without one.
     """
 
-    message: Observation
+    message: messages.Observation
     received_at: float
     jpeg: bytes | None
 
@@ -195,9 +185,9 @@ class Inbox:
         self._patience_s = patience_s  # Default time limit of a wait.
         self._process = os.getpid()
         self._changed = threading.Condition()
-        self._events: deque[Event] = deque(maxlen=256)
+        self._events: deque[messages.Event] = deque(maxlen=256)
         self._refusals: dict[int, str] = {}
-        self._said: dict[type[RobotMessage], tuple[int, RobotMessage]] = {}
+        self._said: dict[type[messages.RobotMessage], tuple[int, messages.RobotMessage]] = {}
 
     @property
     def seq(self) -> int:
@@ -205,22 +195,22 @@ class Inbox:
         return self.newest.message.seq if self.newest else 0
 
     @property
-    def recorder(self) -> RecorderState | None:
+    def recorder(self) -> messages.RecorderState | None:
         """Last reported state of the robot's recorder; None before the first."""
-        return self.said(RecorderState)
+        return self.said(messages.RecorderState)
 
-    def put(self, message: RobotMessage) -> None:
+    def put(self, message: messages.RobotMessage) -> None:
         """Store a message that has just arrived."""
         with self._changed:
             self.heard += 1
             match message:
-                case Observation():
+                case messages.Observation():
                     self._observe(message)
-                case Event():
+                case messages.Event():
                     self._events.append(message)
-                case Refused(fatal=True):
+                case messages.Refused(fatal=True):
                     raise RobotRefused(message.reason)
-                case Refused(seq=int(seq)):
+                case messages.Refused(seq=int(seq)):
                     self._refusals = {seq: message.reason}
                 case _:
                     self._said[type(message)] = self.heard, message
@@ -288,20 +278,20 @@ class Inbox:
             timeout_s: Time limit, s; None for the link's, and then no refusal is expected.
         """
 
-        def find() -> _M | Refused | None:
+        def find() -> _M | messages.Refused | None:
             said = self.said(kind, since)
             if said is not None and accepts(said):
                 return said
-            return None if timeout_s is None else self.said(Refused, since)
+            return None if timeout_s is None else self.said(messages.Refused, since)
 
         found = self.wait(find, timeout_s)
-        if isinstance(found, Refused):
+        if isinstance(found, messages.Refused):
             raise RobotRefused(found.reason)
         if found is None:
             raise LinkError(f"The robot did not answer with a {kind.__name__!r} in time.")
         return found
 
-    def events(self) -> list[Event]:
+    def events(self) -> list[messages.Event]:
         """Return the events since the last call, oldest first, at most 256."""
         with self._changed:
             events = list(self._events)
@@ -312,7 +302,7 @@ class Inbox:
         """Return the reason why the robot refused a command, or "" if it has not."""
         return self._refusals.get(seq, "")
 
-    def _observe(self, message: Observation) -> None:
+    def _observe(self, message: messages.Observation) -> None:
         last = self.newest
         if message.seq <= self.seq:
             raise LinkError(f"Observation {message.seq} arrived after {self.seq}, as in a replay.")

@@ -25,13 +25,8 @@ from typing import Final
 
 from shapechanger.errors import LinkError, UnknownName, translate_errors
 from shapechanger.files import cannot_write, read_text, write_atomic
+from shapechanger.robot.link import authentication
 from shapechanger.robot.link.address import Address, parse_address
-from shapechanger.robot.link.authentication import (
-    fingerprint_of,
-    fingerprint_short,
-    parse_fingerprint,
-    parse_key,
-)
 
 KNOWN_ROBOT: Final = "known robot"
 """Kind of the name of a robot, in errors."""
@@ -70,7 +65,7 @@ class KnownRobot:
         parse_address(self.address)
         parse_trust(self.fingerprint)
         if self.key or self.fingerprint != INSECURE:
-            parse_key(self.key)
+            authentication.parse_key(self.key)
 
     def __repr__(self) -> str:
         """Leave out the key, which does not belong in a log."""
@@ -148,7 +143,7 @@ def forget(name: str) -> None:
 
 def parse_trust(fingerprint: str) -> bytes | None:
     """Return the SHA-256 of the expected certificate; None for "insecure"."""
-    return None if fingerprint == INSECURE else parse_fingerprint(fingerprint)
+    return None if fingerprint == INSECURE else authentication.parse_fingerprint(fingerprint)
 
 
 def untrusted(address: Address, timeout_s: float) -> LinkError:
@@ -158,11 +153,11 @@ def untrusted(address: Address, timeout_s: float) -> LinkError:
         to=lambda error: LinkError(f"No server shows a certificate at {address}: {error}."),
     ):
         shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
-    fingerprint = fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
+    fingerprint = authentication.fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
     digits = fingerprint.hex()
     return LinkError(
         f"The robot at {address} is not trusted yet. Its fingerprint is\n"
-        f"  {digits}  (in short {fingerprint_short(fingerprint)})\n"
+        f"  {digits}  (in short {authentication.fingerprint_short(fingerprint)})\n"
         "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
         f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
     )

@@ -160,9 +160,15 @@ class RobotSpaces:
                 f"The state layout has {self._state_layout.size} numbers, and the robot sent "
                 f"{len(message.state)}."
             )
-        state, absent = self._state(message)
+        state = np.array(message.state, dtype=np.float32)
+        absent: list[str] = []
+        for feature in self._state_layout if np.isnan(state).any() else ():
+            block = state[self._places[feature.name]]
+            if (missing := np.isnan(block)).any():
+                absent.append(feature.name)
+                block[missing] = feature.middle
         if not self.has_image:
-            return View(state, True, absent)
+            return View(state, True, tuple(absent))
         self.shows(received)
         if self.picture is None:
             raise LinkError("The robot has sent no image yet.")
@@ -170,20 +176,7 @@ class RobotSpaces:
         image = resize_picture(self.picture, self._size)
         image = image.copy() if image is self.picture else image
         seen = {"image": image, "state": state} if self._has_state else image
-        return View(seen, fresh, absent)
-
-    def _state(self, message: Observation) -> tuple[NDArray[np.float32], tuple[str, ...]]:
-        """Return the state with absent values at the middle of their range, and their names."""
-        state = np.array(message.state, dtype=np.float32)
-        if not np.isnan(state).any():
-            return state, ()
-        absent: list[str] = []
-        for feature in self._state_layout:
-            block = state[self._places[feature.name]]
-            if (missing := np.isnan(block)).any():
-                absent.append(feature.name)
-                block[missing] = feature.middle
-        return state, tuple(absent)
+        return View(seen, fresh, tuple(absent))
 
 
 def _box(layout: Layout) -> gym.spaces.Box[np.float32]:
