@@ -20,12 +20,7 @@ from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import Credentials, make_credentials
 from shapechanger.robot.link import messages as m
-from shapechanger.robot.link.authentication import (
-    is_proof,
-    new_key,
-    new_nonce,
-    parse_key,
-)
+from shapechanger.robot.link.authentication import is_proof, new_key, new_nonce, parse_key
 
 FULL_SPEED = 2.0  # m/s at a throttle of 1.
 WALL = 1.5  # m ahead of the start.

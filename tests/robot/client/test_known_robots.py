@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from shapechanger.errors import LinkError, UnknownName
@@ -14,11 +12,6 @@ KEY = "IVPO-EP6N-42IE-SHAG-6YAL-CDJ5-XI"
 """A fixed key, for stable test ids."""
 
 PRINT = "ab" * 32
-
-
-@pytest.fixture(autouse=True)
-def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
 
 
 def test_a_known_robot_round_trips() -> None:

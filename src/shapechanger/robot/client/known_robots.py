@@ -19,7 +19,7 @@ import tempfile
 import time
 import tomllib
 import webbrowser
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -57,7 +57,7 @@ class KnownRobot:
 
     name: str
     address: str
-    key: str
+    key: str = field(repr=False)  # It does not belong in a log.
     fingerprint: str
 
     def __post_init__(self) -> None:
@@ -66,10 +66,6 @@ class KnownRobot:
         parse_trust(self.fingerprint)
         if self.key or self.fingerprint != INSECURE:
             authentication.parse_key(self.key)
-
-    def __repr__(self) -> str:
-        """Leave out the key, which does not belong in a log."""
-        return f"KnownRobot({self.name!r}, {self.address!r}, fingerprint={self.fingerprint!r})"
 
 
 def check_name(name: str) -> None:
@@ -149,8 +145,7 @@ def parse_trust(fingerprint: str) -> bytes | None:
 def untrusted(address: Address, timeout_s: float) -> LinkError:
     """Return the error for a connection without a fingerprint, which shows the one to compare."""
     with translate_errors(
-        OSError,
-        to=lambda error: LinkError(f"No server shows a certificate at {address}: {error}."),
+        OSError, to=lambda error: LinkError(f"No server shows a certificate at {address}: {error}.")
     ):
         shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
     fingerprint = authentication.fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))

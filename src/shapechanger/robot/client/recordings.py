@@ -36,12 +36,11 @@ _LOOK_EVERY_S: Final = 0.1
 
 def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[EpisodeSummary]:
     """Return the episodes on a robot, oldest first."""
-    found: list[EpisodeSummary] = []
-    more = True
-    while more:
-        page = robot.browse(found[-1].id if found else "")
+    page = robot.browse()
+    found = list(page.episodes)
+    while page.more and page.episodes:
+        page = robot.browse(found[-1].id)
         found += page.episodes
-        more = page.more and bool(page.episodes)
     found.reverse()
     ids = [episode.id for episode in found]
     for name in wanted:
@@ -180,10 +179,7 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
     The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
     """
     known = recall(name)
-    with (
-        Terminal() as terminal,
-        RobotClient.connect(known, role="person", frames=False) as robot,
-    ):
+    with Terminal() as terminal, RobotClient.connect(known, role="person", frames=False) as robot:
         _require_fit(episode, robot.welcome)
         terminal.keys(0.0)  # Keys pressed before this line was shown are no consent.
         say(
@@ -211,7 +207,10 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
     """Refuse a robot that does not fit the recording."""
     recorded = Layout.from_json(episode.header.action_layout)
     moved = Layout.from_json(welcome.action_layout)
-    if [_range(f) for f in recorded] != [_range(f) for f in moved]:
+    ranges = [
+        [(f.name, f.unit, f.shape, f.low, f.high) for f in layout] for layout in (recorded, moved)
+    ]
+    if ranges[0] != ranges[1]:
         raise DemosError(
             f"{welcome.robot} takes {_told(moved)}, and {episode.path.name} was recorded with "
             f"{_told(recorded)}."
@@ -254,10 +253,6 @@ def _play(robot: RobotClient, terminal: Terminal, episode: Episode) -> str:
         due_s = max(due_s + period_s, time.monotonic())
     terminal.keys(max(0.0, due_s - time.monotonic()))  # The last command gets a full period, too.
     return f"played {len(steps)} steps"
-
-
-def _range(feature: object) -> tuple[object, ...]:
-    return tuple(getattr(feature, name) for name in ("name", "unit", "shape", "low", "high"))
 
 
 def _told(layout: Layout) -> str:
