@@ -127,13 +127,15 @@ _LINK = """
 """
 
 
-@pytest.mark.parametrize("path", ["package://parts/wedge.obj", "package:///parts/wedge.obj"])
-def test_packages_of_a_urdf_are_folders_around_it(tmp_path: Path, path: str) -> None:
-    """However many slashes precede them."""
-    (tmp_path / "parts").mkdir()
+@pytest.mark.parametrize("scheme", ["package://", "package:///", "model://"])
+def test_packages_of_a_urdf_are_folders_around_it(tmp_path: Path, scheme: str) -> None:
+    """Next to it or above it, however many slashes precede them."""
+    (tmp_path / "parts" / "urdf").mkdir(parents=True)
     _written(tmp_path / "parts", "wedge.obj", _OBJ)
-    file = _written(tmp_path, "link.urdf", _LINK.format(mesh=path, inertia=".1"))
-    assert compile_body(own_family(file).load(file)).nmesh == 1
+    text = _LINK.format(mesh=f"{scheme}parts/wedge.obj", inertia=".1")
+    for folder in (tmp_path / "parts" / "urdf", tmp_path):
+        file = _written(folder, "link.urdf", text)
+        assert compile_body(own_family(file).load(file)).nmesh == 1
     (tmp_path / "parts" / "wedge.obj").unlink()
     with pytest.raises(BrokenModel, match=r"neither a folder 'parts' that it is in"):
         own_family(file).load(file)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 import shapechanger
-from shapechanger.errors import BrokenModel, TaskError
+from shapechanger.errors import TaskError
 from shapechanger.morphology import AddMotor
 from tests.envs.own_robots import DOG
 
@@ -208,42 +207,3 @@ def test_many_joints_are_solved_densely(tmp_path: Path) -> None:
     data.ctrl[:] = 1.0
     mujoco.mj_step(plain, data, inner.frame_skip)
     np.testing.assert_array_equal(data.qpos, inner.data.qpos)
-
-
-def _tetrahedron() -> bytes:
-    corners = 0.1 * np.eye(4, 3)
-    faces = [(3, 1, 0), (3, 0, 2), (0, 1, 2), (3, 2, 1)]
-    return (
-        b"\0" * 80
-        + struct.pack("<I", 4)
-        + b"".join(struct.pack("<12fH", 0, 0, 0, *corners[list(face)].ravel(), 0) for face in faces)
-    )
-
-
-@pytest.mark.parametrize("scheme", ["package", "model"])
-def test_packages_are_the_folders_around_a_urdf(tmp_path: Path, scheme: str) -> None:
-    """Or the folders in these; elsewhere an error names the way out."""
-    text = f"""
-    <robot name="r"><link name="base">{_INERTIA}</link>
-      <link name="arm">{_INERTIA}<collision><geometry>
-        <mesh filename="{scheme}://my_robot/meshes/arm.stl"/></geometry></collision></link>
-      <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
-        <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="5" velocity="1"/></joint>
-    </robot>"""
-    package = tmp_path / "ros" / "my_robot"
-    (package / "meshes").mkdir(parents=True)
-    (package / "urdf").mkdir()
-    (package / "meshes" / "arm.stl").write_bytes(_tetrahedron())
-    for file in (package / "urdf" / "r.urdf", tmp_path / "ros" / "r.urdf"):
-        file.write_text(text)
-        env = shapechanger.from_mjcf(file, still, rig=AddMotor("*"))
-        assert env.unwrapped.model.nmesh == 1  # pyright: ignore[reportAttributeAccessIssue]
-    (tmp_path / "r.urdf").write_text(text)
-    with pytest.raises(BrokenModel, match=r"neither a folder 'my_robot' .* copy the package"):
-        shapechanger.from_mjcf(tmp_path / "r.urdf", still, rig=AddMotor("*"))
-
-
-_INERTIA = (
-    '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/>'
-    "</inertial>"
-)

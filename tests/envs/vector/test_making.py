@@ -16,6 +16,7 @@ from gymnasium.wrappers import vector as wrappers
 
 import shapechanger
 from shapechanger.envs import CATALOGUE
+from shapechanger.envs import make_vec as entry_points
 from shapechanger.envs.checks import require_same_spaces
 from shapechanger.envs.vector import ThreadVectorEnv
 from shapechanger.envs.vector.batch import _work_off
@@ -105,6 +106,17 @@ def test_spaces_equal_gymnasiums() -> None:
             assert getattr(ours, whole) == getattr(theirs, whole)
     ours.close()
     theirs.close()
+
+
+def test_a_spec_round_trips_through_json() -> None:
+    """The vector entry point is a string that names the id."""
+    spec = gym.spec("shapechanger/BigAnt-v1")
+    again = gym.envs.registration.EnvSpec.from_json(spec.to_json())
+    assert again == spec
+    envs = gym.make_vec(again, num_envs=2)
+    assert len(envs.get_attr("body")[0]) == 1
+    envs.close()
+    assert not hasattr(entry_points, "_private")
 
 
 def test_each_env_may_have_a_body_of_its_own() -> None:
