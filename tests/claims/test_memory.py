@@ -11,6 +11,7 @@ import pytest
 _PEER = Path(__file__).parents[2] / "benchmarks" / "vector_peer.py"
 
 
+@pytest.mark.system
 @pytest.mark.skipif(sys.platform != "linux", reason="Needs resident memory of Linux")
 def test_an_ant_takes_less_than_a_megabyte() -> None:
     """Each of 128 running envs; the benchmark measures 1,024."""

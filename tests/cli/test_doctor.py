@@ -84,6 +84,7 @@ def test_the_reason_of_a_renderer_is_passed_on(monkeypatch: pytest.MonkeyPatch) 
     assert drawn.sentence.startswith("With MUJOCO_GL=vulkan nothing can be drawn: set it to one of")
 
 
+@pytest.mark.system
 @pytest.mark.gl
 def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     main(["doctor"])

@@ -62,6 +62,7 @@ def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
     assert names == ["source, in the source", "zero-shot", "fine-tune", "scratch"]
 
 
+@pytest.mark.slow
 def test_vehicles_are_filmed_from_outside(tmp_path: Path) -> None:
     """Their envs render what the robot sees, not the robot."""
     source, target = driven(env_ref("CarWaypoint")), driven(env_ref("TankWaypoint"))

@@ -23,6 +23,7 @@ sys.meta_path.insert(0, CtrlC())
 """
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("name", ["tyro", "mujoco"])
 def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
     code = INTERRUPTED.format(name=name) + COMMAND.format(arguments=["envs", "show", "Ant"])
@@ -31,6 +32,7 @@ def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
     assert done.stderr == "Stopped.\n"
 
 
+@pytest.mark.system
 def test_ascii_output_replaces_missing_letters() -> None:
     arguments = ["envs", "show", "InvertedPendulum"]
     done = run_python(COMMAND.format(arguments=arguments), PYTHONIOENCODING="ascii")
@@ -43,6 +45,7 @@ def test_ascii_output_replaces_missing_letters() -> None:
     assert message.startswith("error: No environment matches '?'")
 
 
+@pytest.mark.system
 @pytest.mark.skipif(sys.platform != "linux", reason="Other systems always have a display.")
 @pytest.mark.parametrize(
     ("arguments", "variables", "words"),
@@ -168,6 +171,7 @@ def test_flags_and_help_are_options(
     assert not said.err
 
 
+@pytest.mark.system
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")
 def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
     """No traceback, neither on write nor at interpreter exit."""

@@ -60,6 +60,7 @@ def test_it_is_evaluated_in_any_body(policy: Path, capsys: pytest.CaptureFixture
     assert "counterpart" not in other
 
 
+@pytest.mark.slow
 def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
     out = tmp_path / "ant.onnx"
     main(["policies", "export", str(policy), "--env", "ExtendedAnt", "--out", str(out)])

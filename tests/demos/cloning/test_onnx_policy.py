@@ -26,9 +26,12 @@ _RNG = np.random.default_rng(0)
 _PICTURE = _RNG.integers(0, 256, (60, 80, 3), dtype=np.uint8)
 _CARDS = {
     "edges": {"eyes": "edges", "low": (-0.5, 0.0), "high": (0.5, 1.0)},
-    "state": {"eyes": "none", "nerves": (8,), "state_layout": _STATE, "unseen": ("bump",)},
     "both, several": {"nerves": (8, 4), "state_layout": _STATE, "members": 3},
-    "classes": {
+    "state, classes": {
+        "eyes": "none",
+        "nerves": (8,),
+        "state_layout": _STATE,
+        "unseen": ("bump",),
         "head": "class",
         "classes": ((-1.0, 0.5), (0.0, 1.0), (1.0, 0.5)),
         "class_names": ("left", "forward", "right"),

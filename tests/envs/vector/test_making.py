@@ -231,6 +231,14 @@ def test_importing_make_vec_loads_no_simulator() -> None:
     assert run.stdout == "False\n"
 
 
+def test_empty_vector_envs_are_refused() -> None:
+    """At least one env and one thread are needed."""
+    with pytest.raises(VectorEnvError, match="at least one env, got 0"):
+        ThreadVectorEnv([])
+    with pytest.raises(VectorEnvError, match="at least one thread, got 0"):
+        ThreadVectorEnv([lambda: _Bounded(1.0)], threads=0)
+
+
 class _Bounded(gym.Env[Any, Any]):
     """Env without a body, a layout or a spec."""
 

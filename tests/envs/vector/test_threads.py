@@ -208,6 +208,7 @@ def _run(body: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.system
 def test_ctrl_c_at_random_moments() -> None:
     """Thirty interruptions at random moments of steps leave the vector env usable."""
     run = _run(
@@ -239,6 +240,7 @@ def test_ctrl_c_at_random_moments() -> None:
     assert (run.stdout, run.stderr) == ("30 1\n", "")
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("end", ["sys.exit(0)", "pass"], ids=["exit", "end"])
 def test_a_program_exits_without_close(end: str) -> None:
     """Unclosed vector envs neither block the exit nor print anything."""
@@ -246,6 +248,7 @@ def test_a_program_exits_without_close(end: str) -> None:
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
 
+@pytest.mark.system
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_a_forked_process_steps_with_threads_of_its_own() -> None:
     run = _run(

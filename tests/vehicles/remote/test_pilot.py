@@ -113,6 +113,7 @@ def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(
     ("profile", "name", "words"),
     [
