@@ -18,11 +18,12 @@ from pathlib import Path
 
 from shapechanger.errors import LinkError
 from shapechanger.layout import Feature, Layout
-from shapechanger.robot.daemon.client import MessageRate
+from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.guard.channel import Order
+from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (
     VERSION,
@@ -103,6 +104,15 @@ FRAGMENTS = [
 ]
 
 
+class _Clock(Clock):
+    """A clock that the fuzzer sets."""
+
+    ns = 1_000_000_000
+
+    def now_ns(self) -> int:
+        return self.ns
+
+
 def mutated(rng: random.Random) -> bytes:
     """Return a mutated valid message; a few remain valid."""
     data = bytearray(rng.choice(SEEDS))
@@ -154,14 +164,14 @@ def fuzz(
     rng = random.Random(seed)
     counts: collections.Counter[str] = collections.Counter()
     orders: list[Order] = []
-    now_ns = 1_000_000_000
-    hub = SessionHub(PLAN, lambda: now_ns, orders.append)
+    clock = _Clock()
+    hub = SessionHub(PLAN, clock, orders.append)
     owner = Session(0, hub, Authenticator())
     owner.introduce(encode(Hello(version=VERSION, proof=b"", role="person", name="owner")))
     owner.receive(encode(Take()))
     known: Session | None = None
     for number in range(1, count + 1):
-        now_ns += 1_000_000
+        clock.ns += 1_000_000
         data = mutated(rng)
         if number % 4 == 0:  # An unauthenticated connection to a robot with a key.
             stranger = Session(number, hub, Authenticator(KEY))
@@ -173,7 +183,7 @@ def fuzz(
                 raise AssertionError(f"A stranger was let in with {data!r}.")
             continue
         if known is None:
-            known = Session(number, hub, Authenticator(), MessageRate(1e9))
+            known = Session(number, hub, Authenticator(), messages_per_s=1e9)
             known.introduce(encode(Hello(version=VERSION, proof=b"", name="known")))
             known.observe()
         try:
@@ -193,7 +203,7 @@ def fuzz(
         orders.clear()
         if number % 50_000 < 4:
             progress(number)
-    if hub.lease.holder is not owner.client:
+    if hub.holder is not owner.client:
         raise AssertionError("The owner lost the command.")
     return counts
 

@@ -13,6 +13,7 @@ import msgspec
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.guard.channel import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.hardware import Clock
 from tests.robot.daemon.plans import guard_state
 
 
@@ -127,7 +128,7 @@ class FakeCamera(Camera):
         self._frames.put(self.opened)
 
 
-class SteppedClock:
+class SteppedClock(Clock):
     """A clock that moves in steps, as that of a twin does."""
 
     def __init__(self) -> None:
@@ -139,13 +140,6 @@ class SteppedClock:
     def now_ns(self) -> int:
         """Return the time, ns."""
         return self.ns
-
-    def wait(self, readable: Any, until_ns: int, at_most_s: float) -> bool:
-        """Raise, since the daemon does not use it."""
-        raise NotImplementedError
-
-    def keep_alive(self, beat: Callable[[], object]) -> None:
-        """Do nothing, since the daemon does not use it."""
 
     async def sleep(self, seconds: float) -> int | None:
         """Advance the time, and let the guard tick."""

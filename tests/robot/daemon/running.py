@@ -5,14 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
 import socket
 import ssl
+import tempfile
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 import aiohttp
+import msgspec
 import pytest
 
 from shapechanger.robot.cameras.camera import Frame
@@ -202,26 +204,20 @@ async def running(
     if plan.card.clock == "real":
         guard.attach()
     guard.send()
-    ready, tell = os.pipe()
-    daemon = process.Daemon(plan, clock, guard.daemon_fd, ready_fd=tell)
-    task = asyncio.create_task(daemon.run())
-    reading = asyncio.create_task(asyncio.to_thread(os.read, ready, 4096))
-    await asyncio.wait((reading, task), return_when=asyncio.FIRST_COMPLETED)
-    if not reading.done():  # The daemon failed to start.
-        os.close(tell)
-        await reading
-        os.close(ready)
-        guard.close()
-        task.result()
-    line = await reading
-    os.close(ready)
-    async with aiohttp.ClientSession() as session:
-        port = json.loads(line)["port"]
-        robot = Running(plan, clock, guard, camera, port, daemon, task, session)
+    async with contextlib.AsyncExitStack() as stack:
+        stack.callback(guard.close)
+        ready = Path(stack.enter_context(tempfile.TemporaryDirectory()), "ready.json")
+        plan = msgspec.structs.replace(plan, ready_file=str(ready))
+        daemon = process.Daemon(plan, clock, guard.daemon_fd)
+        task = asyncio.create_task(daemon.run())
+        await until(lambda: ready.exists() or task.done(), "it can be reached")
+        if task.done():
+            task.result()
+        port = json.loads(ready.read_text())["port"]
+        session = await stack.enter_async_context(aiohttp.ClientSession())
         try:
-            yield robot
+            yield Running(plan, clock, guard, camera, port, daemon, task, session)
         finally:
             daemon.end()
             async with asyncio.timeout(PATIENCE_S):
                 await task
-            guard.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable
 
 import pytest
 
@@ -36,41 +36,46 @@ class Ends:
                 return orders
 
 
-@pytest.fixture
-def ends() -> Iterator[Ends]:
-    """Both ends of the connection."""
-    ends = Ends()
-    yield ends
-    ends.port.close()
-    ends.guard.close()
+def play(script: Callable[[Ends], Awaitable[None]]) -> None:
+    """Run a script with both ends of the connection."""
+
+    async def run() -> None:
+        ends = Ends()
+        await script(ends)
+        ends.port.close()
+        ends.guard.close()
+
+    asyncio.run(run())
 
 
-def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
-    ends.guard.send(encode(guard_state(at_ns=1)))
-    ends.guard.send(b"nonsense")
-    ends.guard.send(b'{"at_ns": "3"}')
-    ends.guard.send(encode(guard_state(at_ns=4)))
-    ends.port.drain()
-    assert [state.at_ns for state in ends.states] == [1, 4]
+def test_states_arrive_in_order_and_invalid_ones_are_skipped() -> None:
+    async def script(ends: Ends) -> None:
+        ends.guard.send(encode(guard_state(at_ns=1)))
+        ends.guard.send(b"nonsense")
+        ends.guard.send(b'{"at_ns": "3"}')
+        ends.guard.send(encode(guard_state(at_ns=4)))
+        ends.port.drain()
+        assert [state.at_ns for state in ends.states] == [1, 4]
+
+    play(script)
 
 
-def test_a_lost_guard_is_reported_once(ends: Ends) -> None:
-    ends.guard.close()
-    ends.port.drain()
-    ends.port.drain()
-    ends.port.send(Order(kind="disarm"))
-    assert ends.lost == [True]
+@pytest.mark.parametrize("reads_first", [True, False])
+def test_a_lost_guard_is_reported_once(reads_first: bool) -> None:
+    async def script(ends: Ends) -> None:
+        ends.guard.close()
+        for _ in range(2):
+            if reads_first:
+                ends.port.drain()
+            ends.port.send(Order(kind="disarm"))
+            ends.port.drain()
+        assert ends.lost == [True]
+
+    play(script)
 
 
-def test_a_lost_guard_is_detected_on_send(ends: Ends) -> None:
-    ends.guard.close()
-    ends.port.send(Order(kind="command"))
-    assert ends.lost == [True]
-
-
-def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
-    async def play() -> list[Order]:
-        ends.port.attach(asyncio.get_running_loop())
+def test_a_full_socket_keeps_stops_and_drops_commands() -> None:
+    async def script(ends: Ends) -> None:
         for seq in range(5_000):
             ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
         before = [order.seq for order in ends.received()]
@@ -90,8 +95,7 @@ def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
             return [order.kind for order in received[-3:]] == ["disarm", "emergency", "halt"]
 
         await until(stopped, "all stops have arrived")
-        return received
+        assert {order.kind for order in received[:-3]} == {"command"}
+        assert received[-4].seq < 9_999
 
-    received = asyncio.run(play())
-    assert {order.kind for order in received[:-3]} == {"command"}
-    assert received[-4].seq < 9_999
+    play(script)

@@ -1,9 +1,11 @@
-"""The hub: observations for one client, and expiry of commands and suggestions."""
+"""The hub: control, observations for one client, and expiry of commands and suggestions."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,11 +13,20 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.guard.channel import GuardState
-from shapechanger.robot.link.messages import Command, Observation
+from shapechanger.robot.link.messages import Command, Lease, Observation
+from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
-ANN, SAC = Client(1, "Ann", "person"), Client(3, "sac")
+ANN, BOB = Client(1, "Ann", "person"), Client(2, "Bob", "person")
+SAC, PPO = Client(3, "sac"), Client(4, "ppo")
 MS = 1_000_000
+
+
+def new_hub(ns: int = 50, **plan: Any) -> tuple[SessionHub, SteppedClock]:
+    """Return the hub of a car, and its clock."""
+    clock = SteppedClock()
+    clock.ns = ns
+    return SessionHub(car_plan(**plan), clock, lambda order: None), clock
 
 
 def observed(hub: SessionHub, frame_sent: int | None = 0) -> Observation:
@@ -27,11 +38,40 @@ def seen_at_50_ns(
     state: GuardState | None = None, *, frames: int = 3, frame_sent: int | None = 0
 ) -> Observation:
     """Build the observation of a robot with a state of 40 ns and a frame of 30 ns."""
-    hub = SessionHub(car_plan(), lambda: 50, lambda order: None)
+    hub = new_hub()[0]
     for _ in range(frames):
         hub.on_frame(Frame(b"jpeg", 30))
     hub.on_state(guard_state(at_ns=40) if state is None else state)
     return observed(hub, frame_sent)
+
+
+@pytest.mark.parametrize("holder", [ANN, SAC], ids=lambda client: client.name)
+@pytest.mark.parametrize("other", [BOB, PPO], ids=lambda client: client.name)
+def test_only_a_person_takes_control_and_only_from_a_program(holder: Client, other: Client) -> None:
+    hub, _ = new_hub()
+    hub.take(holder)
+    hub.take(other)
+    if (holder, other) == (SAC, BOB):
+        assert (hub.holder, hub.lease) == (BOB, 2)
+    else:
+        assert (hub.holder, hub.lease) == (holder, 1)
+        answer = list(iter(other.take, None))[-1]
+        assert isinstance(answer, Lease)
+        assert answer.reason.startswith(f"{holder.name} has control; a {other.role} cannot")
+
+
+@given(moves=st.lists(st.tuples(st.booleans(), st.sampled_from((ANN, BOB, SAC, PPO))), max_size=50))
+def test_each_lease_has_one_holder_and_a_larger_number(moves: list[tuple[bool, Client]]) -> None:
+    hub, _ = new_hub()
+    of_number: dict[int, Client] = {}
+    for takes, client in moves:
+        before, held = hub.lease, hub.holder
+        hub.take(client) if takes else hub.release(client, "it went")
+        if held is client:
+            assert (hub.lease, hub.holder) == (before, client if takes else None)
+        assert hub.lease >= before
+        if hub.holder is not None:
+            assert of_number.setdefault(hub.lease, hub.holder) is hub.holder
 
 
 def test_an_absent_quantity_is_nan() -> None:
@@ -43,7 +83,7 @@ def test_an_absent_quantity_is_nan() -> None:
 
 
 def test_without_a_state_of_the_guard_all_is_unknown() -> None:
-    seen = observed(SessionHub(car_plan(), lambda: 50, lambda order: None))
+    seen = observed(new_hub()[0])
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
     assert not seen.armed
@@ -64,9 +104,10 @@ def test_without_a_camera_the_time_is_that_of_the_state() -> None:
 
 
 def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
-    hub = SessionHub(car_plan(), lambda: 50, lambda order: None)
+    hub, clock = new_hub()
     hub.take(ANN)
-    hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5)), 38)
+    clock.ns = 38
+    hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5)))
     hub.on_state(guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39))
     own = observed(hub)
     assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)
@@ -79,28 +120,26 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
 
 @given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))
 def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: int) -> None:
-    now_ns = 1
-    hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
+    hub, clock = new_hub(1, deadline_ms=250)
     assert observed(hub).commanded == ()
     hub.on_state(guard_state(armed=True))
-    hub.lease.take(ANN)
-    hub.command(ANN, Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms), now_ns)
-    now_ns += age_ms * MS
+    hub.take(ANN)
+    hub.command(ANN, Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms))
+    clock.ns += age_ms * MS
     assert observed(hub).commanded == ((0.0, 0.5) if age_ms <= min(ttl_ms, 250) else ())
-    now_ns = 1
+    clock.ns = 1
     hub.halt()
     assert observed(hub).commanded == ()
 
 
 def test_the_newest_suggestion_counts_until_it_expires() -> None:
-    now_ns = 1
-    hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
+    hub, clock = new_hub(1, deadline_ms=250)
     assert observed(hub).suggested == ()
     hub.suggest(ANN, (0.1, 0.0))
-    now_ns += 10 * MS
+    clock.ns += 10 * MS
     hub.suggest(SAC, (0.2, 0.0))
-    now_ns += 250 * MS
+    clock.ns += 250 * MS
     seen = observed(hub)
     assert (seen.suggested_by, seen.suggested) == ("sac", (0.2, 0.0))
-    now_ns += 1
+    clock.ns += 1
     assert observed(hub).suggested == ()

@@ -12,7 +12,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 import msgspec
 import pytest
@@ -33,7 +32,7 @@ class Started:
     process: subprocess.Popen[bytes]
     guard: socket.socket
     heart: socket.socket
-    ready: BinaryIO
+    ready: Path
     life: int
     port: int = 0
 
@@ -45,16 +44,15 @@ class Started:
 
 
 @pytest.fixture
-def begun() -> Iterator[Started]:
+def begun(tmp_path: Path) -> Iterator[Started]:
     """A daemon that has no state from the guard yet."""
-    daemon = msgspec.to_builtins(car_plan(camera=None, discovery=True))
+    file = tmp_path / "ready.json"
+    daemon = msgspec.to_builtins(car_plan(camera=None, discovery=True, ready_file=str(file)))
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
     plan = plan_fd(ServePlan(guard_plan, daemon))
     guard, guard_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     heart, heart_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    ready, ready_end = os.pipe()
     ends = {"plan": plan, "guard": guard_end.fileno(), "heartbeat": heart_end.fileno()}
-    ends["ready"] = ready_end
     arguments = [part for name, fd in ends.items() for part in (f"--{name}-fd", str(fd))]
     process = subprocess.Popen(
         [sys.executable, "-m", "shapechanger.robot.daemon.process", *arguments],
@@ -62,15 +60,13 @@ def begun() -> Iterator[Started]:
         stdin=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    for fd in (plan, ready_end):
-        os.close(fd)
+    os.close(plan)
     guard_end.close()
     heart_end.close()
     heart.settimeout(20.0)
     log, (life,), _, _ = socket.recv_fds(guard, 16, 2)
     assert log == LIFELINE
-    with os.fdopen(ready, "rb") as ready_file:
-        yield Started(process, guard, heart, ready_file, life)
+    yield Started(process, guard, heart, file, life)
     for end in (guard, heart):
         end.close()
     os.close(life)
@@ -84,7 +80,9 @@ def begun() -> Iterator[Started]:
 def started(begun: Started) -> Started:
     """A daemon that serves."""
     begun.guard.send(encode(guard_state()))
-    begun.port = json.loads(begun.ready.readline())["port"]
+    while not begun.ready.exists():
+        assert begun.heart.recv(16)  # The daemon lives.
+    begun.port = json.loads(begun.ready.read_text())["port"]
     return begun
 
 
@@ -122,14 +120,14 @@ def test_sending_the_lifeline_to_a_closed_socket_raises_nothing() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.close()
     with theirs:
-        assert send_lifeline(theirs.fileno())
+        send_lifeline(theirs.fileno())
 
 
 def test_no_client_connects_before_the_first_state(begun: Started) -> None:
     assert begun.heart.recv(16) == b"."  # The daemon is running.
     begun.guard.close()
     status, log = begun.ended()
-    assert (status, begun.ready.readline()) == (1, b"")
+    assert (status, begun.ready.exists()) == (1, False)
     assert "listens" not in log
     assert "The guard is gone." in log
 

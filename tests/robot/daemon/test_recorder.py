@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Episode, Step, episodes_of, read_episode, repair, writer
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.client import Client
-from shapechanger.robot.daemon.recorder import DISK_TOO_SLOW, Recorder, StepBuilder
+from shapechanger.robot.daemon.client import Client, Sent
+from shapechanger.robot.daemon.recorder import DISK_TOO_SLOW, Recorder
 from shapechanger.robot.link.messages import Mark, Observation, RecorderState, Refused, Undo
 from tests.robot.daemon.plans import car_plan, picture
 
@@ -232,58 +232,51 @@ def frame(seq: int) -> Frame:
     return Frame(b"jpeg %d" % seq, seq)
 
 
-class Built:
-    """A builder, and the steps that it has written with their frames."""
+class Built(Recorder):
+    """A recorder that keeps its steps, with their frames, in memory."""
 
     def __init__(self) -> None:
+        super().__init__(car_plan(), lambda message: None, lambda call: call())
+        self.on = True
         self.written: list[tuple[Step, bytes | None]] = []
-        self.builder = StepBuilder(
-            [(-1.0, 1.0)], lambda *step: self.written.append(step), lambda: 7
-        )
+
+    def _add(self, step: Step, jpeg: bytes | None) -> None:
+        self.written.append((step, jpeg))
+
+    def see(self, client: Client, observation: Observation, frame: Frame | None = None) -> Sent:
+        """Send an observation to a client."""
+        self.observed(client, observation)
+        return Sent(observation, frame)
 
 
-@pytest.fixture
-def built() -> Built:
-    """A new builder."""
-    return Built()
-
-
-def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
-    built.builder.observed(ADA, seen(1, 100, suggested=(0.9,)), frame(1))
-    built.builder.decided(ADA, 1, (0.5,), 110)
+def test_the_next_observation_brings_the_applied_outputs() -> None:
+    built = Built()
+    sent = built.see(ADA, seen(1, 100, suggested=(0.9, 0.0)), frame(1))
+    built.decided(ADA, sent, (0.5, 7.0), 110)
     assert built.written == []
-    built.builder.observed(ADA, seen(2, 120, stop_reason="A bump."), frame(2))
-    built.builder.complete()
+    built.see(ADA, seen(2, 120, stop_reason="A bump."), frame(2))
+    built.end()
     ((step, jpeg),) = built.written
     assert jpeg == b"jpeg 1"
-    assert (step.action, step.applied, step.wanted) == ((0.5,), (0.25,), (0.9,))
-    assert (step.captured_ns, step.decided_ns, step.wall_ns) == (100, 110, 7)
+    assert (step.action, step.applied, step.wanted) == ((0.5, 1.0), (0.25,), (0.9, 0.0))
+    assert (step.captured_ns, step.decided_ns) == (100, 110)
     assert (step.driver, step.state, step.stop_reason) == ("person", (100.0,), "A bump.")
 
 
-def test_the_later_of_two_decisions_counts(built: Built) -> None:
-    built.builder.observed(ADA, seen(1, 100), None)
-    built.builder.decided(ADA, 1, (0.5,), 110)
-    built.builder.decided(ADA, 1, (0.0,), 115)
-    built.builder.complete()
+def test_the_later_of_two_decisions_counts() -> None:
+    built = Built()
+    sent = built.see(ADA, seen(1, 100))
+    built.decided(ADA, sent, (0.5, 0.0), 110)
+    built.decided(ADA, sent, (0.0, 0.0), 115)
+    built.end()
     ((step, _),) = built.written
-    assert (step.action, step.decided_ns, step.applied) == ((0.0,), 115, None)
+    assert (step.action, step.decided_ns, step.applied) == ((0.0, 0.0), 115, None)
 
 
-def test_a_command_for_an_unknown_observation_is_skipped(built: Built) -> None:
-    built.builder.observed(ADA, seen(1, 100), None)
-    for who, answers in ((ADA, 2), (NET, 1)):
-        built.builder.decided(who, answers, (0.5,), 110)
-    built.builder.forget(ADA)
-    built.builder.decided(ADA, 1, (0.5,), 110)
-    built.builder.complete()
-    assert built.written == []
-
-
-def test_a_client_without_control_does_not_complete_applied_outputs(built: Built) -> None:
-    built.builder.observed(NET, seen(1, 100), None)
-    built.builder.decided(NET, 1, (0.5,), 110)
-    built.builder.observed(NET, seen(2, 120, mine=False), None)
+def test_a_client_without_control_does_not_complete_applied_outputs() -> None:
+    built = Built()
+    built.decided(NET, built.see(NET, seen(1, 100)), (0.5, 0.0), 110)
+    built.see(NET, seen(2, 120, mine=False))
     ((step, _),) = built.written
     assert step.applied is None
 
@@ -293,21 +286,18 @@ def test_a_client_without_control_does_not_complete_applied_outputs(built: Built
         st.tuples(st.booleans(), st.sampled_from((ADA, NET)), st.integers(0, 4)), max_size=60
     )
 )
-def test_times_increase_and_no_frame_repeats(
-    events: list[tuple[bool, Client, int]],
-) -> None:
+def test_times_increase_and_no_frame_repeats(events: list[tuple[bool, Client, int]]) -> None:
     built = Built()
-    newest = {ADA: 0, NET: 0}
+    sent: dict[Client, list[Sent]] = {ADA: [], NET: []}
     pictures_seen = [frame(number) for number in range(22)]
     for now_ns, (looks, who, back) in enumerate(events):
         if looks:
-            newest[who] += 1
             picture = pictures_seen[1 + now_ns // 3]  # Each image is seen a few times.
-            sent = seen(newest[who], picture.captured_ns)
-            built.builder.observed(who, sent, picture)
-        else:
-            built.builder.decided(who, newest[who] - back, (0.5,), now_ns)
-    built.builder.complete()
+            number = len(sent[who]) + 1
+            sent[who].append(built.see(who, seen(number, picture.captured_ns), picture))
+        elif back < len(sent[who]):
+            built.decided(who, sent[who][-1 - back], (0.5, 0.0), now_ns)
+    built.end()
     for times in ("captured_ns", "decided_ns"):
         found = [getattr(step, times) for step, _ in built.written]
         assert found == sorted(found)

@@ -12,8 +12,9 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from shapechanger.errors import LinkError
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client
+from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.link.messages import (
     VERSION,
@@ -33,6 +34,7 @@ from shapechanger.robot.link.messages import (
     Undo,
     encode,
 )
+from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
 MAX_AGE_NS = 400 * 1_000_000
@@ -56,10 +58,10 @@ class Robot(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.now_ns = 1_000_000_000
+        self.clock = SteppedClock()
         self.orders: list[Order] = []
         self.allowed: list[tuple[int, tuple[float, ...]]] = []
-        self.hub = SessionHub(car_plan(), lambda: self.now_ns, self.orders.append)
+        self.hub = SessionHub(car_plan(), self.clock, self.orders.append)
         self.sessions: dict[int, Session] = {}
         self.models: dict[int, ClientModel] = {}
         self.holder: int | None = None
@@ -144,7 +146,7 @@ class Robot(RuleBasedStateMachine):
         if place in self.sessions:
             observation = self.sessions[place].observe()
             assert observation.mine == (self.holder == place)
-            self.models[place].sent[observation.seq] = self.now_ns
+            self.models[place].sent[observation.seq] = self.clock.ns
 
     @precondition(connected)
     @rule(
@@ -168,7 +170,7 @@ class Robot(RuleBasedStateMachine):
                 self.halts += 1
             elif self.is_fresh(place, answers):
                 self.allowed.append((seq, tuple(scale * value for value in values)))
-                self.commanded_ns = self.now_ns
+                self.commanded_ns = self.clock.ns
         model.newest_command = max(model.newest_command, seq)
         assert self.send(place, message)
 
@@ -189,7 +191,7 @@ class Robot(RuleBasedStateMachine):
         good = len(values) == 2 and all(map(math.isfinite, values))
         self.send(place, Suggest(seq=seq, answers=answers, values=values))
         if self.holder != place and new and good and self.is_fresh(place, answers):
-            self.suggestion = place, values, self.now_ns + DEADLINE_NS
+            self.suggestion = place, values, self.clock.ns + DEADLINE_NS
         assert len(self.orders) == before
 
     @rule(
@@ -216,7 +218,7 @@ class Robot(RuleBasedStateMachine):
     @rule(milliseconds=st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
         """Time passes."""
-        self.now_ns += milliseconds * 1_000_000
+        self.clock.ns += milliseconds * 1_000_000
 
     @rule(garbage=st.binary(max_size=20), place=_places)
     def garbage(self, garbage: bytes, place: int) -> None:
@@ -233,8 +235,8 @@ class Robot(RuleBasedStateMachine):
     @rule()
     def report(self) -> None:
         """A state of the guard and a frame arrive."""
-        self.hub.on_state(guard_state(at_ns=self.now_ns, armed=True))
-        self.hub.on_frame(Frame(b"jpeg", self.now_ns))
+        self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True))
+        self.hub.on_frame(Frame(b"jpeg", self.clock.ns))
 
     @invariant()
     def only_allowed_commands_reach_the_guard(self) -> None:
@@ -258,7 +260,7 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def the_lease_has_the_expected_holder(self) -> None:
-        held = self.hub.lease.holder
+        held = self.hub.holder
         place = next((p for p, s in self.sessions.items() if s.client == held), None)
         assert place == self.holder
 
@@ -266,7 +268,7 @@ class Robot(RuleBasedStateMachine):
     def the_newest_suggestion_is_shown_until_it_expires(self) -> None:
         """Values and sender equal the model's."""
         shown, expected = self.hub.observation(Client(0), 1, None), self.suggestion
-        if expected is None or self.now_ns > expected[2]:
+        if expected is None or self.clock.ns > expected[2]:
             assert (shown.suggested, shown.suggested_by) == ((), "")
         else:
             name = self.sessions[expected[0]].client.name
@@ -275,7 +277,7 @@ class Robot(RuleBasedStateMachine):
     @invariant()
     def no_command_is_in_force_without_a_holder(self) -> None:
         commanded = self.hub.observation(Client(0), 1, None).commanded
-        if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
+        if self.holder is None or self.clock.ns - self.commanded_ns > DEADLINE_NS:
             assert commanded == ()
         elif commanded:
             assert commanded == self.allowed[-1][1]
@@ -292,7 +294,7 @@ class Robot(RuleBasedStateMachine):
     def is_fresh(self, place: int, answers: int) -> bool:
         """Return True if the observation was sent there within the age limit."""
         sent_ns = self.models[place].sent.get(answers)
-        return sent_ns is not None and self.now_ns - sent_ns <= MAX_AGE_NS
+        return sent_ns is not None and self.clock.ns - sent_ns <= MAX_AGE_NS
 
     def send(self, place: int, message: Any) -> bool:
         """Send a message from a place. Return False if no client is there."""

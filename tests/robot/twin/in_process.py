@@ -11,6 +11,7 @@ import logging
 import os
 from collections.abc import Callable, Sequence
 from inspect import signature
+from types import SimpleNamespace
 from typing import Any, Final, cast
 
 import msgspec
@@ -158,9 +159,10 @@ class InProcessRobot:
         self.welcome = Welcome(**msgspec.structs.asdict(card), session=1)
         self._guard: Guard | None = None
         # Numbers images through all starts.
-        self._hub = SessionHub(DaemonPlan(card=card), lambda: self.now_ns, self._send)
+        clock = cast("SteadyClock", SimpleNamespace(now_ns=lambda: self.now_ns))
+        self._hub = SessionHub(DaemonPlan(card=card), clock, self._send)
         self._client = Client(1)
-        self._hub.lease.take(self._client)
+        self._hub.take(self._client)
         self._start()
 
     @property
@@ -204,7 +206,7 @@ class InProcessRobot:
         bumps = self._orders.state.bumps
         self._seq += 1
         command = Command(seq=self._seq, answers=0, values=tuple(values), ttl_ms=self._deadline_ms)
-        self._hub.command(self._client, command, self.now_ns)
+        self._hub.command(self._client, command)
         self._advance(self._period_ns)
         return self._observe(), self._orders.state.bumps > bumps
 

@@ -52,7 +52,7 @@ class FrameChecks:
 
 
 class FrameReader:
-    """Reads a camera in a thread, and reopens it after failures."""
+    """Reads a camera in a thread, from now until `close`, and reopens it after failures."""
 
     def __init__(
         self,
@@ -62,7 +62,6 @@ class FrameReader:
         report: Callable[[str], None],
         opener: Callable[[CameraPlan], Camera] = open_camera,
     ) -> None:
-        self.errors = 0
         self._plan = plan
         self._checks = checks
         self._deliver = deliver
@@ -73,9 +72,6 @@ class FrameReader:
         self._end = threading.Event()
         self._camera: Camera | None = None
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
-
-    def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
@@ -84,8 +80,7 @@ class FrameReader:
         camera = self._camera
         if camera is not None:
             camera.close()
-        if self._thread.is_alive():
-            self._thread.join(_JOIN_S)
+        self._thread.join(_JOIN_S)
 
     def _run(self) -> None:
         pause_s = _FIRST_PAUSE_S
@@ -107,28 +102,24 @@ class FrameReader:
                         self._fail(refusal)
                         # A broken driver may return without waiting for the next frame.
                         self._end.wait(0.5 / self._plan.fps)
-                    else:
-                        good, bad = True, 0
-                        self._accept(frame)
+                        continue
+                    good, bad = True, 0
+                    self._deliver(frame)
+                    if frame.skipped and not self._skips:
+                        self._skips = True  # Some streams have bytes between all frames.
+                        self._report(
+                            f"The camera's stream has bytes between its frames that are no JPEG, "
+                            f"{frame.skipped} before this one: they are skipped."
+                        )
+                    if self._trouble:
+                        self._trouble = ""
+                        self._report("The camera works again.")
         except (ShapechangerError, OSError, ImportError, ValueError) as error:
             if not self._end.is_set():
                 self._fail(str(error))
         return good
 
-    def _accept(self, frame: Frame) -> None:
-        self._deliver(frame)
-        if frame.skipped and not self._skips:
-            self._skips = True  # Some streams have bytes between all frames.
-            self._report(
-                f"The camera's stream has bytes between its frames that are no JPEG, "
-                f"{frame.skipped} before this one: they are skipped."
-            )
-        if self._trouble:
-            self._trouble = ""
-            self._report("The camera works again.")
-
     def _fail(self, trouble: str) -> None:
-        self.errors += 1
         if trouble != self._trouble:
             self._trouble = trouble
             self._report(trouble)

@@ -1,4 +1,4 @@
-"""Session hub: state that all connections share, and the path of commands to the guard."""
+"""Session hub: state that all connections share, the path of commands to the guard, and time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import msgspec
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.client import Client, ControlLease
+from shapechanger.robot.daemon.client import Client, Sent
 from shapechanger.robot.daemon.library import RecordingLibrary
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import PolicyRunner
@@ -54,13 +54,19 @@ class PendingCommand(NamedTuple):
     until_ns: int
 
 
+_NOTHING: Final = PendingCommand(Client(0), (), 0)
+
+
 class SessionHub:
     """The robot, as its connections see it. The hub never blocks and knows no sockets.
 
     Attributes:
         plan: Description of the robot.
         now_ns: Returns the robot's time, ns.
-        lease: The control lease.
+        in_steps: True if time stands still between calls of `step`.
+        holder: The client in control, which holds the lease; or None.
+        lease: Number of the current lease, or of the last one. Each lease has a larger number than
+            the one before, so that commands of an earlier lease can be recognised.
         recorder: Records episodes.
         library: Reads recorded episodes.
         policies: Runs policies on board.
@@ -68,19 +74,21 @@ class SessionHub:
         state: Newest state of the guard.
         frame: Newest frame, or None.
         frame_seq: Its number, from 1; 0 before the first.
-        frame_arrived: Set at each new frame.
-        unsettled: True if an order was given that takes effect at the guard's next tick.
     """
 
     def __init__(
         self,
         plan: DaemonPlan,
-        now_ns: Callable[[], int],
+        clock: Clock,
         order: Callable[[Order], None],
+        drain: Callable[[], None] = lambda: None,
         call: Callable[[Callable[[], None]], None] = lambda work: work(),
     ) -> None:
         self.plan = plan
-        self.lease = ControlLease()
+        self.now_ns = clock.now_ns
+        self.in_steps = plan.card.clock == "twin"
+        self.holder: Client | None = None
+        self.lease = 0
         actions = Layout.from_json(plan.card.action_layout)
         self.action_size = actions.size
         self._applied = [f"{name}{_APPLIED}" for name in actions.names]
@@ -90,17 +98,23 @@ class SessionHub:
         self.state = NO_STATE
         self.frame: Frame | None = None
         self.frame_seq = 0
-        self.frame_arrived = asyncio.Event()
-        self.unsettled = False
-        self.now_ns = now_ns
+        self._clock = clock
         self._order = order
+        self._drain = drain
+        self._one_step_at_a_time = asyncio.Lock()
+        self._frame_arrived = asyncio.Event()
+        self._unsettled = False  # An order was given that takes effect at the guard's next tick.
         self._clients: dict[int, Client] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
-        self._command: PendingCommand | None = None
-        self._suggestion: PendingCommand | None = None
+        self._command = self._suggestion = _NOTHING
         self.recorder = Recorder(plan, self._broadcast, call)
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
         self.policies = PolicyRunner(plan, self._broadcast)
+
+    @property
+    def holder_name(self) -> str:
+        """Name of the client in control; "" for none."""
+        return "" if self.holder is None else self.holder.name
 
     def join(self, client: Client) -> None:
         """Add an authenticated client.
@@ -114,7 +128,7 @@ class SessionHub:
             raise RobotRefused(
                 f"{count} are connected, which is the limit; only a person can still connect."
             )
-        others = [other for other in self._clients.values() if other is not self.lease.holder]
+        others = [other for other in self._clients.values() if other is not self.holder]
         self._clients[client.session] = client
         if is_full:
             # The person may want to stop the robot, and the others may be of somebody who does not.
@@ -127,50 +141,56 @@ class SessionHub:
             return
         self._drop_suggestion(client)
         self.release(client, f"the connection to {client.name} ended")
-        if self.recorder.builder is not None:
-            self.recorder.builder.forget(client)
         if self.recorder.on and not any(other.is_person for other in self._clients.values()):
             self.recorder.end("The last person disconnected, which ended the recording.")
             self._broadcast(self.recorder.state())
 
     def take(self, client: Client) -> None:
-        """Give control to a client and report it to all, or report the refusal to the client."""
-        if refusal := self.lease.refusal(client):
-            client.post(Lease(mine=False, holder=self.lease.holder_name, reason=refusal))
+        """Give control to a client and report it to all, or report the refusal to the client.
+
+        A person takes control from a program at once; no client takes it from any other.
+        """
+        held = self.holder
+        if held is not None and held is not client and (held.is_person or not client.is_person):
+            reason = f"{held.name} has control; a {client.role} cannot take it from a {held.role}."
+            client.post(Lease(mine=False, holder=held.name, reason=reason))
             return
-        lost = self.lease.take(client)
         self._drop_suggestion(client)
         reason = f"{client.name} has control."
-        if lost is not None:
-            # The last command of the previous holder must not stay in force.
-            self.give_order(Order(kind="halt"))
-            self._command = None
-            reason = f"{client.name}, a person, took control from {lost.name}."
+        if held is not client:
+            self.holder = client
+            self.lease += 1
+            if held is not None:
+                # The last command of the previous holder must not stay in force.
+                self.give_order(Order(kind="halt"))
+                self._command = _NOTHING
+                reason = f"{client.name}, a person, took control from {held.name}."
         self._broadcast_lease(reason)
 
     def release(self, client: Client, why: str) -> None:
         """End the lease of a client, if it holds it, and disarm the robot."""
-        if self.lease.holder is not client:
+        if self.holder is not client:
             return
-        self.lease.holder = None
+        self.holder = None
         self.give_order(Order(kind="disarm", reason=why))
-        self._command = None
+        self._command = _NOTHING
         self._broadcast_lease(f"No client has control: {why}.")
 
-    def command(self, client: Client, command: Command, now_ns: int) -> None:
-        """Pass a valid command of the lease holder to the guard."""
-        self._arrivals[self.lease.number, command.seq] = now_ns
+    def command(self, client: Client, command: Command, sent: Sent | None = None) -> None:
+        """Pass a valid command of the lease holder, which answers `sent`, to the guard."""
+        now_ns = self.now_ns()
+        self._arrivals[self.lease, command.seq] = now_ns
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
         values = tuple(command.scale * value for value in command.values)
         until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.card.deadline_ms)
         self._command = PendingCommand(client, values, until_ns)
-        if self.recorder.builder is not None and self.state.armed:
-            self.recorder.builder.decided(client, command.answers, values, now_ns)
+        if sent is not None and self.state.armed:
+            self.recorder.decided(client, sent, values, now_ns)
         self._order(
             Order(
                 kind="command",
-                session=self.lease.number,
+                session=self.lease,
                 seq=command.seq,
                 issued_ns=now_ns,
                 ttl_ms=command.ttl_ms,
@@ -182,12 +202,12 @@ class SessionHub:
     def halt(self) -> None:
         """Drop the newest command, because the lease holder sent an invalid one after it."""
         # Not `give_order`: the sender waits for an observation anyway, so time need not step.
-        self._command = None
+        self._command = _NOTHING
         self._order(Order(kind="halt", issued_ns=self.now_ns()))
 
     def give_order(self, order: Order) -> None:
         """Pass an order other than a command to the guard, with the current time."""
-        self.unsettled = True
+        self._unsettled = True
         self._order(msgspec.structs.replace(order, issued_ns=self.now_ns()))
 
     def suggest(self, client: Client, values: tuple[float, ...]) -> None:
@@ -200,15 +220,15 @@ class SessionHub:
 
         `frame_sent` is the number of the last frame sent to it; None if it wants no frames.
         """
-        now_ns, state, frame, holder = self.now_ns(), self.state, self.frame, self.lease.holder
+        now_ns, state, frame, holder = self.now_ns(), self.state, self.frame, self.holder
         at_ns = state.at_ns or now_ns
         known = state.quantities | dict(zip(self._applied, state.applied, strict=False))
         # A command of another lease came from another client.
-        drives = state.applied_seq is not None and state.applied_session == self.lease.number
-        command, suggestion = self._command, self._suggestion
-        in_force = command is not None and state.armed and now_ns <= command.until_ns
-        if suggestion is not None and now_ns > suggestion.until_ns:
-            suggestion = None
+        drives = state.applied_seq is not None and state.applied_session == self.lease
+        command, suggestion = (
+            pending if now_ns <= pending.until_ns else _NOTHING
+            for pending in (self._command if state.armed else _NOTHING, self._suggestion)
+        )
         is_new = frame_sent is not None and frame_sent != self.frame_seq
         return Observation(
             seq=seq,
@@ -229,12 +249,12 @@ class SessionHub:
             armed=state.armed,
             emergency=state.emergency,
             emergencies=state.emergencies,
-            holder=self.lease.holder_name,
+            holder=self.holder_name,
             mine=holder is client,
             holder_role="" if holder is None else holder.role,
-            commanded=command.values if command is not None and in_force else (),
-            suggested=() if suggestion is None else suggestion.values,
-            suggested_by="" if suggestion is None else suggestion.client.name,
+            commanded=command.values,
+            suggested=suggestion.values,
+            suggested_by=suggestion.client.name,
         )
 
     def on_state(self, state: GuardState) -> None:
@@ -252,17 +272,32 @@ class SessionHub:
             refused = Refused(reason=state.refused, seq=state.refused_seq)
             if state.refused_seq is None:
                 self._broadcast(refused)
-            elif self.lease.holder is not None:
+            elif self.holder is not None:
                 # A refused command is the business of the lease holder alone.
-                self.lease.holder.post(refused)
+                self.holder.post(refused)
         self._notify()
 
     def on_frame(self, frame: Frame) -> None:
         """Handle a new, valid frame of the camera."""
         self.frame = frame
         self.frame_seq += 1
-        self.frame_arrived.set()
+        self._frame_arrived.set()
         self._notify()
+
+    async def step(self, seconds: float) -> None:
+        """Let `seconds` of the robot's time pass, and collect all that happened meanwhile."""
+        if self.in_steps:
+            # Finish a step whose client disconnects: the clock would lose count otherwise.
+            await asyncio.shield(asyncio.ensure_future(self._one_step(seconds)))
+        else:
+            await self._clock.sleep(seconds)
+            self._drain()
+
+    async def settle(self) -> None:
+        """Let the guard handle an order that was just given; a real clock needs no help."""
+        if self.in_steps and self._unsettled:
+            self._unsettled = False
+            await self.step(1.0 / self.plan.card.tick_hz)
 
     def event(self, name: str, text: str) -> None:
         """Report an event to all clients."""
@@ -274,62 +309,28 @@ class SessionHub:
 
     def _broadcast_lease(self, reason: str) -> None:
         for client in self._clients.values():
-            mine = self.lease.holder is client
-            client.post(Lease(mine=mine, holder=self.lease.holder_name, reason=reason))
+            mine = self.holder is client
+            client.post(Lease(mine=mine, holder=self.holder_name, reason=reason))
 
     def _drop_suggestion(self, client: Client) -> None:
         """Drop the suggestion of a client that left or took the lease."""
-        if self._suggestion is not None and self._suggestion.client is client:
-            self._suggestion = None
+        if self._suggestion.client is client:
+            self._suggestion = _NOTHING
 
     def _notify(self) -> None:
         for client in self._clients.values():
             client.updated.set()
 
-
-class Timekeeper:
-    """Advances the robot's time, and collects all that happened meanwhile.
-
-    Attributes:
-        in_steps: True if time stands still between calls of `step`.
-    """
-
-    def __init__(self, clock: Clock, hub: SessionHub, drain: Callable[[], None]) -> None:
-        self._clock = clock
-        self._hub = hub
-        self._drain = drain
-        self.in_steps = hub.plan.card.clock == "twin"
-        self._one_at_a_time = asyncio.Lock()
-
-    async def step(self, seconds: float) -> None:
-        """Let `seconds` pass."""
-        if not self.in_steps:
-            await self._clock.sleep(seconds)
-            self._drain()
-            return
-        # Finish a step whose client disconnects: the clock would lose count otherwise.
-        await asyncio.shield(asyncio.ensure_future(self._one_step(seconds)))
-
-    async def settle(self) -> None:
-        """Let the guard handle an order that was just given; a real clock needs no help."""
-        if self.in_steps and self._hub.unsettled:
-            self._hub.unsettled = False
-            await self.step(1.0 / self._hub.plan.card.tick_hz)
-
     async def _one_step(self, seconds: float) -> None:
-        async with self._one_at_a_time:
+        async with self._one_step_at_a_time:
             captured_ns = await self._clock.sleep(seconds)
             self._drain()
-            if captured_ns is not None:
-                await self._wait_for_frame(captured_ns)
-
-    async def _wait_for_frame(self, captured_ns: int) -> None:
-        """Wait for a frame that is still in the camera's driver."""
-        hub = self._hub
-        try:
-            async with asyncio.timeout(_FRAME_WAIT_S):
-                while hub.frame is None or hub.frame.captured_ns < captured_ns:
-                    hub.frame_arrived.clear()
-                    await hub.frame_arrived.wait()
-        except TimeoutError:
-            _log.warning("The frame of %d ns did not arrive.", captured_ns)
+            if captured_ns is None:
+                return
+            try:  # The frame may still be in the camera's driver.
+                async with asyncio.timeout(_FRAME_WAIT_S):
+                    while self.frame is None or self.frame.captured_ns < captured_ns:
+                        self._frame_arrived.clear()
+                        await self._frame_arrived.wait()
+            except TimeoutError:
+                _log.warning("The frame of %d ns did not arrive.", captured_ns)

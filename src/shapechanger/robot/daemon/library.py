@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import re
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
 from shapechanger.demos.episodes import drop, keep
 from shapechanger.demos.episodes.files import (
@@ -28,7 +29,6 @@ Answer = messages.Recordings | messages.Piece | messages.Refused
 
 _EPISODE_ID: Final = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,127}")
 _MAX_TEXT: Final = 200
-_CHUNK: Final = 1 << 16
 _JOIN_S: Final = 2.0
 
 
@@ -39,22 +39,16 @@ class RecordingLibrary:
     """
 
     def __init__(self, folder: Path | None, call: Callable[[Callable[[], None]], None]) -> None:
-        self._folder = Path() if folder is None else folder
+        self._folder = folder or Path()
         self._has_folder = folder is not None
-        self._call = call
-        self._worker = Worker("library")
+        self._worker = Worker("library", call)
         self._known: dict[str, tuple[object, messages.EpisodeSummary]] = {}
-        self._index: LineIndex | None = None
+        self._index = LineIndex(Path())
 
     def ask(self, question: Question, then: Callable[[Answer], None]) -> None:
         """Ask a question; the caller bounds how many are open."""
-
-        def work() -> None:
-            answer = self.answer(question)
-            self._call(lambda: then(answer))
-
         if self._has_folder:
-            self._worker.put(work)
+            self._worker.put(partial(self._answer, question), then)
         else:
             then(messages.Refused(reason="This robot was served without a folder for recordings."))
 
@@ -62,7 +56,7 @@ class RecordingLibrary:
         """End the thread, without waiting for a disk that hangs."""
         self._worker.close(_JOIN_S)
 
-    def answer(self, question: Question) -> Answer:
+    def _answer(self, question: Question) -> Answer:
         """Answer a question; errors of the disk are refusals."""
         try:
             match question:
@@ -90,9 +84,19 @@ class RecordingLibrary:
             known = self._known.get(name)
             if known is not None and known[0] == stamp:
                 return known[1]
-            summary = _summary(path)
+            outline = read_outline(path)
         except (DemosError, OSError) as error:
             return messages.EpisodeSummary(id=name, outcome=str(error)[:_MAX_TEXT])
+        summary = messages.EpisodeSummary(
+            id=name,
+            steps=outline.steps,
+            kept=outline.kept,
+            seconds=outline.seconds,
+            closed=outline.closed,
+            created=outline.header.created[:_MAX_TEXT],
+            driver=outline.header.driver[:_MAX_TEXT],
+            outcome=outline.outcome[:_MAX_TEXT],
+        )
         self._known[name] = stamp, summary
         return summary
 
@@ -115,28 +119,23 @@ class RecordingLibrary:
     def _piece(self, path: Path, question: messages.Fetch) -> messages.Piece:
         """Read a part of an episode."""
         steps = path / STEPS
-        index = self._index
-        if index is None or index.path != steps:
-            index = self._index = LineIndex(steps)
-        header = (path / HEADER).read_bytes().decode()
+        if self._index.path != steps:
+            self._index = LineIndex(steps)
+        index, header = self._index, (path / HEADER).read_bytes().decode()
         lines: list[str] = []
         frames: list[bytes | None] = []
-        with steps.open("rb") as file:
-            index.refresh(file)
-            last = min(question.first + question.count, len(index))
-            size, frame_before = len(header), ""
-            for number in range(question.first, last):
-                line = index.read(file, number)[:-1].decode()
-                name = frame_of(line, f"Line {number + 1} of {steps}")
-                frame = None
-                if name and name != frame_before:
-                    frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
-                size += len(line.encode()) + len(frame or b"")
-                if lines and size > messages.MAX_PIECE:
-                    break
-                lines.append(line)
-                frames.append(frame)
-                frame_before = name
+        size, frame_before = len(header), ""
+        for number, line in enumerate(index.lines(question.first, question.count), question.first):
+            name = frame_of(line, f"Line {number + 1} of {steps}")
+            frame = None
+            if name and name != frame_before:
+                frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
+            size += len(line.encode()) + len(frame or b"")
+            if lines and size > messages.MAX_PIECE:
+                break
+            lines.append(line)
+            frames.append(frame)
+            frame_before = name
         piece = messages.Piece(
             episode=question.episode,
             first=question.first,
@@ -155,47 +154,31 @@ class LineIndex:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._ends: array[int] = array("Q")  # Offset behind each complete line.
-        self._read_to = 0
+        self._ends: array[int] = array("Q", [0])  # 0, and the offset behind each complete line.
         self._inode = -1
 
     def __len__(self) -> int:
-        """Return the number of complete lines at the last `refresh`."""
-        return len(self._ends)
+        """Return the number of complete lines when they were read last."""
+        return len(self._ends) - 1
 
-    def refresh(self, file: BinaryIO) -> None:
-        """Read what was appended, or all of it if the file was replaced or truncated."""
-        found = os.fstat(file.fileno())
-        if found.st_ino != self._inode or found.st_size < self._read_to:
-            self._ends, self._read_to, self._inode = array("Q"), 0, found.st_ino
-        file.seek(self._read_to)
-        while chunk := file.read(_CHUNK):
-            at = -1
-            while (at := chunk.find(b"\n", at + 1)) != -1:
-                self._ends.append(self._read_to + at + 1)
-            self._read_to += len(chunk)
+    def lines(self, first: int, count: int) -> Iterator[str]:
+        r"""Read up to `count` lines from number `first` on, and return them without their `\n`.
 
-    def read(self, file: BinaryIO, number: int) -> bytes:
-        r"""Read a line with its `\n`."""
-        start = self._ends[number - 1] if number else 0
-        file.seek(start)
-        return file.read(self._ends[number] - start)
+        What was appended is read before, or all of the file if it was replaced or truncated.
+        """
+        with self.path.open("rb") as file:
+            found = os.fstat(file.fileno())
+            if found.st_ino != self._inode or found.st_size < self._ends[-1]:
+                self._ends, self._inode = array("Q", [0]), found.st_ino
+            file.seek(self._ends[-1])
+            for line in file:
+                if line.endswith(b"\n"):
+                    self._ends.append(self._ends[-1] + len(line))
+            file.seek(self._ends[min(first, len(self))])
+            for _ in range(first, min(first + count, len(self))):
+                yield file.readline()[:-1].decode()
 
 
 def _is_listed(path: Path) -> bool:
     """Return True for the folder of an episode, and never for a link to another place."""
     return bool(_EPISODE_ID.fullmatch(path.name)) and not path.is_symlink() and is_episode(path)
-
-
-def _summary(path: Path) -> messages.EpisodeSummary:
-    outline = read_outline(path)
-    return messages.EpisodeSummary(
-        id=path.name,
-        steps=outline.steps,
-        kept=outline.kept,
-        seconds=outline.seconds,
-        closed=outline.closed,
-        created=outline.header.created[:_MAX_TEXT],
-        driver=outline.header.driver[:_MAX_TEXT],
-        outcome=outline.outcome[:_MAX_TEXT],
-    )

@@ -9,6 +9,7 @@ import ctypes
 import json
 import logging
 import os
+import queue
 import select
 import signal
 import socket
@@ -23,11 +24,15 @@ import msgspec
 from shapechanger.errors import ShapechangerError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
-from shapechanger.robot.daemon.credentials import check_exposure, read_key, server_tls
-from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
+from shapechanger.robot.daemon.credentials import (
+    Authenticator,
+    check_exposure,
+    read_key,
+    server_tls,
+)
+from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
-from shapechanger.robot.daemon.session import Authenticator
 from shapechanger.robot.discovery import announce, withdraw
 from shapechanger.robot.guard.channel import (
     MAX_DATAGRAM,
@@ -57,7 +62,7 @@ _READY_S: Final = 1.0
 
 
 class GuardLink:
-    """Non-blocking socket to the guard: sends orders and receives states.
+    """Non-blocking socket to the guard, in the running event loop: sends orders, receives states.
 
     A guard that does not read fills the socket. A command is then dropped, because it would be
     too old when the guard reads again, and a stop waits until there is room.
@@ -70,19 +75,18 @@ class GuardLink:
         self._socket.setblocking(False)
         self._on_state = on_state
         self._on_lost = on_lost
-        self._lost = False
         self._stuck = False
         self._waiting: dict[str, Order] = {}
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(self._socket, self.drain)
 
-    def attach(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Read states in an event loop from now on."""
-        self._loop = loop
-        loop.add_reader(self._socket, self.drain)
+    @property
+    def _is_open(self) -> bool:
+        return self._socket.fileno() >= 0
 
     def send(self, order: Order) -> None:
         """Send an order."""
-        if self._lost:
+        if not self._is_open:
             return
         if not self._waiting and self._try(order):
             self._stuck = False
@@ -92,12 +96,11 @@ class GuardLink:
             _log.warning("The guard does not read: commands are dropped, and stops wait.")
         if order.kind in _URGENT:
             self._waiting.setdefault(order.kind, order)
-            if self._loop is not None:
-                self._loop.add_writer(self._socket, self._send_waiting)
+            self._loop.add_writer(self._socket, self._send_waiting)
 
     def drain(self) -> None:
         """Read all states that have arrived."""
-        while not self._lost:
+        while self._is_open:
             try:
                 data = self._socket.recv(MAX_DATAGRAM)
             except BlockingIOError:
@@ -111,15 +114,15 @@ class GuardLink:
                 state = decode_state(data)
             except ValueError as error:
                 _log.warning("A message of the guard is not a state: %s", error)
-                continue
-            self._on_state(state)
+            else:
+                self._on_state(state)
 
     def close(self) -> None:
         """Close the socket, which makes the guard stop the robot."""
-        self._lost = True  # Nothing is sent from now on.
-        if self._socket.fileno() >= 0:
-            self._detach()
-        self._socket.close()
+        if self._is_open:
+            self._loop.remove_reader(self._socket)
+            self._loop.remove_writer(self._socket)
+            self._socket.close()
 
     def _try(self, order: Order) -> bool:
         try:
@@ -131,52 +134,34 @@ class GuardLink:
         return True
 
     def _send_waiting(self) -> None:
-        for kind, order in list(self._waiting.items()):
+        while self._is_open and self._waiting:
+            kind, order = next(iter(self._waiting.items()))
             if not self._try(order):
                 return
-            self._waiting.pop(kind, None)
-        if self._loop is not None and not self._lost:
+            del self._waiting[kind]
+        if self._is_open:
             self._loop.remove_writer(self._socket)
 
     def _lose(self) -> None:
-        if self._lost:
-            return
-        self._lost = True
-        self._waiting.clear()
-        self._detach()
+        self.close()
         self._on_lost()
-
-    def _detach(self) -> None:
-        if self._loop is not None:
-            self._loop.remove_reader(self._socket)
-            self._loop.remove_writer(self._socket)
 
 
 class Daemon:
     """The daemon of a robot, from start to end; make it in the event loop that runs it."""
 
     def __init__(
-        self,
-        plan: DaemonPlan,
-        clock: Clock,
-        guard_fd: int,
-        heartbeat_fd: int | None = None,
-        ready_fd: int | None = None,
+        self, plan: DaemonPlan, clock: Clock, guard_fd: int, heartbeat_fd: int | None = None
     ) -> None:
         self._plan = plan
-        self._clock = clock
+        self._now_ns = clock.now_ns
         self._ended = asyncio.Event()
         self._guard_reported = asyncio.Event()  # The guard has reported, or never will.
         self._why = ""
-        self._guard = GuardLink(
-            guard_fd,
-            on_state=self._on_state,
-            on_lost=lambda: self.end("The guard is gone."),
-        )
+        self._guard = GuardLink(guard_fd, self._on_state, lambda: self.end("The guard is gone."))
         self._loop = asyncio.get_running_loop()
-        self._hub = SessionHub(plan, clock.now_ns, self._guard.send, self._call)
+        self._hub = SessionHub(plan, clock, self._guard.send, self._guard.drain, self._call)
         self._heartbeat_fd = heartbeat_fd
-        self._ready_fd = ready_fd
 
     async def run(self) -> str:
         """Serve until `end` is called.
@@ -184,40 +169,38 @@ class Daemon:
         Returns:
             The reason why it ended; "" if it was asked to.
         """
-        plan = self._plan
+        plan, hub = self._plan, self._hub
         check_exposure(plan)
         key = read_key(Path(plan.key_file)) if plan.key_file else b""
         tls, fingerprint = None, b""
         if plan.certificate:
             tls, fingerprint = server_tls(Path(plan.certificate), Path(plan.private_key))
-        time = Timekeeper(self._clock, self._hub, self._guard.drain)
-        server = Server(self._hub, time, Authenticator(key, fingerprint), tls)
+        server = Server(hub, Authenticator(key, fingerprint), tls)
         tasks = [
             asyncio.create_task(work) for work in (self._heartbeats(), self._report_recorder())
         ]
-        self._guard.attach(self._loop)
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
             # The first client must not see a robot of unknown state. Where time moves in steps,
             # the guard reports nothing before the first step.
-            if not time.in_steps:
+            if not hub.in_steps:
                 await self._guard_reported.wait()
             if not self._ended.is_set():
                 port = await server.start()
-                self._hub.policies.serve(port, fingerprint)
+                hub.policies.serve(port, fingerprint)
                 self._report_ready(port, fingerprint)
                 if plan.discovery and is_loopback(plan.host):
-                    words = "%s is not announced: only this machine reaches %s."
-                    _log.info(words, plan.card.robot, plan.host)
+                    text = "%s is not announced: only this machine reaches %s."
+                    _log.info(text, plan.card.robot, plan.host)
                 elif plan.discovery:
                     announcement = await announce(plan.card, plan.host, port, fingerprint)
             await self._ended.wait()
         finally:
             # First of all the guard stops the robot, when it sees this socket close.
             self._guard.close()
-            self._hub.recorder.end()
-            await self._hub.policies.close()
+            hub.recorder.end()
+            await hub.policies.close()
             if camera is not None:
                 await asyncio.to_thread(camera.close)
             await server.close()
@@ -226,8 +209,8 @@ class Daemon:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await asyncio.to_thread(self._hub.recorder.close)
-            await asyncio.to_thread(self._hub.library.close)
+            await asyncio.to_thread(hub.recorder.close)
+            await asyncio.to_thread(hub.library.close)
         return self._why
 
     def end(self, why: str = "") -> None:
@@ -260,7 +243,7 @@ class Daemon:
             self._loop.call_soon_threadsafe(work)
 
     def _camera(self, plan: CameraPlan) -> FrameReader:
-        """Start to read the camera. While the loop is busy, only the newest frame is kept."""
+        """Read the camera. While the loop is busy, only the newest frame is kept."""
         newest: deque[Frame] = deque(maxlen=1)
 
         def collect() -> None:
@@ -275,26 +258,21 @@ class Daemon:
             _log.warning("Camera: %s", text)
             self._call(lambda: self._hub.event("camera", text))
 
-        now_ns = self._clock.now_ns if self._plan.card.clock == "real" else None
-        reader = FrameReader(plan, FrameChecks(now_ns), deliver, report)
-        reader.start()
-        return reader
+        now_ns = None if self._hub.in_steps else self._now_ns
+        return FrameReader(plan, FrameChecks(now_ns), deliver, report)
 
     def _report_ready(self, port: int, fingerprint: bytes) -> None:
-        """Report the port in the log, and to the process that started this one."""
+        """Report the port in the log, and in the file that says that the robot can be reached."""
         plan = self._plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
         _log.info("%s listens at %s, %s.", plan.card.robot, Address(plan.host, port), secured)
+        if not plan.ready_file:
+            return
         ready = {"port": port, "fingerprint": fingerprint.hex()}
-        line = json.dumps(ready).encode() + b"\n"
         try:
-            if self._ready_fd is not None:
-                os.write(self._ready_fd, line)
-                os.close(self._ready_fd)
-            if plan.ready_file:
-                partial = Path(f"{plan.ready_file}.partial")
-                partial.write_bytes(line)
-                partial.replace(plan.ready_file)
+            partial = Path(f"{plan.ready_file}.partial")
+            partial.write_text(json.dumps(ready) + "\n")
+            partial.replace(plan.ready_file)
         except OSError as error:
             _log.warning("The port cannot be reported, but the robot is served: %s", error)
 
@@ -305,7 +283,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--plan-fd", type=int, required=True)
     parser.add_argument("--guard-fd", type=int, required=True)
     parser.add_argument("--heartbeat-fd", type=int)
-    parser.add_argument("--ready-fd", type=int)
     options = parser.parse_args(arguments)
     serve_plan = read_plan_fd(options.plan_fd)
     os.close(options.plan_fd)
@@ -315,12 +292,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger("shapechanger").setLevel(logging.INFO)
     try:
         plan = msgspec.convert(serve_plan.daemon, DaemonPlan)
-        source, argument = serve_plan.hardware
-        clock = connect(source, argument).clock
+        clock = connect(*serve_plan.hardware).clock
         run_early()
 
         async def run() -> str:
-            daemon = Daemon(plan, clock, options.guard_fd, options.heartbeat_fd, options.ready_fd)
+            daemon = Daemon(plan, clock, options.guard_fd, options.heartbeat_fd)
             for number in (signal.SIGTERM, signal.SIGINT):
                 asyncio.get_running_loop().add_signal_handler(number, daemon.end)
             return await daemon.run()
@@ -333,7 +309,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if why else 0
 
 
-def send_lifeline(guard_fd: int) -> bool:
+def send_lifeline(guard_fd: int) -> None:
     """Send the guard a descriptor that closes as soon as this process dies.
 
     When a process is killed, the kernel frees its memory before it closes its files. For the
@@ -342,43 +318,36 @@ def send_lifeline(guard_fd: int) -> bool:
     one end of a pipe, and the guard the other. `python -m benchmarks.run robot-faults` measures
     0.5 ms instead of 7 ms.
 
-    Call this while few files are open and no other thread runs.
-
-    Returns:
-        False where the system cannot do it; the guard then waits for the end of the socket.
+    Where the system cannot do it, the guard waits for the end of the socket. Call this while few
+    files are open and no other thread runs.
     """
     ours, theirs = os.pipe()
     # The new thread gets a copy of each file; this one is then closed here.
-    apart = threading.Event()
-    failed: list[bool] = []
+    held: queue.SimpleQueue[bool] = queue.SimpleQueue()
     threading.Thread(
-        target=_hold, args=(theirs, apart, failed), name="shapechanger-life", daemon=True
+        target=_hold, args=(theirs, held), name="shapechanger-life", daemon=True
     ).start()
-    held = apart.wait(_READY_S) and not failed
+    # The queue is empty if the thread is late. If the guard is gone already, the reader of the
+    # socket notices.
+    with contextlib.suppress(queue.Empty, BrokenPipeError, ConnectionResetError):
+        if held.get(timeout=_READY_S):
+            with socket.socket(fileno=os.dup(guard_fd)) as guard:
+                socket.send_fds(guard, [LIFELINE], [ours])
     os.close(theirs)
-    if held:
-        # If the guard is gone already, the reader of the socket notices.
-        with (
-            socket.socket(fileno=os.dup(guard_fd)) as guard,
-            contextlib.suppress(BrokenPipeError, ConnectionResetError),
-        ):
-            socket.send_fds(guard, [LIFELINE], [ours])
     os.close(ours)
-    return held
 
 
-def _hold(fd: int, apart: threading.Event, failed: list[bool]) -> None:
+def _hold(fd: int, held: queue.SimpleQueue[bool]) -> None:
     """Hold a file that no other thread has, until the process or the other end is gone."""
     unshare = getattr(ctypes.CDLL(None), "unshare", None)  # On Linux only.
     if unshare is None or unshare(_CLONE_FILES) != 0:
-        failed.append(True)
-        apart.set()
+        held.put(False)
         return
     os.closerange(0, fd)
     os.closerange(fd + 1, os.sysconf("SC_OPEN_MAX"))
     ended = select.poll()
     ended.register(fd, 0)  # Only the error condition, that the other end is closed.
-    apart.set()
+    held.put(True)
     ended.poll()
 
 

@@ -7,12 +7,11 @@ import logging
 import queue
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
@@ -20,7 +19,7 @@ from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.client import Client
+from shapechanger.robot.daemon.client import Client, Sent
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (
@@ -36,7 +35,6 @@ _log = logging.getLogger(__name__)
 
 DISK_TOO_SLOW: Final = "The disk is too slow: recording ended, and the steps so far are kept."
 
-_WINDOW: Final = 64  # Observations of one client; a command answers a younger one.
 _MAX_JOBS: Final = 256  # Over ten seconds of steps at 20 Hz: memory cards pause for seconds.
 _MAX_BYTES: Final = 16 << 20  # Bytes of queued frames.
 _CLOSE_S: Final = 5.0
@@ -45,141 +43,45 @@ _NOT_RECORDING: Final = "Nothing is being recorded."
 # Facts of the card that an episode keeps, under the same names.
 _SHARED: Final = tuple(f.name for f in fields(EpisodeHeader) if hasattr(RobotCard, f.name))
 
-
-class _Seen(NamedTuple):
-    """An observation that a client was sent, and the newest frame at that time."""
-
-    observation: Observation
-    frame: Frame | None
+_T = TypeVar("_T")
 
 
 class _Decided(NamedTuple):
-    """A step whose applied outputs are not known yet."""
+    """A step whose applied outputs are not known yet, and the observation that it answers."""
 
     client: Client
-    seen: _Seen
+    sent: Sent
     step: Step
-
-
-class StepBuilder:
-    """Makes a step of each observation that is answered by a command.
-
-    The next observation of the same client completes a step, because it reports the applied
-    outputs. Of two commands that answer the same observation the later one counts. A command that
-    answers an observation older than the last step's is ignored, so that time never runs
-    backwards in an episode.
-    """
-
-    def __init__(
-        self,
-        limits: Sequence[tuple[float, float]],
-        write: Callable[[Step, bytes | None], object],
-        wall_ns: Callable[[], int] = time.time_ns,
-    ) -> None:
-        self._limits = limits
-        self._write = write
-        self._wall_ns = wall_ns
-        self._seen: dict[Client, deque[_Seen]] = {}
-        self._decided: _Decided | None = None
-        self._newest: _Decided | None = None
-        self._frame: Frame | None = None
-
-    def observed(self, client: Client, observation: Observation, frame: Frame | None) -> None:
-        """Note an observation that is sent to a client, and complete the step before it."""
-        self._seen.setdefault(client, deque(maxlen=_WINDOW)).append(_Seen(observation, frame))
-        decided = self._decided
-        if decided is None or decided.client is not client:
-            return
-        if observation.mine:
-            step = msgspec.structs.replace(
-                decided.step,
-                applied=observation.action_applied or None,
-                stop_reason=observation.stop_reason,
-            )
-            self._decided = decided._replace(step=step)
-        self.complete()
-
-    def decided(self, client: Client, answers: int, values: tuple[float, ...], now_ns: int) -> None:
-        """Note a command of a client, and complete a step that answers another observation."""
-        window = self._seen.get(client, ())
-        seen = next((s for s in reversed(window) if s.observation.seq == answers), None)
-        if seen is None or self._is_past(client, seen):
-            return
-        before = self._decided
-        if before is None or before.client is not client or before.seen is not seen:
-            self.complete()
-        step = Step(
-            action=tuple(
-                min(max(value, low), high)
-                for value, (low, high) in zip(values, self._limits, strict=True)
-            ),
-            driver=client.role,
-            wanted=seen.observation.suggested or None,
-            state=seen.observation.state,
-            captured_ns=seen.observation.captured_ns,
-            decided_ns=now_ns,
-            wall_ns=self._wall_ns(),
-        )
-        self._decided = self._newest = _Decided(client, seen, step)
-
-    def complete(self) -> None:
-        """Write the pending step, if there is one, with the outputs known so far."""
-        decided, self._decided = self._decided, None
-        if decided is None:
-            return
-        frame, jpeg = decided.seen.frame, None
-        if frame is not None and frame is not self._frame:
-            self._frame, jpeg = frame, frame.jpeg
-        self._write(decided.step, jpeg)
-
-    def forget(self, client: Client) -> None:
-        """Drop the observations of a client that left."""
-        self._seen.pop(client, None)
-
-    def _is_past(self, client: Client, seen: _Seen) -> bool:
-        """Return True if an observation is older than the newest step's."""
-        newest = self._newest
-        if newest is None or newest.seen is seen:
-            return False
-        ours, theirs = seen.observation, newest.seen.observation
-        if client is newest.client and ours.seq < theirs.seq:
-            return True
-        return ours.captured_ns < theirs.captured_ns
 
 
 class Worker:
-    """Thread that calls functions one after another; a disk that hangs keeps no process alive."""
+    """Thread that does one job after another; a disk that hangs keeps no process alive.
 
-    def __init__(self, name: str) -> None:
-        self._calls: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+    Args:
+        name: Name of the thread.
+        call: Calls a function in the event loop's thread.
+    """
+
+    def __init__(self, name: str, call: Callable[[Callable[[], None]], None]) -> None:
+        self._call = call
+        self._jobs: queue.SimpleQueue[Callable[[], Callable[[], None]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
-    def put(self, call: Callable[[], None]) -> None:
-        """Call a function after those before it."""
+    def put(self, job: Callable[[], _T], then: Callable[[_T], None]) -> None:
+        """Do a job after those before it, and pass its result to a function in the event loop."""
         if self._thread.ident is None:
             self._thread.start()
-        self._calls.put(call)
+        self._jobs.put(lambda: partial(then, job()))
 
     def close(self, at_most_s: float) -> None:
-        """End the thread after the functions so far, and wait for it, up to a limit."""
+        """End the thread after the jobs so far, and wait for it, up to a limit."""
         if self._thread.ident is not None:
-            self._calls.put(None)
+            self._jobs.put(None)
             self._thread.join(at_most_s)
 
     def _run(self) -> None:
-        while (call := self._calls.get()) is not None:
-            call()
-
-
-class _Shot(NamedTuple):
-    """A step, and its frame; None if it repeats the previous step's."""
-
-    step: Step
-    jpeg: bytes | None
-
-
-_Job = _Shot | Mark | Undo | str | None
-"""Something to write: a step, an edit, the outcome that ends an episode, or None to begin it."""
+        while (job := self._jobs.get()) is not None:
+            self._call(job())
 
 
 class _Episode:
@@ -201,28 +103,24 @@ class _Episode:
         self._create = partial(EpisodeWriter.create, folder, header)
         self._writer: EpisodeWriter | None = None
 
-    def attempt(self, job: _Job) -> str:
-        """Do a job unless there was an error, and return the reason for a refusal, or ""."""
-        if self._trouble:
-            return ""
+    def attempt(self, job: Callable[[EpisodeWriter], object]) -> tuple[object, RecorderState]:
+        """Do a job unless there was an error, and return its result and the episode's state."""
+        result = None
         try:
-            return self._write(job)
-        except ShapechangerError as error:
-            self._trouble = str(error)
+            if not self._trouble:
+                self._writer = self._writer or self._create()
+                result = job(self._writer)
         except Exception as error:  # Whatever it is, the robot drives on.
-            self._trouble = f"Recording failed: {error!r}."
-        # On a full disk this may fail too. All steps are there all the same, and
-        # `shapechanger demos repair` closes the episode.
-        with contextlib.suppress(ShapechangerError):
-            if self._writer is not None:
-                self._writer.close(self._trouble)
-        return ""
-
-    def newest(self) -> RecorderState:
-        """Return the state of the episode."""
+            is_ours = isinstance(error, ShapechangerError)
+            self._trouble = str(error) if is_ours else f"Recording failed: {error!r}."
+            # On a full disk this may fail too. All steps are there all the same, and
+            # `shapechanger demos repair` closes the episode.
+            with contextlib.suppress(ShapechangerError):
+                if self._writer is not None:
+                    self._writer.close(self._trouble)
         if (writer := self._writer) is None:
-            return RecorderState(text=self._trouble)
-        return RecorderState(
+            return result, RecorderState(text=self._trouble)
+        return result, RecorderState(
             text=self._trouble,
             episode=writer.path.name,
             steps=writer.steps,
@@ -231,34 +129,24 @@ class _Episode:
             marks=writer.marks,
         )
 
-    def _write(self, job: _Job) -> str:
-        writer = self._writer = self._writer or self._create()
-        match job:
-            case _Shot():
-                if writer.is_full:
-                    writer = self._writer = writer.continued()
-                writer.add(*job)
-            case Undo():
-                return "" if writer.undo(job.seconds) else "There is nothing to undo."
-            case Mark():
-                if not writer.steps:
-                    return "There is no step to mark yet."
-                writer.mark(job.text)
-            case str():
-                writer.close(job)
-            case None:
-                pass
-        return ""
+    def add(self, step: Step, jpeg: bytes | None, writer: EpisodeWriter) -> None:
+        """Write a step, with its frame; None if it repeats the previous step's."""
+        if writer.is_full:
+            self._writer = writer = writer.continued()
+        writer.add(step, jpeg)
 
 
 class Recorder:
     """Records one episode at a time, with any client in control. It never waits for the disk.
 
-    Steps are recorded while the robot is armed. A thread writes them; `call` calls a function in
-    the event loop's thread.
+    While the robot is armed, each observation that is answered by a command becomes a step. The
+    next observation of the same client completes it, because it reports the applied outputs. Of two
+    commands that answer the same observation the later one counts. A command that answers an
+    observation older than the last step's is ignored, so that time never runs backwards in an
+    episode.
 
     Attributes:
-        builder: Makes the steps of the episode; None while nothing is recorded.
+        on: Whether an episode is recorded.
     """
 
     def __init__(
@@ -267,26 +155,62 @@ class Recorder:
         broadcast: Callable[[RobotMessage], None],
         call: Callable[[Callable[[], None]], None],
     ) -> None:
+        self.on = False
         self._plan = plan
         self._broadcast = broadcast
-        self._call = call
         features = Layout.from_json(plan.card.action_layout).features
         self._limits = [(f.low, f.high) for f in features for _ in range(f.size)]
-        self._worker = Worker("recorder")
+        self._worker = Worker("recorder", call)
         self._episode: _Episode | None = None
-        self.builder: StepBuilder | None = None
         self._text = ""
-
-    @property
-    def on(self) -> bool:
-        """True while an episode is recorded."""
-        return self.builder is not None
+        self._decided: _Decided | None = None
+        self._newest: _Decided | None = None
+        self._frame: Frame | None = None
 
     def state(self) -> RecorderState:
         """Return the state of the recorder."""
         progress = RecorderState() if self._episode is None else self._episode.progress
         text = self._text or progress.text
         return msgspec.structs.replace(progress, recording=self.on, text=text)
+
+    def observed(self, client: Client, observation: Observation) -> None:
+        """Complete the step of a client with the next observation that it is sent."""
+        decided = self._decided
+        if decided is None or decided.client is not client:
+            return
+        if observation.mine:
+            step = msgspec.structs.replace(
+                decided.step,
+                applied=observation.action_applied or None,
+                stop_reason=observation.stop_reason,
+            )
+            self._decided = decided._replace(step=step)
+        self._complete()
+
+    def decided(self, client: Client, sent: Sent, values: tuple[float, ...], now_ns: int) -> None:
+        """Note a command of a client, and complete a step that answers another observation."""
+        newest, seen = self._newest, sent.observation
+        if not self.on:
+            return
+        if newest is not None and newest.sent is not sent:
+            before = newest.sent.observation
+            is_past = newest.client is client and seen.seq < before.seq
+            if is_past or seen.captured_ns < before.captured_ns:
+                return
+            self._complete()
+        step = Step(
+            action=tuple(
+                min(max(value, low), high)
+                for value, (low, high) in zip(values, self._limits, strict=True)
+            ),
+            driver=client.role,
+            wanted=seen.suggested or None,
+            state=seen.state,
+            captured_ns=seen.captured_ns,
+            decided_ns=now_ns,
+            wall_ns=time.time_ns(),
+        )
+        self._decided = self._newest = _Decided(client, sent, step)
 
     def begin(self, client: Client, name: str, driver: str) -> str:
         """Begin an episode, and return the reason for a refusal, or ""."""
@@ -302,16 +226,16 @@ class Recorder:
             notes={"name": name, "recorded_by": client.name},
         )
         self._episode = _Episode(Path(self._plan.recordings), header, client)
-        self._text = ""
-        self.builder = StepBuilder(self._limits, self._add)
-        self._put(self._episode, None)
+        self.on, self._text = True, ""
+        self._decided = self._newest = self._frame = None
+        self._put(self._episode, lambda _: None)
         return ""
 
     def end(self, text: str = "") -> str:
         """End the episode, and return the reason for a refusal, or ""."""
-        if self._episode is None or self.builder is None:
+        self._complete()
+        if self._episode is None or not self.on:
             return _NOT_RECORDING
-        self.builder.complete()
         self._stop(self._episode, text)
         return ""
 
@@ -321,9 +245,17 @@ class Recorder:
         Returns:
             The reason for a refusal, or "".
         """
-        if self._episode is None or self.builder is None:
+        self._complete()
+        if self._episode is None or not self.on:
             return _NOT_RECORDING
-        self.builder.complete()
+
+        def write(writer: EpisodeWriter) -> str:
+            if isinstance(request, Undo):
+                return "" if writer.undo(request.seconds) else "There is nothing to undo."
+            if not writer.steps:
+                return "There is no step to mark yet."
+            writer.mark(request.text)
+            return ""
 
         def answer(refusal: str) -> None:
             if refusal:
@@ -331,7 +263,7 @@ class Recorder:
             else:
                 self._broadcast(self.state())
 
-        self._put(self._episode, request, answer)
+        self._put(self._episode, write, answer)
         return ""
 
     def tick(self) -> None:
@@ -344,50 +276,60 @@ class Recorder:
         self.end()
         self._worker.close(_CLOSE_S)
 
+    def _complete(self) -> None:
+        """Write the pending step, if there is one, with the outputs known so far."""
+        decided, self._decided = self._decided, None
+        if decided is None:
+            return
+        frame, jpeg = decided.sent.frame, None
+        if frame is not None and frame is not self._frame:
+            self._frame, jpeg = frame, frame.jpeg
+        self._add(decided.step, jpeg)
+
     def _add(self, step: Step, jpeg: bytes | None) -> None:
         episode, size = self._episode, len(jpeg or b"")
-        if episode is None:
+        if episode is None or not self.on:
             return
         if episode.jobs < _MAX_JOBS and episode.bytes + size <= _MAX_BYTES:
-            self._put(episode, _Shot(step, jpeg))
+            self._put(episode, partial(episode.add, step, jpeg), size=size)
         else:
             self._stop(episode, DISK_TOO_SLOW)
             self._broadcast(self.state())  # Again when the disk responds.
 
     def _stop(self, episode: _Episode, outcome: str) -> None:
-        self.builder = None
+        self.on, self._decided = False, None
         self._text = self._text or outcome
-        self._put(episode, outcome, lambda _: self._broadcast(self.state()))
+        self._put(
+            episode,
+            lambda writer: writer.close(outcome),
+            lambda _: self._broadcast(self.state()),
+        )
 
     def _put(
-        self, episode: _Episode, job: _Job, then: Callable[[str], None] = lambda _: None
+        self,
+        episode: _Episode,
+        job: Callable[[EpisodeWriter], _T],
+        then: Callable[[_T], None] = lambda _: None,
+        size: int = 0,
     ) -> None:
-        """Let the thread do a job, and then call a function with the reason for a refusal."""
-        size = len(job.jpeg or b"") if isinstance(job, _Shot) else 0
+        """Let the thread do a job with a frame of a size, and call a function with its result."""
         episode.jobs += 1
         episode.bytes += size
 
-        def work() -> None:
-            refusal = episode.attempt(job)
-            self._call(partial(self._done, episode, size, episode.newest(), partial(then, refusal)))
+        def done(result: tuple[Any, RecorderState]) -> None:
+            episode.jobs -= 1
+            episode.bytes -= size
+            before, episode.progress = episode.progress, result[1]
+            now = episode.progress
+            if not now.text:
+                then(result[0])
+            elif not before.text:
+                _log.warning("Recorder: %s", now.text)
+                if not now.episode:  # It could not even begin.
+                    episode.starter.post(Refused(reason=now.text))
+            is_news = (before.episode, before.text) != (now.episode, now.text)
+            if is_news and episode is self._episode:
+                self.on = self.on and not now.text
+                self._broadcast(self.state())
 
-        self._worker.put(work)
-
-    def _done(
-        self, episode: _Episode, size: int, progress: RecorderState, then: Callable[[], None]
-    ) -> None:
-        """Note that the thread has done a job."""
-        episode.jobs -= 1
-        episode.bytes -= size
-        before, episode.progress = episode.progress, progress
-        if not progress.text:
-            then()
-        elif not before.text:
-            _log.warning("Recorder: %s", progress.text)
-            if not progress.episode:  # It could not even begin.
-                episode.starter.post(Refused(reason=progress.text))
-        if episode is self._episode and (
-            (before.episode, before.text) != (progress.episode, progress.text)
-        ):
-            self.builder = None if progress.text else self.builder
-            self._broadcast(self.state())
+        self._worker.put(partial(episode.attempt, job), done)

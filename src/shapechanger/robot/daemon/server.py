@@ -19,8 +19,9 @@ from aiohttp import web
 
 from shapechanger.errors import LinkError, RobotError, translate_errors
 from shapechanger.robot.console import ENTRY, console_files
-from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
-from shapechanger.robot.daemon.session import Authenticator, ClientConnection, Session
+from shapechanger.robot.daemon.credentials import Authenticator
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.link.address import is_loopback, parse_address
 from shapechanger.robot.link.messages import VERSION
 
@@ -57,17 +58,13 @@ class Listener:
         self._max_total = max_total
         self._max_per_address = max_per_address
         self._timeout_s = timeout_s
-        self._sockets: list[socket.socket] = []
+        self._sockets = contextlib.ExitStack()
         self._tasks: list[asyncio.Task[None]] = []
         # Oldest first.
         self._waiting: dict[Hashable, tuple[AcceptedSocket, asyncio.TimerHandle]] = {}
 
     async def start(self, host: str, port: int) -> int:
-        """Start listening.
-
-        Returns:
-            The port.
-        """
+        """Start listening, and return the port."""
         loop = asyncio.get_running_loop()
 
         def refusal(error: OSError) -> RobotError:
@@ -77,24 +74,23 @@ class Listener:
             )
 
         with translate_errors(OSError, to=refusal), contextlib.ExitStack() as undo:
-            undo.callback(self._close_sockets)
             found = await loop.getaddrinfo(
                 host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             )
-            for family, *_, address in dict.fromkeys(found):
-                listening = socket.create_server(address, family=family, backlog=_BACKLOG)
-                self._sockets.append(listening)
-                listening.setblocking(False)
-            undo.pop_all()
-        self._tasks = [asyncio.create_task(self._accept(each)) for each in self._sockets]
-        return self._sockets[0].getsockname()[1]
+            listening = [
+                undo.enter_context(socket.create_server(address, family=family, backlog=_BACKLOG))
+                for family, *_, address in dict.fromkeys(found)
+            ]
+            self._sockets = undo.pop_all()
+        self._tasks = [asyncio.create_task(self._accept(each)) for each in listening]
+        return listening[0].getsockname()[1]
 
     async def close(self) -> None:
         """Stop listening, and drop all connections that have not authenticated."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._close_sockets()
+        self._sockets.close()
         for key in list(self._waiting):
             self._drop(key)
 
@@ -106,14 +102,15 @@ class Listener:
             self._drop_oldest(connection.address)
         elif len(self._waiting) >= self._max_total:
             self.drop_one()
-        self._insert(key, connection)
+        timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
+        self._waiting[key] = connection, timer
 
     def renew(self, key: Hashable) -> None:
         """Restart the timeout after a request was served; the connection becomes the youngest."""
         if key in self._waiting:
             connection, _ = self._waiting[key]
             self.remove(key)
-            self._insert(key, connection)
+            self.add(key, connection)
 
     def stop_timer(self, key: Hashable) -> None:
         """End the timeout of a connection that opened the link, whose hello has its own limit."""
@@ -131,11 +128,8 @@ class Listener:
         for address, _ in self._counts().most_common(1):
             self._drop_oldest(address)
 
-    def _close_sockets(self) -> None:
-        for each in self._sockets:
-            each.close()
-
     async def _accept(self, listening: socket.socket) -> None:
+        listening.setblocking(False)
         loop, fails = asyncio.get_running_loop(), False
         while True:
             try:
@@ -155,10 +149,6 @@ class Listener:
 
     def _counts(self) -> Counter[str]:
         return Counter(connection.address for connection, _ in self._waiting.values())
-
-    def _insert(self, key: Hashable, connection: AcceptedSocket) -> None:
-        timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
-        self._waiting[key] = connection, timer
 
     def _drop_oldest(self, address: str) -> None:
         self._drop(next(k for k, (c, _) in self._waiting.items() if c.address == address))
@@ -254,12 +244,10 @@ class Server:
     def __init__(
         self,
         hub: SessionHub,
-        time: Timekeeper,
         authenticator: Authenticator,
         tls: ssl.SSLContext | None,
     ) -> None:
         self._hub = hub
-        self._time = time
         self._authenticator = authenticator
         self._numbers = itertools.count(1)
         self._runner = web.AppRunner(
@@ -279,7 +267,8 @@ class Server:
         await self._runner.cleanup()
 
     def _app(self) -> web.Application:
-        app = web.Application(middlewares=[_add_headers, self._renew_timeout], client_max_size=1024)
+        app = web.Application(middlewares=[self._renew_timeout], client_max_size=1024)
+        app.on_response_prepare.append(_add_headers)
         files = console_files()
         app.router.add_get("/", _serve_file(*files[ENTRY]))
         for name, file in files.items():
@@ -316,13 +305,12 @@ class Server:
         )
 
     async def _health(self, _: web.Request) -> web.Response:
-        state = self._hub.state
-        silent = not state.at_ns or self._hub.now_ns() - state.at_ns > _GUARD_SILENT_NS
+        at_ns = self._hub.state.at_ns
+        heard = at_ns and self._hub.now_ns() - at_ns <= _GUARD_SILENT_NS
         # A twin's time stands still while no client drives, and its guard is silent then.
-        well = not silent or self._time.in_steps
-        return web.json_response(
-            {"guard": "well" if well else "silent"}, status=200 if well else 503
-        )
+        if heard or self._hub.in_steps:
+            return web.json_response({"guard": "well"})
+        return web.json_response({"guard": "silent"}, status=503)
 
     async def _link(self, request: web.Request) -> web.StreamResponse:
         refusal = origin_refusal(
@@ -333,21 +321,14 @@ class Server:
         self._listener.stop_timer(request.protocol)
         forget = partial(self._listener.remove, request.protocol)
         session = Session(next(self._numbers), self._hub, self._authenticator)
-        socket = await ClientConnection(session, self._hub, self._time).run(request, forget)
-        forget()
-        return socket
+        try:
+            return await session.run(request, forget)
+        finally:
+            forget()
 
 
-@web.middleware
-async def _add_headers(request: web.Request, handler: _Handler) -> web.StreamResponse:
-    try:
-        response = await handler(request)
-    except web.HTTPException as error:
-        error.headers.update(_HEADERS)
-        raise
-    if not response.prepared:
-        response.headers.update(_HEADERS)
-    return response
+async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(_HEADERS)
 
 
 def _serve_file(content_type: str, body: bytes) -> _Handler:

@@ -1,4 +1,4 @@
-"""Session of one client: bytes in, messages out; and the WebSocket that carries them."""
+"""Session of one client: the rules for its messages, and the WebSocket that carries them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import contextlib
 import logging
 import math
 import socket
+from collections import deque
 from collections.abc import Awaitable, Callable
+from time import monotonic
 from typing import Final
 
 import aiohttp
@@ -15,18 +17,16 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from shapechanger.errors import LinkError, RobotRefused, ShapechangerError, translate_errors
-from shapechanger.robot.daemon.client import (
-    MESSAGES_PER_S,
-    Client,
-    MessageRate,
-    SentObservations,
-)
+from shapechanger.robot.daemon.client import Client, Sent
 from shapechanger.robot.daemon.credentials import Authenticator
-from shapechanger.robot.daemon.hub import SessionHub, Timekeeper
-from shapechanger.robot.daemon.library import Answer, Question
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.library import Answer
 from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.authentication import new_nonce
+
+MESSAGES_PER_S: Final = 500.0
+"""Messages per second that a connection may send; a driver sends 50."""
 
 HELLO_TIMEOUT_S: Final = 3.0
 """Time that a client has for its hello, s."""
@@ -36,6 +36,8 @@ _NOT_READING: Final = "The client does not read its messages."
 _log = logging.getLogger(__name__)
 
 _LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps sums from overflowing.
+_WINDOW: Final = 64  # More than a second at 50 Hz; older observations are stale in any case.
+_NS_PER_MS: Final = 1_000_000
 _SEND_S: Final = 2.0  # A client that does not read for so long is disconnected.
 _CLOSE_S: Final = 1.0
 _UNANSWERED_MS: Final = 4_000  # Unacknowledged data then ends the connection.
@@ -61,12 +63,13 @@ def printable(text: str) -> str:
 
 
 class Session:
-    """Session of one client, without its socket.
+    """Session of one client.
+
+    `introduce`, `receive` and `observe` are the rules, and know no socket; `run` serves the client
+    on a WebSocket: it receives, answers, and sends observations when they are due.
 
     Attributes:
         client: Identity of the client, and the messages for it other than observations.
-        credit: True while the client waits for an observation.
-        pace: Whether the robot's clock or the client sets the pace.
     """
 
     def __init__(
@@ -74,34 +77,40 @@ class Session:
         number: int,
         hub: SessionHub,
         authenticator: Authenticator,
-        rate: MessageRate | None = None,
+        messages_per_s: float = MESSAGES_PER_S,
     ) -> None:
         self.client = Client(number)
-        self.credit = False
-        self.pace: messages.Pace = "realtime"
         self._hub = hub
         self._authenticator = authenticator
-        self._rate = MessageRate() if rate is None else rate
         self._nonce = new_nonce()
         self._is_known = False
+        self._pace: messages.Pace = "realtime"
         self._wants_frames = False
-        self._sent = SentObservations(hub.plan.card.max_observation_age_ms)
-        self._command_seq = -1
-        self._suggestion_seq = -1
+        self._credit = False  # True while the client waits for an observation.
+        self._sent: deque[Sent] = deque(maxlen=_WINDOW)
+        self._newest_seq = {messages.Command: -1, messages.Suggest: -1}
         self._observation_seq = 0
         self._frame_seq = 0
         self._awaits_library = False
-
-    @property
-    def has_new_frame(self) -> bool:
-        """True if there is a frame that the client wants and has not been sent."""
-        return self._wants_frames and self._hub.frame_seq != self._frame_seq
-
-    def challenge(self) -> messages.Challenge:
-        """Return the first message to the client."""
-        return messages.Challenge(
-            version=messages.VERSION, nonce=self._nonce, robot=self._hub.plan.card.robot
+        # A token bucket that holds one second's worth of messages.
+        self._messages_per_s = self._tokens = messages_per_s
+        self._counted_s = monotonic()
+        # Uncompressed, and without a send queue.
+        self._socket = web.WebSocketResponse(
+            timeout=_CLOSE_S,
+            autoping=False,  # Pings count as messages here, so that they cannot flood the robot.
+            heartbeat=_HEARTBEAT_S,
+            compress=False,
+            # Above the limit, so that an oversized message gets an error message, and still
+            # bounded.
+            max_msg_size=4 * messages.MAX_CLIENT_MESSAGE,
+            writer_limit=0,
         )
+        self._period_s = 1.0 / hub.plan.card.control_hz
+        camera = hub.plan.camera
+        ratio = 0.0 if camera is None else camera.fps / hub.plan.card.control_hz
+        self._by_frames = 1.0 / _FRAME_PACE <= ratio <= _FRAME_PACE
+        self._due_s = 0.0
 
     def introduce(self, data: bytes) -> messages.Welcome:
         """Authenticate the client with its first message."""
@@ -121,7 +130,7 @@ class Session:
         client.role = hello.role
         client.name = printable(hello.name) or f"{hello.role} {client.session}"
         hub.join(client)
-        self._is_known, self.pace, self._wants_frames = True, hello.pace, hello.frames
+        self._is_known, self._pace, self._wants_frames = True, hello.pace, hello.frames
         if (recorded := hub.recorder.state()).episode:
             client.post(recorded)
         if hub.plan.policies:
@@ -135,50 +144,58 @@ class Session:
             raise LinkError("The first message must be a hello.")
         if self.client.expelled:
             raise LinkError(self.client.expelled)
-        self.count()
-        message = messages.decode_client_message(data)
-        match message:
-            case messages.Command():
-                self._command(message)
+        self._count()
+        hub, client = self._hub, self.client
+        match messages.decode_client_message(data):
+            case messages.Command() | messages.Suggest() as message:
+                self._receive_values(message)
             case messages.Acknowledge():
                 self._give_credit()
             case messages.Take():
-                self._hub.take(self.client)
+                hub.take(client)
             case messages.Release():
-                self._hub.release(self.client, f"{self.client.name} released it")
-            case messages.Arm():
+                hub.release(client, f"{client.name} released it")
+            case messages.Arm() as message:
                 self._arm(message)
+            case messages.Disarm() if client.is_person or hub.holder is client:
+                hub.give_order(Order(kind="disarm", reason=f"{client.name} disarmed"))
             case messages.Disarm():
-                self._disarm()
-            case messages.EmergencyStop():
-                reason = f"{self.client.name}: {printable(message.reason) or 'stop'}"
-                self._hub.give_order(Order(kind="emergency", reason=reason))
-            case messages.Ping():
-                self.client.post(messages.Pong(token=message.token, now_ns=self._hub.now_ns()))
-            case messages.Suggest():
-                self._suggest(message)
-            case messages.RunPolicy():
-                if self.client.is_person:
-                    self._refuse(self._hub.policies.run(message.policy))
+                self._refuse(
+                    "Only the client in control, or a person, can disarm this robot; any client "
+                    "can stop it with an emergency stop."
+                )
+            case messages.EmergencyStop(reason=reason):
+                reason = f"{client.name}: {printable(reason) or 'stop'}"
+                hub.give_order(Order(kind="emergency", reason=reason))
+            case messages.Ping(token=token):
+                client.post(messages.Pong(token=token, now_ns=hub.now_ns()))
+            case messages.RunPolicy() if not client.is_person:
+                self._refuse("Only a person can start a policy on this robot, or end it.")
+            case messages.RunPolicy(policy=policy):
+                self._refuse(hub.policies.run(policy))
+            case messages.Record() | messages.Mark() | messages.Undo() | messages.Judge() if (
+                not client.is_person
+            ):
+                self._refuse("Only a person can record on this robot, and judge recordings.")
+            case messages.Record(on=False):
+                self._refuse(hub.recorder.end())
+            case messages.Record(name=name):
+                self._refuse(hub.recorder.begin(client, printable(name), hub.holder_name))
+            case messages.Mark(text=text):
+                self._refuse(hub.recorder.edit(messages.Mark(text=printable(text)), client))
+            case messages.Undo() as message:
+                self._refuse(hub.recorder.edit(message, client))
+            case messages.Browse() | messages.Fetch() | messages.Judge() as message:
+                # An answer may be large, so the next question waits until it has left.
+                if self._awaits_library or client.awaits(messages.Recordings, messages.Piece):
+                    self._refuse("Ask one question about recordings at a time.")
                 else:
-                    self._refuse("Only a person can start a policy on this robot, or end it.")
-            case messages.Record() | messages.Mark() | messages.Undo():
-                self._refuse(self._recording(message))
-            case messages.Browse() | messages.Fetch() | messages.Judge():
-                self._refuse(self._recording(message))
+                    self._awaits_library = True
+                    hub.library.ask(message, self._library_answered)
             case _:
                 raise LinkError("The hello was sent already.")
-        if self.client.is_full:
+        if client.is_full:
             raise LinkError(_NOT_READING)
-
-    def count(self) -> None:
-        """Count a message."""
-        if not self._rate.spend():
-            raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
-
-    def close(self) -> None:
-        """End the session."""
-        self._hub.leave(self.client)
 
     def observe(self) -> messages.Observation:
         """Build the observation to send now, which uses up the credit."""
@@ -186,15 +203,28 @@ class Session:
         self._observation_seq += 1
         frame_sent = self._frame_seq if self._wants_frames else None
         observation = hub.observation(self.client, self._observation_seq, frame_sent)
-        self._sent.add(observation.seq, observation.sent_ns)
-        if hub.recorder.builder is not None:
-            hub.recorder.builder.observed(self.client, observation, hub.frame)
+        self._sent.append(Sent(observation, hub.frame))
+        hub.recorder.observed(self.client, observation)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
-        if self.pace == "lockstep":
-            self._rate.give_back()  # The robot set the pace, however fast.
-        self.credit = False
+        if self._pace == "lockstep":  # The robot set the pace, however fast.
+            self._tokens = min(self._messages_per_s, self._tokens + 1.0)
+        self._credit = False
         return observation
+
+    def close(self) -> None:
+        """End the session."""
+        self._hub.leave(self.client)
+
+    def _count(self) -> None:
+        """Count a message, and refuse it above the rate."""
+        now_s = monotonic()
+        gained = (now_s - self._counted_s) * self._messages_per_s
+        self._tokens = min(self._messages_per_s, self._tokens + gained)
+        self._counted_s = now_s
+        if self._tokens < 1.0:
+            raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
+        self._tokens -= 1.0
 
     def _refuse(self, reason: str, seq: int | None = None) -> None:
         """Report a refusal, unless `reason` is empty."""
@@ -202,41 +232,34 @@ class Session:
             self.client.post(messages.Refused(reason=reason, seq=seq))
 
     def _give_credit(self) -> None:
-        self.credit = True
+        self._credit = True
         self.client.updated.set()
 
-    def _command(self, command: messages.Command) -> None:
-        now_ns = self._hub.now_ns()
-        refusal = ""
-        if self._hub.lease.holder is not self.client:
+    def _receive_values(self, message: messages.Command | messages.Suggest) -> None:
+        """Handle a command, or a suggestion; both ask for the next observation."""
+        hub, kind = self._hub, type(message)
+        is_command, newest = kind is messages.Command, self._newest_seq[kind]
+        sent = self._sent_as(message.answers)
+        if is_command and hub.holder is not self.client:
             refusal = "You do not have control; take it first."
-        elif command.seq <= self._command_seq:
-            refusal = f"Command {command.seq} is not newer than {self._command_seq}."
-        elif refusal := self._values_refusal(command.values):
+        elif not is_command and hub.holder is self.client:
+            refusal = "You have control: send a command instead of a suggestion."
+        elif message.seq <= newest:
+            name = "Command" if is_command else "Suggestion"
+            refusal = f"{name} {message.seq} is not newer than {newest}."
+        elif refusal := self._values_refusal(message.values):
             # The previous command is no longer what the client wants. A late or repeated command
             # proves nothing of that kind, and must not stop a newer one.
-            self._hub.halt()
+            if is_command:
+                hub.halt()
         else:
-            refusal = self._sent.refusal(command.answers, now_ns)
-        self._command_seq = max(self._command_seq, command.seq)
-        self._refuse(refusal, command.seq)
-        if not refusal:
-            self._hub.command(self.client, command, now_ns)
-        self._give_credit()
-
-    def _suggest(self, suggestion: messages.Suggest) -> None:
-        if self._hub.lease.holder is self.client:
-            refusal = "You have control: send a command instead of a suggestion."
-        elif suggestion.seq <= self._suggestion_seq:
-            refusal = f"Suggestion {suggestion.seq} is not newer than {self._suggestion_seq}."
-        else:
-            refusal = self._values_refusal(suggestion.values) or self._sent.refusal(
-                suggestion.answers, self._hub.now_ns()
-            )
-        self._suggestion_seq = max(self._suggestion_seq, suggestion.seq)
-        self._refuse(refusal, suggestion.seq)
-        if not refusal:
-            self._hub.suggest(self.client, suggestion.values)
+            refusal = self._age_refusal(message.answers)
+        self._newest_seq[kind] = max(newest, message.seq)
+        self._refuse(refusal, message.seq)
+        if not refusal and isinstance(message, messages.Command):
+            hub.command(self.client, message, sent)
+        elif not refusal:
+            hub.suggest(self.client, message.values)
         self._give_credit()
 
     def _values_refusal(self, values: tuple[float, ...]) -> str:
@@ -247,95 +270,51 @@ class Session:
             return f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
         return ""
 
+    def _sent_as(self, seq: int) -> Sent | None:
+        """Return the observation of a number, if it was sent recently."""
+        return next((sent for sent in self._sent if sent.observation.seq == seq), None)
+
+    def _age_refusal(self, answers: int) -> str:
+        """Return why a message that answers an observation is too late to act, or ""."""
+        sent, most_ms = self._sent_as(answers), self._hub.plan.card.max_observation_age_ms
+        if sent is None:
+            return f"Observation {answers} was not sent to this client recently."
+        age_ms = (self._hub.now_ns() - sent.observation.sent_ns) / _NS_PER_MS
+        if age_ms > most_ms:
+            return (
+                f"Observation {answers} was sent {age_ms:.0f} ms ago; "
+                f"at most {most_ms} ms are allowed."
+            )
+        return ""
+
     def _arm(self, arm: messages.Arm) -> None:
         hub, person = self._hub, self.client.is_person
         refusal = ""
-        if hub.lease.holder is None:
+        if hub.holder is None:
             refusal = "No client has control; take control first."
         elif not person and hub.plan.card.arming != "anyone":
             refusal = "Only a person can arm this robot."
         elif not person and hub.state.emergency:
             refusal = "Only a person can end an emergency stop."
-        elif not person and hub.lease.holder is not self.client:
+        elif not person and hub.holder is not self.client:
             refusal = "Only the client in control, or a person, can arm this robot."
-        elif late := self._sent.refusal(arm.answers, hub.now_ns()):
+        elif late := self._age_refusal(arm.answers):
             refusal = f"Not armed. {late}"
         self._refuse(refusal)
         if not refusal:
             # The guard knows every emergency stop; this process only those reported to it.
             hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
-    def _disarm(self) -> None:
-        if not self.client.is_person and self._hub.lease.holder is not self.client:
-            self._refuse(
-                "Only the client in control, or a person, can disarm this robot; any client can "
-                "stop it with an emergency stop."
-            )
-            return
-        self._hub.give_order(Order(kind="disarm", reason=f"{self.client.name} disarmed"))
-
-    def _recording(
-        self, message: messages.Record | messages.Mark | messages.Undo | Question
-    ) -> str:
-        """Handle a request about recordings. Return the reason for a refusal, or ""."""
-        is_question = isinstance(message, messages.Browse | messages.Fetch)
-        if not is_question and not self.client.is_person:
-            return "Only a person can record on this robot, and judge recordings."
-        recorder = self._hub.recorder
-        match message:
-            case messages.Record(on=False):
-                return recorder.end()
-            case messages.Record():
-                driver = self._hub.lease.holder_name
-                return recorder.begin(self.client, printable(message.name), driver)
-            case messages.Mark():
-                return recorder.edit(messages.Mark(text=printable(message.text)), self.client)
-            case messages.Undo():
-                return recorder.edit(message, self.client)
-            case _:
-                # An answer may be large, so the next question waits until it has left.
-                if self._awaits_library or self.client.awaits(messages.Recordings, messages.Piece):
-                    return "Ask one question about recordings at a time."
-                self._awaits_library = True
-                self._hub.library.ask(message, self._library_answered)
-                return ""
-
     def _library_answered(self, answer: Answer) -> None:
         self._awaits_library = False
         self.client.post(answer)
-
-
-class ClientConnection:
-    """WebSocket of one session: receives, answers, and sends observations when they are due."""
-
-    def __init__(self, session: Session, hub: SessionHub, time: Timekeeper) -> None:
-        self._session = session
-        self._client = session.client
-        self._hub = hub
-        self._time = time
-        # Uncompressed, and without a send queue.
-        self._socket = web.WebSocketResponse(
-            timeout=_CLOSE_S,
-            autoping=False,  # Pings count as messages here, so that they cannot flood the robot.
-            heartbeat=_HEARTBEAT_S,
-            compress=False,
-            # Above the limit, so that an oversized message gets an error message, and still
-            # bounded.
-            max_msg_size=4 * messages.MAX_CLIENT_MESSAGE,
-            writer_limit=0,
-        )
-        self._period_s = 1.0 / hub.plan.card.control_hz
-        camera = hub.plan.camera
-        ratio = 0.0 if camera is None else camera.fps / hub.plan.card.control_hz
-        self._by_frames = 1.0 / _FRAME_PACE <= ratio <= _FRAME_PACE
-        self._due_s = 0.0
 
     async def run(
         self, request: web.Request, on_known: Callable[[], object]
     ) -> web.WebSocketResponse:
         """Serve the client until it leaves; `on_known` is called once it has authenticated."""
         await self._socket.prepare(request)
-        client = self._client
+        client = self.client
         reason: ShapechangerError | None = None
         try:
             _tune(request.transport)
@@ -350,25 +329,33 @@ class ClientConnection:
                 await asyncio.sleep(_WRONG_KEY_S)
         finally:
             # If this client was in control, the robot stops before anything else happens.
-            self._session.close()
+            self.close()
         if reason is not None:
             _log.info("%s: %s", client.name or request.remote, reason)
             with contextlib.suppress(LinkError):  # The client may read no more.
                 await self._send(messages.Refused(reason=str(reason), fatal=True))
-        await self._time.settle()
-        await self._close()
+        await self._hub.settle()
+        try:
+            async with asyncio.timeout(2 * _CLOSE_S):
+                await self._socket.close(code=aiohttp.WSCloseCode.OK, drain=False)
+        except (TimeoutError, ConnectionError, RuntimeError):
+            _log.info("The connection of %s was cut.", client.name or "a client")
         return self._socket
 
     async def _greet(self) -> None:
         """Authenticate the client."""
-        await self._send(self._session.challenge())
+        await self._send(
+            messages.Challenge(
+                version=messages.VERSION, nonce=self._nonce, robot=self._hub.plan.card.robot
+            )
+        )
         late = LinkError(f"No hello was received within {HELLO_TIMEOUT_S:.0f} s.")
         with translate_errors(TimeoutError, to=lambda _: late):
             async with asyncio.timeout(HELLO_TIMEOUT_S):
                 data = await self._read()
         if data is None:
             raise LinkError("The client left without a hello.")
-        await self._send(self._session.introduce(data))
+        await self._send(self.introduce(data))
 
     async def _exchange(self) -> None:
         """Exchange messages until the client disconnects."""
@@ -385,14 +372,6 @@ class ClientConnection:
             if isinstance(result, BaseException) and not isinstance(result, asyncio.CancelledError):
                 raise result
 
-    async def _close(self) -> None:
-        """Close the WebSocket."""
-        try:
-            async with asyncio.timeout(2 * _CLOSE_S):
-                await self._socket.close(code=aiohttp.WSCloseCode.OK, drain=False)
-        except (TimeoutError, ConnectionError, RuntimeError):
-            _log.info("The connection of %s was cut.", self._client.name or "a client")
-
     async def _send(self, message: messages.RobotMessage) -> None:
         await self._in_time(self._socket.send_bytes(messages.encode(message)))
 
@@ -407,54 +386,50 @@ class ClientConnection:
 
     async def _listen(self) -> None:
         while (data := await self._read()) is not None:
-            self._session.receive(data)
-            await self._time.settle()
-            if self._client.awaits():
+            self.receive(data)
+            await self._hub.settle()
+            if self.client.awaits():
                 await asyncio.sleep(0)  # A client that asks faster than it is answered waits.
 
     async def _answer(self) -> None:
-        client = self._client
+        client = self.client
         while True:
             await client.posted.wait()
             client.posted.clear()
             while (message := client.take()) is not None:
                 await self._send(message)
-            if client.is_full:
-                raise LinkError(_NOT_READING)
-            if client.expelled:
-                raise LinkError(client.expelled)
+            if client.is_full or client.expelled:
+                raise LinkError(client.expelled or _NOT_READING)
 
     async def _observe(self) -> None:
+        """Send each observation once it is due and the client has credit for it."""
+        hub = self._hub
         while True:
-            await self._send(await self._next_observation())
-
-    async def _next_observation(self) -> messages.Observation:
-        """Return the next observation, once it is due and the client has credit for it."""
-        session, lease = self._session, self._hub.lease
-        while not session.credit:
-            self._client.updated.clear()
-            await self._client.updated.wait()
-        if session.pace == "lockstep" and not self._time.in_steps:
-            await self._time.step(self._period_s)
-        # The lease holder advances time, or any client without a holder.
-        elif self._time.in_steps and lease.holder in (None, self._client):
-            await self._time.step(self._period_s)
-            if session.pace == "realtime":
+            while not self._credit:
+                self.client.updated.clear()
+                await self.client.updated.wait()
+            # A time in steps is advanced by the lease holder, or any client without a holder.
+            can_step = hub.holder in (None, self.client)
+            advances = can_step if hub.in_steps else self._pace == "lockstep"
+            if advances:
+                await hub.step(self._period_s)
+            if not advances or self._pace == "realtime":
                 await self._wait_until_due()
-        else:
-            await self._wait_until_due()
-        return session.observe()
+            await self._send(self.observe())
 
     async def _wait_until_due(self) -> None:
         """Wait until one period after the last observation was due, or for its frame."""
-        loop = asyncio.get_running_loop()
-        while not (self._by_frames and self._session.has_new_frame) and loop.time() < self._due_s:
-            self._client.updated.clear()
+        loop, hub = asyncio.get_running_loop(), self._hub
+        waits_for_frame = self._by_frames and self._wants_frames
+        while not (waits_for_frame and hub.frame_seq != self._frame_seq) and (
+            loop.time() < self._due_s
+        ):
+            self.client.updated.clear()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout_at(self._due_s):
-                    await self._client.updated.wait()
+                    await self.client.updated.wait()
         now_s = loop.time()
-        if self._by_frames and self._hub.frame is not None:
+        if self._by_frames and hub.frame is not None:
             self._due_s = now_s + _FRAME_PACE * self._period_s
         else:
             # Counted from the time it was due, so that delays do not add up; but a client that
@@ -466,19 +441,20 @@ class ClientConnection:
         """Return the next message, or None when the client has disconnected."""
         while True:
             message = await self._socket.receive()
-            if message.type is WSMsgType.BINARY:
-                return message.data
-            if message.type is WSMsgType.PING:
-                self._session.count()
-                await self._in_time(self._socket.pong(message.data))
-            elif message.type is WSMsgType.PONG:
-                self._session.count()
-            elif message.type is WSMsgType.TEXT:
-                raise LinkError("The link takes binary messages, got text.")
-            elif message.type is WSMsgType.ERROR:
-                raise LinkError(f"The message cannot be read: {message.data}.")
-            else:
-                return None
+            match message.type:
+                case WSMsgType.BINARY:
+                    return message.data
+                case WSMsgType.PING:
+                    self._count()
+                    await self._in_time(self._socket.pong(message.data))
+                case WSMsgType.PONG:
+                    self._count()
+                case WSMsgType.TEXT:
+                    raise LinkError("The link takes binary messages, got text.")
+                case WSMsgType.ERROR:
+                    raise LinkError(f"The message cannot be read: {message.data}.")
+                case _:
+                    return None
 
 
 def _ended(error: ConnectionError | RuntimeError) -> LinkError:
