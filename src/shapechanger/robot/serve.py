@@ -18,13 +18,7 @@ from typing import Final, Literal
 import msgspec
 
 from shapechanger.errors import LinkError, RobotError, UnknownName, translate_errors
-from shapechanger.robot.client.known_robots import (
-    KnownRobot,
-    check_name,
-    known_names,
-    recall,
-    remember,
-)
+from shapechanger.robot.client.known_robots import KnownRobot, recall, remember
 from shapechanger.robot.daemon.credentials import (
     Credentials,
     credentials_folder,
@@ -33,7 +27,7 @@ from shapechanger.robot.daemon.credentials import (
 )
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.running import ServePlan
-from shapechanger.robot.link.address import Address, is_loopback, parse_address
+from shapechanger.robot.link.address import Address, cannot_listen, is_loopback, parse_address
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -94,65 +88,61 @@ class Service:
         if folder is None:
             folder = Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
             undo.callback(shutil.rmtree, folder, ignore_errors=True)
-        found = find_board(folder)
-        if found is None:
-            wired = load_profile(find_profile(self.wired_as)) if self.wired_as else profile
-            wiring = wired.guard_plan()
-            started = start_board(
-                wiring,
-                clock=self.clock,
-                folder=folder,
-                camera=profile.camera,
-                seed=self.seed,
-                one_shot_ms=float(wiring.enable_hold_ms),
-                place=place(),
-            )
-            undo.enter_context(started)
-            started.owner.set_inheritable(True)  # The board outlives this process's `exec`.
-            return started
-        board, clock = found
-        if clock != self.clock:
-            raise RobotError(f"The twin in {folder} runs on --clock {clock}.")
-        return board
+        if found := find_board(folder):
+            board, clock = found
+            if clock != self.clock:
+                raise RobotError(f"The twin in {folder} runs on --clock {clock}.")
+            return board
+        wired = load_profile(find_profile(self.wired_as)) if self.wired_as else profile
+        wiring = wired.guard_plan()
+        started = start_board(
+            wiring,
+            clock=self.clock,
+            folder=folder,
+            camera=profile.camera,
+            seed=self.seed,
+            one_shot_ms=float(wiring.enable_hold_ms),
+            place=place(),
+        )
+        undo.enter_context(started)
+        started.owner.set_inheritable(True)  # The board outlives this process's `exec`.
+        return started
 
     def plan(self, profile: Profile, board: BoardAt | None) -> ServePlan:
-        """Return the plan for the robot's processes."""
-        folder = self.credentials or credentials_folder(profile.name)
-        is_twin = board is not None
-        policies, policy = "", ""  # The folder of those on board, and the one that starts.
-        if self.policy is not None:
-            path = self.policy.absolute()
-            policies, policy = (path, "") if path.is_dir() else (path.parent, path.stem)
-        ready_file = self.ready_file
-        if ready_file is None and board is not None:
-            ready_file = board.folder / f"ready-{os.getpid()}.json"
-        credentials = (
-            make_credentials(folder, profile.name) if is_twin else load_credentials(folder)
-        )
-        camera = profile.camera
-        if board is not None and camera is not None:
-            camera = board.camera_plan(camera)
+        """Return the plan for the robot's processes; `board` is the twin's, None on hardware."""
+        name, guard, camera = profile.name, profile.guard_plan(), profile.camera
+        folder = self.credentials or credentials_folder(name)
+        ready_file, policy = self.ready_file, self.policy
+        if board is None:
+            credentials = load_credentials(folder)
+        else:
+            credentials = make_credentials(folder, name)
+            camera = camera and board.camera_plan(camera)
+            ready_file = ready_file or board.folder / f"ready-{os.getpid()}.json"
+        is_open = self.arm_by_program or board is not None
+        is_local = self.insecure or board is not None
+        policies = policy if policy is None or policy.is_dir() else policy.parent
         daemon = DaemonPlan(
             card=card_of(
                 profile,
-                arming="anyone" if self.arm_by_program or is_twin else "",
-                clock=self.clock if is_twin else "real",
+                arming="anyone" if is_open else "",
+                clock="real" if board is None else self.clock,
             ),
             camera=camera,
-            host=self.host or (_HERE if is_twin or self.insecure else _EVERYWHERE),
+            host=self.host or (_HERE if is_local else _EVERYWHERE),
             port=self.port,
             certificate="" if self.insecure else str(credentials.certificate),
             private_key="" if self.insecure else str(credentials.private_key),
             key_file=str(credentials.key_file),
             insecure=self.insecure,
             discovery=self.announce,
-            ready_file=str(ready_file.absolute()) if ready_file else "",
-            recordings=str((self.recordings or recordings_folder(profile.name)).absolute()),
-            policies=str(policies),
-            policy=policy,
+            ready_file=_absolute(ready_file),
+            recordings=_absolute(self.recordings or recordings_folder(name)),
+            policies=_absolute(policies),
+            policy="" if policy is None or policy == policies else policy.stem,
             pilot=_PILOT if policies else "",
         )
-        guard, fields = profile.guard_plan(), msgspec.to_builtins(daemon)
+        fields = msgspec.to_builtins(daemon)
         if board is None:
             return ServePlan(guard, fields)
         patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
@@ -170,14 +160,13 @@ class Service:
         # address on.
         if self.insecure or (self.credentials is not None and not self.port):
             return
+        credentials = load_credentials(self.credentials or credentials_folder(name))
+        host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
         try:
-            check_name(name)
+            robot = robot_at(str(Address(host, port)), name, credentials)
         except LinkError:  # Not every name of a robot is a file's.
             return
         plan.daemon["port"] = port  # A daemon that is started again keeps it.
-        credentials = load_credentials(self.credentials or credentials_folder(name))
-        host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
-        robot = robot_at(str(Address(host, port)), name, credentials)
         sys.stdout.flush()
         served_by = os.getpid()
         if child := os.fork():
@@ -186,10 +175,14 @@ class Service:
         try:
             # A child of init: the supervisor has no child that it does not know.
             if not os.fork() and _is_reached(Path(plan.daemon["ready_file"]), port, served_by):
-                say(make_known(robot))
+                say(store(robot))
         finally:
             sys.stdout.flush()
             os._exit(0)
+
+
+def _absolute(path: Path | None) -> str:
+    return "" if path is None else str(path.absolute())
 
 
 def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
@@ -208,20 +201,11 @@ def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
 
 def require_free(host: str, port: int) -> int:
     """Check that an address is free before starting anything, and return its port."""
-    with translate_errors(
-        OSError,
-        to=lambda error: RobotError(
-            f"Cannot listen at {host} port {port}: {error.strerror or error}. "
-            "Does the robot run already?"
-        ),
-    ):
-        family, kind, protocol, _, address = socket.getaddrinfo(
+    with translate_errors(OSError, to=lambda error: cannot_listen(host, port, error)):
+        family, *_, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
-        with socket.socket(family, kind, protocol) as listener:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listener.bind(address)
-            listener.listen(1)
+        with socket.create_server(address, family=family) as listener:
             return listener.getsockname()[1]
 
 
@@ -233,7 +217,7 @@ def recordings_folder(name: str) -> Path:
     return base / "shapechanger" / "recordings" / credentials_folder(name).name
 
 
-def make_known(robot: KnownRobot) -> str:
+def store(robot: KnownRobot) -> str:
     """Store a local robot among the known robots, unless its name is taken.
 
     Returns:
@@ -241,12 +225,12 @@ def make_known(robot: KnownRobot) -> str:
     """
     name = robot.name
     drives = f"`shapechanger robot drive {name}` drives it from here"
-    if name not in known_names():
-        remember(robot)
-        return f"Known here as {name}: {drives}."
     try:
         known = recall(name)
-    except (LinkError, UnknownName) as error:
+    except UnknownName:
+        remember(robot)
+        return f"Known here as {name}: {drives}."
+    except LinkError as error:
         return f"It is not stored as a known robot: {error}"
     if (known.key, known.fingerprint) != (robot.key, robot.fingerprint):
         return (

@@ -9,7 +9,7 @@ import pytest
 
 from shapechanger.robot.client.known_robots import KnownRobot, known_folder, recall, remember
 from shapechanger.robot.link.authentication import new_key
-from shapechanger.robot.serve import make_known
+from shapechanger.robot.serve import store
 
 _MINE = KnownRobot("rover", "127.0.0.1", new_key(), "ab" * 32)
 
@@ -21,17 +21,17 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_new_robot_is_remembered() -> None:
     """The message gives the command to drive it; repeating changes nothing."""
-    message = make_known(_MINE)
+    message = store(_MINE)
     assert recall("rover") == _MINE
     assert message == "Known here as rover: `shapechanger robot drive rover` drives it from here."
-    assert make_known(replace(_MINE, address="127.0.0.1:5000")) == message
+    assert store(replace(_MINE, address="127.0.0.1:5000")) == message
 
 
 def test_the_address_of_a_known_robot_is_updated() -> None:
     """The message gives both addresses."""
     remember(_MINE)
     moved = replace(_MINE, address="127.0.0.1:5001")
-    assert "now at 127.0.0.1:5001 and no more at 127.0.0.1:5000" in make_known(moved)
+    assert "now at 127.0.0.1:5001 and no more at 127.0.0.1:5000" in store(moved)
     assert recall("rover") == moved
 
 
@@ -47,7 +47,7 @@ def test_the_address_of_a_known_robot_is_updated() -> None:
 def test_another_robot_of_the_same_name_is_kept(other: KnownRobot) -> None:
     """Serving a twin does not overwrite the key of a real robot."""
     remember(other)
-    assert "stays" in make_known(_MINE)
+    assert "stays" in store(_MINE)
     assert recall("rover") == other
 
 
@@ -56,5 +56,5 @@ def test_a_file_that_cannot_be_read_is_left_alone() -> None:
     remember(_MINE)
     path = known_folder() / "rover.toml"
     path.write_text("key = ")
-    assert make_known(_MINE).startswith("It is not stored as a known robot: ")
+    assert store(_MINE).startswith("It is not stored as a known robot: ")
     assert path.read_text() == "key = "

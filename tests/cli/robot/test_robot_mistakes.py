@@ -215,7 +215,7 @@ def test_a_port_in_use(run: Run, home: Path) -> None:
             "serve", path, "--twin", "--port", str(port), "--no-announce", *IN_A_ROOM
         )
     assert code == 2
-    assert "Does the robot run already?" in output
+    assert "Is the robot served already?" in output
     assert files(home / "work") == before
 
 

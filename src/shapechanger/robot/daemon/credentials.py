@@ -81,7 +81,7 @@ def make_credentials(folder: Path, name: str) -> Credentials:
 
     Existing credentials stay, because clients know them.
     """
-    files = [folder / part for part in (_KEY, _CERTIFICATE, _PRIVATE_KEY)]
+    files = [folder / part for part in (_KEY, _PRIVATE_KEY, _CERTIFICATE)]
     if all(file.exists() for file in files):
         return load_credentials(folder)
     if any(file.exists() for file in files):
@@ -90,45 +90,36 @@ def make_credentials(folder: Path, name: str) -> Credentials:
             "`shapechanger robot init` again."
         )
     certificate, private_key = _self_signed(name)
-    is_new = not folder.exists()
-    try:
+    contents = ((new_key() + "\n").encode(), private_key, certificate)
+    with (
+        translate_errors(
+            OSError,
+            to=lambda error: OutputError(f"Cannot write the credentials to {folder}: {error}."),
+        ),
+        contextlib.ExitStack() as undo,
+    ):
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        write_new(folder / _KEY, (new_key() + "\n").encode(), 0o600)
-        write_new(folder / _PRIVATE_KEY, private_key, 0o600)
-        write_new(folder / _CERTIFICATE, certificate, 0o644)
-    except OSError as error:
-        # On a full disk, for example. Partial credentials would block the next attempt.
-        with contextlib.suppress(OSError):
-            for file in files:
-                file.unlink(missing_ok=True)
-            if is_new:
-                folder.rmdir()
-        raise OutputError(f"Cannot write the credentials to {folder}: {error}.") from error
+        for file, content, mode in zip(files, contents, (0o600, 0o600, 0o644), strict=True):
+            # On a full disk, for example: partial credentials would block the next attempt.
+            undo.callback(file.unlink, missing_ok=True)
+            write_new(file, content, mode)
+        undo.pop_all()
     return load_credentials(folder)
 
 
 def load_credentials(folder: Path) -> Credentials:
     """Read the credentials in a folder."""
-    read_key(folder / _KEY)
-    _check_private(folder / _PRIVATE_KEY)
-    certificate = folder / _CERTIFICATE
-    return Credentials(
-        key_file=folder / _KEY,
-        certificate=certificate,
-        private_key=folder / _PRIVATE_KEY,
-        fingerprint=_fingerprint(certificate),
-    )
+    key, certificate, private_key = folder / _KEY, folder / _CERTIFICATE, folder / _PRIVATE_KEY
+    read_key(key)
+    _check_private(private_key)
+    return Credentials(key, certificate, private_key, _fingerprint(certificate))
 
 
 def read_key(file: Path) -> bytes:
     """Read the key in a file."""
     _check_private(file)
-    with translate_errors(
-        OSError,
-        UnicodeDecodeError,
-        LinkError,
-        to=lambda error: RobotError(f"Cannot read the key in {file}: {error}"),
-    ):
+    text = f"Cannot read the key in {file}"
+    with translate_errors(OSError, ValueError, LinkError, to=lambda e: RobotError(f"{text}: {e}")):
         return parse_key(file.read_text())
 
 
@@ -138,8 +129,8 @@ def server_tls(certificate: Path, private_key: Path) -> tuple[ssl.SSLContext, by
     fingerprint = _fingerprint(certificate)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
-    words = f"{certificate} and {private_key} do not match"
-    with translate_errors(OSError, to=lambda error: RobotError(f"{words}: {error}.")):
+    text = f"{certificate} and {private_key} do not match"
+    with translate_errors(OSError, to=lambda error: RobotError(f"{text}: {error}.")):
         context.load_cert_chain(certificate, private_key)
     return context, fingerprint
 

@@ -12,7 +12,7 @@ import contextlib
 import json
 import logging
 import sys
-from asyncio.subprocess import PIPE, Process
+from asyncio.subprocess import PIPE
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
@@ -104,18 +104,11 @@ class PolicyRunner:
 
     async def close(self) -> None:
         """End the policy that runs."""
-        await self._end(self._task)
-        self._task = None
-
-    async def _end(self, task: asyncio.Task[None] | None) -> None:
-        if task is not None:
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
+        await _cancel(self._task)
 
     async def _supervise(self, before: asyncio.Task[None] | None, name: str) -> None:
         """Run a policy's process, and report what it says."""
-        await self._end(before)
+        await _cancel(before)
         if not name:
             self._report("", "")
             return
@@ -125,26 +118,35 @@ class PolicyRunner:
         )
         # However much it computes, commands and images go first.
         run_normally(process.pid)
+        assert process.stdin is not None
+        assert process.stdout is not None
         try:
-            text = await self._listen(process, name)
+            failure = await self._listen(process.stdin, process.stdout, name)
         finally:
-            await _finish(process)
+            process.stdin.close()  # Its end, which it should follow.
+            try:
+                await asyncio.wait_for(process.wait(), _END_S)
+            except TimeoutError:
+                with contextlib.suppress(ProcessLookupError):
+                    process.kill()
+                await process.wait()
             self._running = ""
+        text = failure or f"its process ended with code {process.returncode}."
         _log.warning("%s ended: %s", name, text)
         self._report("", f"{name} ended: {text}")
 
-    async def _listen(self, process: Process, name: str) -> str:
-        """Tell a policy's process what to do, report its notes, and return why it ended."""
+    async def _listen(
+        self, stdin: asyncio.StreamWriter, stdout: asyncio.StreamReader, name: str
+    ) -> str:
+        """Give a policy's process its task, report its notes, and return why it failed, or ""."""
         task = {"policy": str(Path(self._plan.policies, name + ENDING)), "robot": self._robot}
-        assert process.stdin is not None
-        assert process.stdout is not None
         failure = ""
         try:
             # The key goes through a pipe, because others can read a command line. The pipe stays
             # open: its end tells the process that this one is gone.
-            process.stdin.write(json.dumps(task).encode() + b"\n")
-            await process.stdin.drain()
-            while line := await process.stdout.readline():
+            stdin.write(json.dumps(task).encode() + b"\n")
+            await stdin.drain()
+            while line := await stdout.readline():
                 with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
                     said = msgspec.json.decode(line, type=_Said)
                     failure = said.failed or failure
@@ -153,10 +155,7 @@ class PolicyRunner:
             pass  # It is gone, and its exit code says more.
         except ValueError:
             failure = failure or f"its process wrote a line of more than {_LONGEST} characters."
-        with contextlib.suppress(TimeoutError):  # It has closed its output, but may live on.
-            await asyncio.wait_for(process.wait(), _END_S)
-        code = process.returncode
-        return failure or f"its process ended with code {code}."
+        return failure
 
     def _report(self, running: str, text: str) -> None:
         if (running, text) != (self._running, self._text):
@@ -164,13 +163,8 @@ class PolicyRunner:
             self._post(self.state())
 
 
-async def _finish(process: Process) -> None:
-    """End a process: by the end of its input, and by force if it does not follow."""
-    if process.stdin is not None:
-        process.stdin.close()
-    try:
-        await asyncio.wait_for(process.wait(), _END_S)
-    except TimeoutError:
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
+async def _cancel(task: asyncio.Task[None] | None) -> None:
+    if task is not None:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task

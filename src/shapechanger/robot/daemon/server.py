@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import itertools
 import logging
-import os
 import socket
 import ssl
 from collections import Counter
@@ -22,7 +21,7 @@ from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.session import Session
-from shapechanger.robot.link.address import is_loopback, parse_address
+from shapechanger.robot.link.address import cannot_listen, is_loopback, parse_address
 from shapechanger.robot.link.messages import VERSION
 
 _PRE_AUTH_TIMEOUT_S: Final = 3.0
@@ -66,14 +65,10 @@ class Listener:
     async def start(self, host: str, port: int) -> int:
         """Start listening, and return the port."""
         loop = asyncio.get_running_loop()
-
-        def refusal(error: OSError) -> RobotError:
-            why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-            return RobotError(
-                f"Cannot listen at {host} port {port}: {why}. Is the robot served already?"
-            )
-
-        with translate_errors(OSError, to=refusal), contextlib.ExitStack() as undo:
+        with (
+            translate_errors(OSError, to=lambda error: cannot_listen(host, port, error)),
+            contextlib.ExitStack() as undo,
+        ):
             found = await loop.getaddrinfo(
                 host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             )
@@ -98,8 +93,9 @@ class Listener:
         """Add a connection, and drop another one if there are too many."""
         for other in [k for k, (known, _) in self._waiting.items() if known.is_gone]:
             self.remove(other)
-        if self._counts()[connection.address] >= self._max_per_address:
-            self._drop_oldest(connection.address)
+        here = [k for k, (c, _) in self._waiting.items() if c.address == connection.address]
+        if len(here) >= self._max_per_address:
+            self._drop(here[0])
         elif len(self._waiting) >= self._max_total:
             self.drop_one()
         timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
@@ -124,9 +120,9 @@ class Listener:
 
     def drop_one(self) -> None:
         """Drop the oldest connection of the address that has the most."""
-        # Of addresses with equal counts, this is the one that connected first.
-        for address, _ in self._counts().most_common(1):
-            self._drop_oldest(address)
+        counts = Counter(connection.address for connection, _ in self._waiting.values())
+        if self._waiting:  # Of keys with equal counts, the first one is the oldest.
+            self._drop(max(self._waiting, key=lambda key: counts[self._waiting[key][0].address]))
 
     async def _accept(self, listening: socket.socket) -> None:
         listening.setblocking(False)
@@ -146,12 +142,6 @@ class Listener:
             protocol = self._protocol()
             self.add(protocol, AcceptedSocket(accepted, address[0], protocol, self._tls))
             await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
-
-    def _counts(self) -> Counter[str]:
-        return Counter(connection.address for connection, _ in self._waiting.values())
-
-    def _drop_oldest(self, address: str) -> None:
-        self._drop(next(k for k, (c, _) in self._waiting.items() if c.address == address))
 
     def _drop(self, key: Hashable) -> None:
         connection, _ = self._waiting[key]

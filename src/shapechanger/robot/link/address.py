@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ipaddress
+import os
 import re
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-from shapechanger.errors import LinkError
+from shapechanger.errors import LinkError, RobotError
 
 DEFAULT_PORT: Final = 5000
 """Default port of a robot, as in the original release (2017)."""
@@ -64,6 +65,13 @@ def is_loopback(host: str) -> bool:
     """Return True if only this machine reaches the address of `host`."""
     ip = _ip(host)
     return host == "localhost" if ip is None else ip.is_loopback
+
+
+def cannot_listen(host: str, port: int, error: OSError) -> RobotError:
+    """Return the error of a robot that cannot be served at an address."""
+    # Python adds the address to the text of the system; the numbers of the resolver are negative.
+    why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+    return RobotError(f"Cannot listen at {host} port {port}: {why}. Is the robot served already?")
 
 
 def _is_ip(text: str, version: int) -> bool:
