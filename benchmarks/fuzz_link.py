@@ -190,7 +190,7 @@ def fuzz(
             known.receive(data)
         except LinkError:
             counts["connections ended"] += 1
-            known.close()
+            hub.leave(known.client)
             known = None
         else:
             counts["understood"] += 1

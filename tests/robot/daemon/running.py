@@ -147,6 +147,12 @@ class Running:
         connection: Any = client.socket
         return connection._conn.transport
 
+    async def end(self) -> None:
+        """End the daemon, and wait for it."""
+        self.daemon.end()
+        async with asyncio.timeout(PATIENCE_S):
+            await self.task
+
     @property
     def url(self) -> str:
         return f"{'https' if self.plan.certificate else 'http'}://127.0.0.1:{self.port}"
@@ -215,9 +221,6 @@ async def running(
             task.result()
         port = json.loads(ready.read_text())["port"]
         session = await stack.enter_async_context(aiohttp.ClientSession())
-        try:
-            yield Running(plan, clock, guard, camera, port, daemon, task, session)
-        finally:
-            daemon.end()
-            async with asyncio.timeout(PATIENCE_S):
-                await task
+        robot = Running(plan, clock, guard, camera, port, daemon, task, session)
+        stack.push_async_callback(robot.end)
+        yield robot

@@ -51,8 +51,8 @@ def test_too_many_unread_answers_do_not_fit() -> None:
     client = Client(1)
     for number in range(256):
         client.post(Pong(token=number, now_ns=0))
-    assert not client.is_full
+    assert client.expelled == ""
     client.post(Pong(token=256, now_ns=0))
-    assert client.is_full
+    assert client.expelled == "The client does not read its messages."
     client.post(Event(name="bump", text="", at_ns=0))
     assert len(drained(client)) == 257

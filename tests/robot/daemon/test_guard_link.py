@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Awaitable, Callable
+from collections.abc import Iterator
 
 import pytest
 
@@ -36,66 +36,58 @@ class Ends:
                 return orders
 
 
-def play(script: Callable[[Ends], Awaitable[None]]) -> None:
-    """Run a script with both ends of the connection."""
+@pytest.fixture
+def ends(runner: asyncio.Runner) -> Iterator[Ends]:
+    """Both ends of the connection, in the event loop of the test."""
 
-    async def run() -> None:
-        ends = Ends()
-        await script(ends)
-        ends.port.close()
-        ends.guard.close()
+    async def connect() -> Ends:
+        return Ends()
 
-    asyncio.run(run())
+    ends = runner.run(connect())
+    yield ends
+    ends.port.close()
+    ends.guard.close()
 
 
-def test_states_arrive_in_order_and_invalid_ones_are_skipped() -> None:
-    async def script(ends: Ends) -> None:
-        ends.guard.send(encode(guard_state(at_ns=1)))
-        ends.guard.send(b"nonsense")
-        ends.guard.send(b'{"at_ns": "3"}')
-        ends.guard.send(encode(guard_state(at_ns=4)))
-        ends.port.drain()
-        assert [state.at_ns for state in ends.states] == [1, 4]
-
-    play(script)
+async def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
+    ends.guard.send(encode(guard_state(at_ns=1)))
+    ends.guard.send(b"nonsense")
+    ends.guard.send(b'{"at_ns": "3"}')
+    ends.guard.send(encode(guard_state(at_ns=4)))
+    ends.port.drain()
+    assert [state.at_ns for state in ends.states] == [1, 4]
 
 
 @pytest.mark.parametrize("reads_first", [True, False])
-def test_a_lost_guard_is_reported_once(reads_first: bool) -> None:
-    async def script(ends: Ends) -> None:
-        ends.guard.close()
-        for _ in range(2):
-            if reads_first:
-                ends.port.drain()
-            ends.port.send(Order(kind="disarm"))
+async def test_a_lost_guard_is_reported_once(ends: Ends, reads_first: bool) -> None:
+    ends.guard.close()
+    for _ in range(2):
+        if reads_first:
             ends.port.drain()
-        assert ends.lost == [True]
+        ends.port.send(Order(kind="disarm"))
+        ends.port.drain()
+    assert ends.lost == [True]
 
-    play(script)
 
+async def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
+    for seq in range(5_000):
+        ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
+    before = [order.seq for order in ends.received()]
+    assert before == list(range(len(before)))
+    assert len(before) < 5_000
+    for seq in range(5_000, 10_000):
+        ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
+    for _ in range(3):
+        ends.port.send(Order(kind="disarm", reason="gone"))
+        ends.port.send(Order(kind="emergency", reason="stop"))
+        ends.port.send(Order(kind="halt"))
+        ends.port.send(Order(kind="arm"))
+    received: list[Order] = []
 
-def test_a_full_socket_keeps_stops_and_drops_commands() -> None:
-    async def script(ends: Ends) -> None:
-        for seq in range(5_000):
-            ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
-        before = [order.seq for order in ends.received()]
-        assert before == list(range(len(before)))
-        assert len(before) < 5_000
-        for seq in range(5_000, 10_000):
-            ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
-        for _ in range(3):
-            ends.port.send(Order(kind="disarm", reason="gone"))
-            ends.port.send(Order(kind="emergency", reason="stop"))
-            ends.port.send(Order(kind="halt"))
-            ends.port.send(Order(kind="arm"))
-        received: list[Order] = []
+    def stopped() -> bool:
+        received.extend(ends.received())
+        return [order.kind for order in received[-3:]] == ["disarm", "emergency", "halt"]
 
-        def stopped() -> bool:
-            received.extend(ends.received())
-            return [order.kind for order in received[-3:]] == ["disarm", "emergency", "halt"]
-
-        await until(stopped, "all stops have arrived")
-        assert {order.kind for order in received[:-3]} == {"command"}
-        assert received[-4].seq < 9_999
-
-    play(script)
+    await until(stopped, "all stops have arrived")
+    assert {order.kind for order in received[:-3]} == {"command"}
+    assert received[-4].seq < 9_999

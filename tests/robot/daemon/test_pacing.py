@@ -3,153 +3,123 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
 
 import pytest
 
-from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link.messages import Acknowledge, Command, Observation
 from tests.robot.daemon.fakes import SteppedClock
-from tests.robot.daemon.plans import car_plan, picture
-from tests.robot.daemon.running import Running, running, until
+from tests.robot.daemon.plans import picture
+from tests.robot.daemon.running import Running, until
 
 pytestmark = pytest.mark.realtime
 
 
-def play(
-    script: Callable[[Running], Awaitable[None]],
-    monkeypatch: pytest.MonkeyPatch,
-    plan: DaemonPlan,
-    clock: SteppedClock | None = None,
-) -> None:
-    """Run a script with a daemon."""
-
-    async def whole() -> None:
-        async with running(plan, monkeypatch, clock) as robot:
-            if clock is not None:
-                clock.tick = robot.guard.tick
-            await script(robot)
-
-    asyncio.run(whole())
+STEPPED = pytest.mark.plan(
+    clock="twin", control_hz=20.0, tick_hz=100.0, arming="anyone", camera=None
+)
 
 
-STEPPED = car_plan(clock="twin", control_hz=20.0, tick_hz=100.0, arming="anyone", camera=None)
+def stepped(robot: Running) -> SteppedClock:
+    """Return the robot's clock."""
+    assert isinstance(robot.clock, SteppedClock)
+    return robot.clock
 
 
-def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = SteppedClock()
+@STEPPED
+async def test_in_lockstep_each_command_is_one_period(robot: Running) -> None:
+    clock = stepped(robot)
+    async with robot.client(pace="lockstep") as client:
+        await client.take()
+        await robot.arm(client)
+        seen = await client.observe()
+        assert clock.steps == [0.05, 0.01, 0.05]
+        assert seen.armed
+        for seq in range(1, 50):
+            before_ns = clock.ns
+            await client.send(Command(seq=seq, answers=seen.seq, values=(0.0, 0.5)))
+            seen = await client.expect(Observation)
+            assert seen.state_ns == clock.ns == before_ns + 50_000_000
+            assert seen.applied_seq == seq
+            assert seen.command_ns == before_ns
+    await until(lambda: robot.guard.kinds()[-1] == "disarm", "it is disarmed")
 
-    async def script(robot: Running) -> None:
-        async with robot.client(pace="lockstep") as client:
-            await client.take()
-            await robot.arm(client)
+
+@pytest.mark.plan(clock="twin")
+async def test_lockstep_waits_for_its_frame(robot: Running) -> None:
+    clock = stepped(robot)
+
+    def tick() -> None:
+        robot.guard.tick()
+        clock.captured_ns = clock.ns
+        asyncio.get_running_loop().call_later(0.02, robot.show)
+
+    clock.tick = tick
+    async with robot.client(pace="lockstep") as client:
+        for _ in range(5):
             seen = await client.observe()
-            assert clock.steps == [0.05, 0.01, 0.05]
-            assert seen.armed
-            for seq in range(1, 50):
-                before_ns = clock.ns
-                await client.send(Command(seq=seq, answers=seen.seq, values=(0.0, 0.5)))
-                seen = await client.expect(Observation)
-                assert seen.state_ns == clock.ns == before_ns + 50_000_000
-                assert seen.applied_seq == seq
-                assert seen.command_ns == before_ns
-        await until(lambda: robot.guard.kinds()[-1] == "disarm", "it is disarmed")
-
-    play(script, monkeypatch, STEPPED, clock)
+            assert seen.frame is not None
+            assert seen.captured_ns == clock.ns
 
 
-def test_lockstep_waits_for_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = SteppedClock()
-
-    async def script(robot: Running) -> None:
-        def tick() -> None:
-            robot.guard.tick()
-            clock.captured_ns = clock.ns
-            asyncio.get_running_loop().call_later(0.02, robot.show)
-
-        clock.tick = tick
-        async with robot.client(pace="lockstep") as client:
-            for _ in range(5):
-                seen = await client.observe()
-                assert seen.frame is not None
-                assert seen.captured_ns == clock.ns
-
-    play(script, monkeypatch, car_plan(clock="twin"), clock)
+@STEPPED
+async def test_the_client_in_control_advances_time_in_steps(robot: Running) -> None:
+    clock = stepped(robot)
+    async with robot.client(pace="lockstep") as driver, robot.client() as watcher:
+        await driver.take()
+        seen = await driver.observe()
+        stood_ns = clock.ns
+        for _ in range(3):
+            assert (await watcher.observe()).sent_ns == stood_ns
+        await driver.send(Command(seq=1, answers=seen.seq, values=(0.0, 0.0)))
+        await driver.expect(Observation)
+        assert clock.ns == stood_ns + 50_000_000
 
 
-def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = SteppedClock()
-
-    async def script(robot: Running) -> None:
-        async with robot.client(pace="lockstep") as driver, robot.client() as watcher:
-            await driver.take()
-            seen = await driver.observe()
-            stood_ns = clock.ns
-            for _ in range(3):
-                assert (await watcher.observe()).sent_ns == stood_ns
-            await driver.send(Command(seq=1, answers=seen.seq, values=(0.0, 0.0)))
-            await driver.expect(Observation)
-            assert clock.ns == stood_ns + 50_000_000
-
-    play(script, monkeypatch, STEPPED, clock)
+@STEPPED
+async def test_lockstep_may_exceed_the_message_rate(robot: Running) -> None:
+    async with robot.client(pace="lockstep") as client:
+        for _ in range(1_000):
+            await client.observe()
 
 
-def test_lockstep_may_exceed_the_message_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client(pace="lockstep") as client:
-            for _ in range(1_000):
-                await client.observe()
-
-    play(script, monkeypatch, STEPPED, SteppedClock())
-
-
-def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client() as client:
-            robot.show()
-            seen = await client.observe()
-            while seen.frame_seq != 1:
-                seen = await client.observe()
-            for _ in range(5):
-                robot.show()
-            async with robot.client() as other:
-                while (newest := await other.observe()).frame != picture(6):
-                    pass
-            for _ in range(3):
-                await client.send(Acknowledge())
-            assert (await client.expect(Observation)).frame_seq == newest.frame_seq
-            pending = [message for message in client.received if isinstance(message, Observation)]
-            assert pending[-1].seq == seen.seq + 1
-
-    play(script, monkeypatch, car_plan())
-
-
-def test_without_frames_observations_are_sent_once_a_period(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client() as client:
-            first = await client.observe()
-            for _ in range(10):
-                last = await client.observe()
-            assert last.sent_ns - first.sent_ns >= 0.95 * 10 * 20_000_000
-
-    play(script, monkeypatch, car_plan(control_hz=50.0, camera=None))
-
-
-def test_a_frozen_camera_keeps_its_capture_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def script(robot: Running) -> None:
+async def test_in_real_time_an_observation_costs_a_credit(robot: Running) -> None:
+    async with robot.client() as client:
         robot.show()
-        async with robot.client(role="person") as client:
-            await robot.armed(client)
+        seen = await client.observe()
+        while seen.frame_seq != 1:
             seen = await client.observe()
-            while seen.frame_seq != 1:
-                seen = await client.observe()
-            robot.pictures = 0
-            robot.show()  # The same image with a new time.
-            for seq in range(1, 6):
-                after = await client.drive(seq, 0.0, 0.5)
-                assert (after.frame, after.captured_ns) == (None, seen.captured_ns)
-                assert robot.guard.orders[-1].frame_ns == seen.captured_ns
+        for _ in range(5):
+            robot.show()
+        async with robot.client() as other:
+            while (newest := await other.observe()).frame != picture(6):
+                pass
+        for _ in range(3):
+            await client.send(Acknowledge())
+        assert (await client.expect(Observation)).frame_seq == newest.frame_seq
+        pending = [message for message in client.received if isinstance(message, Observation)]
+        assert pending[-1].seq == seen.seq + 1
 
-    play(script, monkeypatch, car_plan(control_hz=100.0))
+
+@pytest.mark.plan(control_hz=50.0, camera=None)
+async def test_without_frames_observations_are_sent_once_a_period(robot: Running) -> None:
+    async with robot.client() as client:
+        first = await client.observe()
+        for _ in range(10):
+            last = await client.observe()
+        assert last.sent_ns - first.sent_ns >= 0.95 * 10 * 20_000_000
+
+
+@pytest.mark.plan(control_hz=100.0)
+async def test_a_frozen_camera_keeps_its_capture_time(robot: Running) -> None:
+    robot.show()
+    async with robot.client(role="person") as client:
+        await robot.armed(client)
+        seen = await client.observe()
+        while seen.frame_seq != 1:
+            seen = await client.observe()
+        robot.pictures = 0
+        robot.show()  # The same image with a new time.
+        for seq in range(1, 6):
+            after = await client.drive(seq, 0.0, 0.5)
+            assert (after.frame, after.captured_ns) == (None, seen.captured_ns)
+            assert robot.guard.orders[-1].frame_ns == seen.captured_ns

@@ -5,16 +5,18 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from shapechanger.robot.daemon import policies
+from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.link.messages import PolicyState, Refused, RunPolicy
-from tests.robot.daemon.plans import car_plan
-from tests.robot.daemon.running import running, until
+from tests.robot.daemon.running import Running, until
+
+pytestmark = pytest.mark.plan(policies=".")
 
 # Stands for a policy's process: repeats its task, and does what the policy's name says.
 _PROCESS = """
@@ -54,45 +56,46 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _play(
-    script: Callable[[PolicyRunner, list[PolicyState]], Awaitable[None]], **plan: str
-) -> None:
-    async def run() -> None:
-        said: list[PolicyState] = []
-        one = PolicyRunner(car_plan(**plan), said.append, _COMMAND)
+@pytest.fixture
+def said() -> list[PolicyState]:
+    """The messages of the policies."""
+    return []
+
+
+@pytest.fixture
+def one(
+    folder: Path, plan: DaemonPlan, runner: asyncio.Runner, said: list[PolicyState]
+) -> Iterator[PolicyRunner]:
+    """Policies on board of a robot that can be reached."""
+    one = PolicyRunner(plan, said.append, _COMMAND)
+
+    async def serve() -> None:
         one.serve(5000, b"\x01" * 32)
-        await script(one, said)
-        await one.close()
 
-    asyncio.run(run())
-
-
-def test_a_policy_starts_with_the_robot(folder: Path) -> None:
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        await until(lambda: said and said[-1].text == "it drives", "it drives")
-        assert [each.running for each in said] == ["student"] * len(said)
-        assert said[-1].names == _NAMES
-        assert said[0].text == "It starts."
-        robot = json.loads(said[1].text)
-        assert (robot["address"], robot["key"]) == ("127.0.0.1:5000", "")
-        assert robot["fingerprint"] == "01" * 32
-        assert one.run("student") == "student runs already."
-
-    _play(script, policies=str(folder), policy="student")
+    runner.run(serve())
+    yield one
+    runner.run(one.close())
 
 
-def test_another_policy_takes_the_place(folder: Path) -> None:
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        assert one.run("student") == ""
-        await until(lambda: said and said[-1].text == "it drives", "the first drives")
-        assert one.run("teacher") == ""
-        await until(
-            lambda: (said[-1].running, said[-1].text) == ("teacher", "it drives"), "the second"
-        )
-        assert one.run("") == ""
-        await until(lambda: said[-1] == PolicyState(names=_NAMES), "none runs")
+@pytest.mark.plan(policy="student")
+async def test_a_policy_starts_with_the_robot(one: PolicyRunner, said: list[PolicyState]) -> None:
+    await until(lambda: said and said[-1].text == "it drives", "it drives")
+    assert [each.running for each in said] == ["student"] * len(said)
+    assert said[-1].names == _NAMES
+    assert said[0].text == "It starts."
+    robot = json.loads(said[1].text)
+    assert (robot["address"], robot["key"]) == ("127.0.0.1:5000", "")
+    assert robot["fingerprint"] == "01" * 32
+    assert one.run("student") == "student runs already."
 
-    _play(script, policies=str(folder))
+
+async def test_another_policy_takes_the_place(one: PolicyRunner, said: list[PolicyState]) -> None:
+    assert one.run("student") == ""
+    await until(lambda: said and said[-1].text == "it drives", "the first drives")
+    assert one.run("teacher") == ""
+    await until(lambda: (said[-1].running, said[-1].text) == ("teacher", "it drives"), "the second")
+    assert one.run("") == ""
+    await until(lambda: said[-1] == PolicyState(names=_NAMES), "none runs")
 
 
 @pytest.mark.parametrize(
@@ -103,63 +106,51 @@ def test_another_policy_takes_the_place(folder: Path) -> None:
         ("babble", "babble ended: its process wrote a line of more than 1024 characters."),
     ],
 )
-def test_a_policy_that_ends_is_reported(folder: Path, name: str, words: str) -> None:
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        assert one.run(name) == ""
-        await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
-        assert said[-1].text.startswith(words)
-        assert one.run("student") == ""
-        await until(lambda: said[-1].text == "it drives", "another drives")
+async def test_a_policy_that_ends_is_reported(
+    one: PolicyRunner, said: list[PolicyState], name: str, words: str
+) -> None:
+    assert one.run(name) == ""
+    await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
+    assert said[-1].text.startswith(words)
+    assert one.run("student") == ""
+    await until(lambda: said[-1].text == "it drives", "another drives")
 
-    _play(script, policies=str(folder))
 
-
-def test_a_deaf_policy_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_deaf_policy_is_killed(
+    one: PolicyRunner, said: list[PolicyState], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(policies, "_END_S", 0.05)
-
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        assert one.run("deaf") == ""
-        await until(lambda: said and said[-1].text == "deaf", "it hears nothing")
-        assert one.run("") == ""
-        await until(lambda: said[-1].running == "", "it is gone")
-
-    _play(script, policies=str(folder))
+    assert one.run("deaf") == ""
+    await until(lambda: said and said[-1].text == "deaf", "it hears nothing")
+    assert one.run("") == ""
+    await until(lambda: said[-1].running == "", "it is gone")
 
 
-def test_an_unknown_policy_is_refused(folder: Path) -> None:
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        assert "Did you mean 'student'?" in one.run("studnt")
-        assert one.run("../student") != ""
-        assert said == []
-
-    _play(script, policies=str(folder))
+async def test_an_unknown_policy_is_refused(one: PolicyRunner, said: list[PolicyState]) -> None:
+    assert "Did you mean 'student'?" in one.run("studnt")
+    assert one.run("../student") != ""
+    assert said == []
 
 
-def test_a_robot_without_policies_refuses() -> None:
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        assert "--policy" in one.run("student")
-        assert one.state() == PolicyState(names=())
-
-    _play(script)
+@pytest.mark.plan(policies="")
+async def test_a_robot_without_policies_refuses(one: PolicyRunner, said: list[PolicyState]) -> None:
+    assert "--policy" in one.run("student")
+    assert one.state() == PolicyState(names=())
 
 
-def test_a_folder_that_is_gone_has_no_policies(tmp_path: Path) -> None:
-    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
-        assert one.state().names == ()
-
-    _play(script, policies=str(tmp_path / "gone"), policy="student")
+@pytest.mark.plan(policies="gone", policy="student")
+async def test_a_folder_that_is_gone_has_no_policies(
+    one: PolicyRunner, said: list[PolicyState]
+) -> None:
+    assert one.state().names == ()
 
 
 @pytest.mark.realtime
-def test_only_a_person_starts_a_policy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def script() -> None:
-        async with running(car_plan(policies=str(folder)), monkeypatch) as robot:
-            async with robot.client(role="program") as program:
-                assert (await program.expect(PolicyState)).names == _NAMES
-                await program.send(RunPolicy(policy="student"))
-                assert "Only a person" in (await program.expect(Refused)).reason
-            async with robot.client(role="person") as person:
-                await person.send(RunPolicy(policy="studen"))
-                assert "student" in (await person.expect(Refused)).reason
-
-    asyncio.run(script())
+async def test_only_a_person_starts_a_policy(folder: Path, robot: Running) -> None:
+    async with robot.client(role="program") as program:
+        assert (await program.expect(PolicyState)).names == _NAMES
+        await program.send(RunPolicy(policy="student"))
+        assert "Only a person" in (await program.expect(Refused)).reason
+    async with robot.client(role="person") as person:
+        await person.send(RunPolicy(policy="studen"))
+        assert "student" in (await person.expect(Refused)).reason

@@ -31,70 +31,58 @@ class Fake:
         self.dropped += 1
 
 
-def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
-    async def play() -> None:
-        connections = _listener(max_total=10, max_per_address=2)
-        other, crowd = Fake("a"), [Fake("b") for _ in range(5)]
-        for number, sock in enumerate([other, *crowd]):
-            connections.add(number, sock)
-        assert [sock.dropped for sock in crowd] == [1, 1, 1, 0, 0]
-        assert other.dropped == 0
-
-    asyncio.run(play())
+async def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
+    connections = _listener(max_total=10, max_per_address=2)
+    other, crowd = Fake("a"), [Fake("b") for _ in range(5)]
+    for number, sock in enumerate([other, *crowd]):
+        connections.add(number, sock)
+    assert [sock.dropped for sock in crowd] == [1, 1, 1, 0, 0]
+    assert other.dropped == 0
 
 
-def test_a_full_set_drops_from_the_most_crowded_address() -> None:
-    async def play() -> None:
-        connections = _listener(max_total=4, max_per_address=4)
-        crowd, other = [Fake("b") for _ in range(4)], Fake("a")
-        for number, sock in enumerate([*crowd, other]):
-            connections.add(number, sock)
-        assert [sock.dropped for sock in crowd] == [1, 0, 0, 0]
-        connections.drop_one()
-        assert [sock.dropped for sock in crowd] == [1, 1, 0, 0]
-        assert other.dropped == 0
-
-    asyncio.run(play())
+async def test_a_full_set_drops_from_the_most_crowded_address() -> None:
+    connections = _listener(max_total=4, max_per_address=4)
+    crowd, other = [Fake("b") for _ in range(4)], Fake("a")
+    for number, sock in enumerate([*crowd, other]):
+        connections.add(number, sock)
+    assert [sock.dropped for sock in crowd] == [1, 0, 0, 0]
+    connections.drop_one()
+    assert [sock.dropped for sock in crowd] == [1, 1, 0, 0]
+    assert other.dropped == 0
 
 
-def test_a_served_request_restarts_the_timeout() -> None:
-    async def play() -> None:
-        connections = _listener(max_total=2, max_per_address=2, timeout_s=0.05)
-        page, silent = Fake("a"), Fake("a")
-        for sock in (page, silent):
-            connections.add(id(sock), sock)
-        async with asyncio.timeout(20.0):
-            while not silent.dropped:
-                connections.renew(id(page))
-                await asyncio.sleep(0.002)
-        assert not page.dropped
-        connections.add("next", Fake("a"))
-        connections.renew(id(page))
-        connections.add("newest", Fake("a"))
-        assert not page.dropped
-        connections.renew("gone")
-        await connections.close()
-        assert page.dropped == 1
-
-    asyncio.run(play())
+async def test_a_served_request_restarts_the_timeout() -> None:
+    connections = _listener(max_total=2, max_per_address=2, timeout_s=0.05)
+    page, silent = Fake("a"), Fake("a")
+    for sock in (page, silent):
+        connections.add(id(sock), sock)
+    async with asyncio.timeout(20.0):
+        while not silent.dropped:
+            connections.renew(id(page))
+            await asyncio.sleep(0.002)
+    assert not page.dropped
+    connections.add("next", Fake("a"))
+    connections.renew(id(page))
+    connections.add("newest", Fake("a"))
+    assert not page.dropped
+    connections.renew("gone")
+    await connections.close()
+    assert page.dropped == 1
 
 
-def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
-    async def play() -> None:
-        connections = _listener(timeout_s=0.01)
-        silent, asks, known = Fake("a"), Fake("a"), Fake("a")
-        for sock in (silent, asks, known):
-            connections.add(id(sock), sock)
-        connections.stop_timer(id(asks))
-        connections.remove(id(known))
-        async with asyncio.timeout(20.0):
-            while not silent.dropped:
-                await asyncio.sleep(0.002)
-        assert len(connections._waiting) == 1
-        await connections.close()
-        assert [sock.dropped for sock in (silent, asks, known)] == [1, 1, 0]
-
-    asyncio.run(play())
+async def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
+    connections = _listener(timeout_s=0.01)
+    silent, asks, known = Fake("a"), Fake("a"), Fake("a")
+    for sock in (silent, asks, known):
+        connections.add(id(sock), sock)
+    connections.stop_timer(id(asks))
+    connections.remove(id(known))
+    async with asyncio.timeout(20.0):
+        while not silent.dropped:
+            await asyncio.sleep(0.002)
+    assert len(connections._waiting) == 1
+    await connections.close()
+    assert [sock.dropped for sock in (silent, asks, known)] == [1, 1, 0]
 
 
 @given(

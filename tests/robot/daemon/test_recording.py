@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, read_episode
-from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.link.messages import (
     MAX_PIECE,
     Acknowledge,
@@ -33,25 +30,10 @@ from shapechanger.robot.link.messages import (
     Undo,
     encode,
 )
-from tests.robot.daemon.plans import ACTIONS, car_plan, picture
-from tests.robot.daemon.running import Client, Running, running, until
+from tests.robot.daemon.plans import ACTIONS, picture
+from tests.robot.daemon.running import Client, Running, until
 
-pytestmark = pytest.mark.realtime
-
-
-@pytest.fixture
-def play(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
-    """Run a script against a daemon that keeps recordings."""
-
-    def played(script: Any, **plan: Any) -> None:
-        async def run() -> None:
-            fields = {"recordings": str(tmp_path / "kept"), "arming": "anyone"} | plan
-            async with running(car_plan(**fields), monkeypatch) as robot:
-                await script(robot)
-
-        asyncio.run(run())
-
-    return played
+pytestmark = [pytest.mark.realtime, pytest.mark.plan(recordings="kept", arming="anyone")]
 
 
 async def recording(client: Client, on: bool = True) -> RecorderState:
@@ -84,26 +66,23 @@ def only(folder: Path) -> Path:
     return episode
 
 
-def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) -> None:
+async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_path: Path) -> None:
     seen: list[Observation] = []
-
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person", name="Grace") as person:
-            await person.obtain()
-            await robot.arm(person)
-            await until(lambda: robot.guard.state.armed, "it is armed")
-            await until(lambda: robot.daemon._hub.state.armed, "that is known")
-            began = await recording(person)
-            assert (began.steps, began.dropped, began.text) == (0, 0, "")
-            seen.extend(await drive(robot, person, 1, 12))
-            await person.send(Mark(text="a corner\n"))
-            while (state := await person.expect(RecorderState)).marks == 0:
-                pass
-            assert state.steps == 12
-            ended = await recording(person, on=False)
-            assert (ended.steps, ended.marks, ended.episode) == (12, 1, began.episode)
-
-    play(script)
+    async with robot.client(role="person", name="Grace") as person:
+        await person.obtain()
+        await robot.arm(person)
+        await until(lambda: robot.guard.state.armed, "it is armed")
+        await until(lambda: robot.daemon._hub.state.armed, "that is known")
+        began = await recording(person)
+        assert (began.steps, began.dropped, began.text) == (0, 0, "")
+        seen.extend(await drive(robot, person, 1, 12))
+        await person.send(Mark(text="a corner\n"))
+        while (state := await person.expect(RecorderState)).marks == 0:
+            pass
+        assert state.steps == 12
+        ended = await recording(person, on=False)
+        assert (ended.steps, ended.marks, ended.episode) == (12, 1, began.episode)
+    await robot.end()
     episode = read_episode(only(tmp_path / "kept"))
     assert episode.closed
     assert episode.outcome == ""
@@ -125,256 +104,217 @@ def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) 
     assert len({step.frame for step in episode.steps}) > 6
 
 
-def test_no_step_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as person:
-            await person.obtain()
-            await recording(person)
-            await drive(robot, person, 1, 3)
-            assert (await recording(person, on=False)).steps == 0
-
-    play(script)
+async def test_no_step_is_recorded_while_disarmed(robot: Running, tmp_path: Path) -> None:
+    async with robot.client(role="person") as person:
+        await person.obtain()
+        await recording(person)
+        await drive(robot, person, 1, 3)
+        assert (await recording(person, on=False)).steps == 0
+    await robot.end()
     assert read_episode(only(tmp_path / "kept")).steps == ()
 
 
-def test_an_episode_continues_after_a_change_of_control(play: Any, tmp_path: Path) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as person, robot.client(name="net") as program:
-            await program.obtain()
-            await robot.arm(program)
-            await until(lambda: robot.daemon._hub.state.armed, "it is armed")
-            await recording(person)
-            await drive(robot, program, 1, 3)
-            await person.obtain()
-            suggestion = await program.observe()
-            await program.send(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
-            assert (await program.expect(Observation)).suggested == (-1.0, 5.0)
-            (answered,) = await drive(robot, person, 1, 1)
-            assert (answered.suggested, answered.suggested_by) == ((-1.0, 5.0), "net")
-            assert (answered.holder_role, answered.mine) == ("person", True)
-            assert (await person.observe()).commanded == (0.05, 0.005)
-            assert (await recording(person, on=False)).steps == 4
-
-    play(script, deadline_ms=60_000, control_hz=200.0)
+@pytest.mark.plan(deadline_ms=60_000, control_hz=200.0)
+async def test_an_episode_continues_after_a_change_of_control(
+    robot: Running, tmp_path: Path
+) -> None:
+    async with robot.client(role="person") as person, robot.client(name="net") as program:
+        await program.obtain()
+        await robot.arm(program)
+        await until(lambda: robot.daemon._hub.state.armed, "it is armed")
+        await recording(person)
+        await drive(robot, program, 1, 3)
+        await person.obtain()
+        suggestion = await program.observe()
+        await program.send(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
+        assert (await program.expect(Observation)).suggested == (-1.0, 5.0)
+        (answered,) = await drive(robot, person, 1, 1)
+        assert (answered.suggested, answered.suggested_by) == ((-1.0, 5.0), "net")
+        assert (answered.holder_role, answered.mine) == ("person", True)
+        assert (await person.observe()).commanded == (0.05, 0.005)
+        assert (await recording(person, on=False)).steps == 4
+    await robot.end()
     steps = read_episode(only(tmp_path / "kept")).steps
     assert [step.driver for step in steps] == ["program", "program", "program", "person"]
     assert [step.wanted for step in steps] == [None, None, None, (-1.0, 5.0)]
 
 
-def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as person:
-            await robot.armed(person)
-            await recording(person)
-            await drive(robot, person, 1, 5)
-            await person.send(Undo(seconds=3_600.0))
-            while (await person.expect(RecorderState)).dropped != 5:
-                pass
-            await person.send(Undo())
-            assert (await person.expect(Refused)).reason == "There is nothing to undo."
-            await recording(person, on=False)
-            for nothing in (Undo(), Mark(), Record(on=False)):
-                await person.send(nothing)
-                assert (await person.expect(Refused)).reason == "Nothing is being recorded."
-
-    play(script)
+async def test_undo_drops_the_newest_steps(robot: Running, tmp_path: Path) -> None:
+    async with robot.client(role="person") as person:
+        await robot.armed(person)
+        await recording(person)
+        await drive(robot, person, 1, 5)
+        await person.send(Undo(seconds=3_600.0))
+        while (await person.expect(RecorderState)).dropped != 5:
+            pass
+        await person.send(Undo())
+        assert (await person.expect(Refused)).reason == "There is nothing to undo."
+        await recording(person, on=False)
+        for nothing in (Undo(), Mark(), Record(on=False)):
+            await person.send(nothing)
+            assert (await person.expect(Refused)).reason == "Nothing is being recorded."
+    await robot.end()
     episode = read_episode(only(tmp_path / "kept"))
     assert (len(episode.steps), episode.kept) == (5, ())
 
 
-def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client() as program:
-            for request in (
-                Record(on=True),
-                Record(on=False),
-                Mark(),
-                Undo(),
-                Judge(episode="x", first=0, last=0),
-            ):
-                await program.send(request)
-                assert "Only a person" in (await program.expect(Refused)).reason
-            await program.send(Browse())
-            assert (await program.expect(Recordings)) == Recordings(episodes=())
-
-    play(script)
+async def test_only_persons_record_and_judge(robot: Running, tmp_path: Path) -> None:
+    async with robot.client() as program:
+        for request in (
+            Record(on=True),
+            Record(on=False),
+            Mark(),
+            Undo(),
+            Judge(episode="x", first=0, last=0),
+        ):
+            await program.send(request)
+            assert "Only a person" in (await program.expect(Refused)).reason
+        await program.send(Browse())
+        assert (await program.expect(Recordings)) == Recordings(episodes=())
+    await robot.end()
     assert not (tmp_path / "kept").exists()
 
 
-def test_a_robot_without_a_folder_does_not_record(play: Any) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.connect() as person:
-            assert (await person.greet(role="person")).can_record is False
-            for request in (Record(on=True), Browse(), Fetch(episode="x")):
-                await person.send(request)
-                assert "without a folder" in (await person.expect(Refused)).reason
-
-    play(script, recordings="")
+@pytest.mark.plan(recordings="")
+async def test_a_robot_without_a_folder_does_not_record(robot: Running) -> None:
+    async with robot.connect() as person:
+        assert (await person.greet(role="person")).can_record is False
+        for request in (Record(on=True), Browse(), Fetch(episode="x")):
+            await person.send(request)
+            assert "without a folder" in (await person.expect(Refused)).reason
 
 
-def test_a_failing_disk_ends_the_recording_and_not_the_drive(play: Any, tmp_path: Path) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as person:
-            await robot.armed(person)
-            await recording(person)
-            await drive(robot, person, 1, 2)
-            frames = only(tmp_path / "kept") / "frames"
-            frames.rename(frames.with_name("elsewhere"))
-            seq = 3
-            while robot.daemon._hub.recorder.on:
-                await drive(robot, person, seq, 1)
-                seq += 1
-            states = [m for m in person.received if isinstance(m, RecorderState)]
-            while not states[-1].text:
-                states.append(await person.expect(RecorderState))
-            assert "Cannot write" in states[-1].text
-            assert not states[-1].recording
-            assert (await person.drive(seq)).applied_seq == seq
-            await recording(person)  # A new recording starts.
+async def test_a_failing_disk_ends_the_recording_and_not_the_drive(
+    robot: Running, tmp_path: Path
+) -> None:
+    async with robot.client(role="person") as person:
+        await robot.armed(person)
+        await recording(person)
+        await drive(robot, person, 1, 2)
+        frames = only(tmp_path / "kept") / "frames"
+        frames.rename(frames.with_name("elsewhere"))
+        seq = 3
+        while robot.daemon._hub.recorder.on:
+            await drive(robot, person, seq, 1)
+            seq += 1
+        states = [m for m in person.received if isinstance(m, RecorderState)]
+        while not states[-1].text:
+            states.append(await person.expect(RecorderState))
+        assert "Cannot write" in states[-1].text
+        assert not states[-1].recording
+        assert (await person.drive(seq)).applied_seq == seq
+        await recording(person)  # A new recording starts.
 
-    play(script)
 
-
-def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None:
+async def test_two_recordings_cannot_share_a_folder(robot: Running, tmp_path: Path) -> None:
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
-
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as one, robot.client(role="person") as two:
-            with EpisodeWriter.create(tmp_path / "kept", header):
-                await one.send(Record(on=True))
-                assert "in use by another recorder" in (await one.expect(Refused)).reason
-            await recording(one)
-            await two.send(Record(on=True))
-            assert "recorded already" in (await two.expect(Refused)).reason
-            await recording(two, on=False)
-
-    play(script)
+    async with robot.client(role="person") as one, robot.client(role="person") as two:
+        with EpisodeWriter.create(tmp_path / "kept", header):
+            await one.send(Record(on=True))
+            assert "in use by another recorder" in (await one.expect(Refused)).reason
+        await recording(one)
+        await two.send(Record(on=True))
+        assert "recorded already" in (await two.expect(Refused)).reason
+        await recording(two, on=False)
 
 
-def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client() as program:
-            async with robot.client(role="person") as one:
-                async with robot.client(role="person") as two:
-                    await recording(two)
-                async with robot.client(role="person") as late:
-                    assert (await late.expect(RecorderState)).recording
-            del one
-            while not (state := await program.expect(RecorderState)).text:
-                assert state.recording
-            assert "last person" in state.text
-
-    play(script)
+async def test_recording_ends_when_the_last_person_leaves(robot: Running, tmp_path: Path) -> None:
+    async with robot.client() as program:
+        async with robot.client(role="person") as one:
+            async with robot.client(role="person") as two:
+                await recording(two)
+            async with robot.client(role="person") as late:
+                assert (await late.expect(RecorderState)).recording
+        del one
+        while not (state := await program.expect(RecorderState)).text:
+            assert state.recording
+        assert "last person" in state.text
+    await robot.end()
     assert "last person" in read_episode(only(tmp_path / "kept")).outcome
 
 
-def test_the_state_is_broadcast_each_second(play: Any) -> None:
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as person, robot.client() as program:
-            await robot.armed(person)
-            await recording(person)
-            await drive(robot, person, 1, 3)
-            await program.send(Acknowledge())
-            while (await program.expect(RecorderState)).steps < 2:
-                pass
-
-    play(script)
+async def test_the_state_is_broadcast_each_second(robot: Running) -> None:
+    async with robot.client(role="person") as person, robot.client() as program:
+        await robot.armed(person)
+        await recording(person)
+        await drive(robot, person, 1, 3)
+        await program.send(Acknowledge())
+        while (await program.expect(RecorderState)).steps < 2:
+            pass
 
 
-def test_the_episode_is_closed_when_the_daemon_ends(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    async def run() -> None:
-        async with (
-            running(car_plan(recordings=str(tmp_path)), monkeypatch) as robot,
-            robot.client(role="person") as person,
-        ):
-            await robot.armed(person)
-            await recording(person)
-            await drive(robot, person, 1, 4)
-            robot.daemon.end()
-            await robot.task
-
-    asyncio.run(run())
-    episode = read_episode(only(tmp_path))
+async def test_the_episode_is_closed_when_the_daemon_ends(robot: Running, tmp_path: Path) -> None:
+    async with robot.client(role="person") as person:
+        await robot.armed(person)
+        await recording(person)
+        await drive(robot, person, 1, 4)
+        await robot.end()
+    episode = read_episode(only(tmp_path / "kept"))
     assert (episode.closed, episode.outcome, len(episode.steps)) == (True, "", 4)
 
 
-def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) -> None:
+async def test_recordings_can_be_listed_fetched_and_judged(robot: Running, tmp_path: Path) -> None:
     header = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(30):
             jpeg = picture(number) if number % 3 == 0 else None
             writer.add(Step(action=(0.0, number / 30), driver="person"), jpeg)
         name = writer.path.name
-
-    async def script(robot: Running) -> None:
-        async with robot.client(role="person") as person:
-            await person.send(Browse())
-            (summary,) = (await person.expect(Recordings)).episodes
-            assert summary == EpisodeSummary(
-                id=name,
-                steps=30,
-                kept=30,
-                seconds=3.0,
-                closed=True,
-                created=summary.created,
-                driver="Ada",
-                outcome="",
-            )
-            await person.send(Judge(episode=name, first=10, last=14))
-            (summary,) = (await person.expect(Recordings)).episodes
-            assert (summary.kept, summary.seconds) == (25, 2.5)
-            await person.send(Judge(episode=name, first=12, last=12, keep=True))
-            assert (await person.expect(Recordings)).episodes[0].kept == 26
-            await person.send(Judge(episode=name, first=0, last=99))
-            assert "has the steps 0 to 29" in (await person.expect(Refused)).reason
-            await person.send(Fetch(episode=name, first=28, count=100))
-            piece = await person.expect(Piece)
-            assert (piece.first, piece.total, len(piece.lines)) == (28, 32, 4)
-            assert piece.frames == (picture(27), None, None, None)
-            assert json.loads(piece.header)["driver"] == "Ada"
-            await person.send(Fetch(episode=name, first=32))
-            assert (await person.expect(Piece)).lines == ()
-            await person.send(Fetch(episode="20260101T000000Z-0001"))
-            assert "There is no episode" in (await person.expect(Refused)).reason
-
-    play(script)
+    async with robot.client(role="person") as person:
+        await person.send(Browse())
+        (summary,) = (await person.expect(Recordings)).episodes
+        assert summary == EpisodeSummary(
+            id=name,
+            steps=30,
+            kept=30,
+            seconds=3.0,
+            closed=True,
+            created=summary.created,
+            driver="Ada",
+            outcome="",
+        )
+        await person.send(Judge(episode=name, first=10, last=14))
+        (summary,) = (await person.expect(Recordings)).episodes
+        assert (summary.kept, summary.seconds) == (25, 2.5)
+        await person.send(Judge(episode=name, first=12, last=12, keep=True))
+        assert (await person.expect(Recordings)).episodes[0].kept == 26
+        await person.send(Judge(episode=name, first=0, last=99))
+        assert "has the steps 0 to 29" in (await person.expect(Refused)).reason
+        await person.send(Fetch(episode=name, first=28, count=100))
+        piece = await person.expect(Piece)
+        assert (piece.first, piece.total, len(piece.lines)) == (28, 32, 4)
+        assert piece.frames == (picture(27), None, None, None)
+        assert json.loads(piece.header)["driver"] == "Ada"
+        await person.send(Fetch(episode=name, first=32))
+        assert (await person.expect(Piece)).lines == ()
+        await person.send(Fetch(episode="20260101T000000Z-0001"))
+        assert "There is no episode" in (await person.expect(Refused)).reason
 
 
-def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> None:
+async def test_one_question_about_recordings_at_a_time(robot: Running, tmp_path: Path) -> None:
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(200):
             writer.add(Step(action=(0.0, 0.5), driver="person"), picture(number))
         name = writer.path.name
-
-    async def script(robot: Running) -> None:
-        async with robot.client() as program:
-            for _ in range(40):
-                await program.send(Fetch(episode=name))
-            await program.send(Browse())
-            refused = await program.expect(Refused)
-            assert "one question" in refused.reason
-            await program.send(Ping(token=1))
-            await program.expect(Pong)
-            pieces = [m for m in program.received if isinstance(m, Piece)]
-            assert all(0 < len(encode(piece)) < MAX_PIECE + 100_000 for piece in pieces)
-            assert len(pieces) < 40
-
-    play(script)
+    async with robot.client() as program:
+        for _ in range(40):
+            await program.send(Fetch(episode=name))
+        await program.send(Browse())
+        refused = await program.expect(Refused)
+        assert "one question" in refused.reason
+        await program.send(Ping(token=1))
+        await program.expect(Pong)
+        pieces = [m for m in program.received if isinstance(m, Piece)]
+        assert all(0 < len(encode(piece)) < MAX_PIECE + 100_000 for piece in pieces)
+        assert len(pieces) < 40
 
 
-def test_a_client_that_only_listens_gets_all_events(play: Any, tmp_path: Path) -> None:
-    made = make_credentials(tmp_path / "credentials", "test car")
-    secured = {"certificate": str(made.certificate), "private_key": str(made.private_key)}
-
-    async def script(robot: Running) -> None:
-        async with robot.client() as program:
-            for number in range(6):
-                robot.daemon._hub.event("news", str(number))
-                while (received := await program.expect(Event)).name != "news":
-                    pass
-                assert received.text == str(number)
-
-    play(script, **secured)
+@pytest.mark.plan(secured=True)
+async def test_a_client_that_only_listens_gets_all_events(robot: Running, key: bytes) -> None:
+    async with robot.client(key) as program:
+        for number in range(6):
+            robot.daemon._hub.event("news", str(number))
+            while (received := await program.expect(Event)).name != "news":
+                pass
+            assert received.text == str(number)

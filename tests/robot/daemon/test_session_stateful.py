@@ -90,7 +90,7 @@ class Robot(RuleBasedStateMachine):
         """A client leaves; if it had control, the robot is disarmed."""
         if place not in self.sessions:
             return
-        self.sessions.pop(place).close()
+        self.hub.leave(self.sessions.pop(place).client)
         self.forget_suggestion(place)
         if self.holder == place:
             self.holder = None

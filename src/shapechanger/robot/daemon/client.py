@@ -7,23 +7,19 @@ from collections import deque
 from typing import Final, NamedTuple
 
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.link.messages import (
-    Event,
-    Lease,
-    Observation,
-    RecorderState,
-    RobotMessage,
-    Role,
-)
+from shapechanger.robot.link import messages
 
-_MAX_EVENTS: Final = 32
+NOT_READING: Final = "The client does not read its messages."
+
 _MAX_MESSAGES: Final = 256
+# Of these kinds, only the newest ones are kept.
+_KEPT: Final = {messages.Lease: 1, messages.RecorderState: 1, messages.Event: 32}
 
 
 class Sent(NamedTuple):
     """An observation that a client was sent, and the newest frame at that time."""
 
-    observation: Observation
+    observation: messages.Observation
     frame: Frame | None
 
 
@@ -39,42 +35,41 @@ class Client:
         role: "person" or "program".
         posted: Set when a message waits.
         updated: Set when an observation may be due.
-        is_full: True once a message did not fit, because the client does not read.
-        expelled: Reason why the connection must end; "" if it may go on.
+        expelled: Reason why the connection must end, a sentence; "" if it may go on.
     """
 
-    def __init__(self, session: int, name: str = "", role: Role = "program") -> None:
+    def __init__(self, session: int, name: str = "", role: messages.Role = "program") -> None:
         self.session = session
         self.name = name
-        self.role: Role = role
+        self.role: messages.Role = role
         self.posted = asyncio.Event()
         self.updated = asyncio.Event()
-        self.is_full = False
         self.expelled = ""
-        self._messages: deque[RobotMessage] = deque()
+        self._messages: deque[messages.RobotMessage] = deque()
 
     @property
     def is_person(self) -> bool:
         """True for a person, False for a program."""
         return self.role == "person"
 
-    def post(self, message: RobotMessage) -> None:
-        """Queue a message; one that does not fit is lost, and sets `is_full`."""
-        self.posted.set()
-        if isinstance(message, Lease | RecorderState):
-            self._trim(type(message), keep=0)
-        elif isinstance(message, Event):
-            self._trim(Event, keep=_MAX_EVENTS - 1)
+    def post(self, message: messages.RobotMessage) -> None:
+        """Queue a message; one that does not fit is lost, and expels the client."""
+        kind = type(message)
+        if kind in _KEPT:
+            same = [queued for queued in self._messages if type(queued) is kind]
+            if len(same) == _KEPT[kind]:
+                self._messages.remove(same[0])
         elif len(self._messages) >= _MAX_MESSAGES:
-            self.is_full = True
+            self.expel(NOT_READING)
             return
         self._messages.append(message)
+        self.posted.set()
 
-    def take(self) -> RobotMessage | None:
+    def take(self) -> messages.RobotMessage | None:
         """Remove and return the oldest message, or None if the queue is empty."""
         return self._messages.popleft() if self._messages else None
 
-    def awaits(self, *kinds: type[RobotMessage]) -> bool:
+    def awaits(self, *kinds: type[messages.RobotMessage]) -> bool:
         """Return True if a message of one of these types, or of any without types, is queued."""
         return any(isinstance(message, kinds or object) for message in self._messages)
 
@@ -82,9 +77,3 @@ class Client:
         """End the connection, for a reason that is a sentence."""
         self.expelled = reason
         self.posted.set()
-
-    def _trim(self, kind: type[RobotMessage], keep: int) -> None:
-        """Remove the oldest messages of a type until `keep` are left."""
-        queued = [message for message in self._messages if isinstance(message, kind)]
-        for message in queued[: max(0, len(queued) - keep)]:
-            self._messages.remove(message)

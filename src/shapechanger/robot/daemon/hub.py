@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections import OrderedDict
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -22,14 +22,7 @@ from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.channel import NO_STATE, GuardState, Order
 from shapechanger.robot.hardware import Clock
-from shapechanger.robot.link.messages import (
-    Command,
-    Event,
-    Lease,
-    Observation,
-    Refused,
-    RobotMessage,
-)
+from shapechanger.robot.link import messages
 
 _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
@@ -105,7 +98,8 @@ class SessionHub:
         self._frame_arrived = asyncio.Event()
         self._unsettled = False  # An order was given that takes effect at the guard's next tick.
         self._clients: dict[int, Client] = {}
-        self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
+        # Lease and number of each command, and when it arrived, ns.
+        self._arrivals: deque[tuple[tuple[int, int], int]] = deque(maxlen=_ARRIVALS)
         self._command = self._suggestion = _NOTHING
         self.recorder = Recorder(plan, self._broadcast, call)
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
@@ -153,7 +147,7 @@ class SessionHub:
         held = self.holder
         if held is not None and held is not client and (held.is_person or not client.is_person):
             reason = f"{held.name} has control; a {client.role} cannot take it from a {held.role}."
-            client.post(Lease(mine=False, holder=held.name, reason=reason))
+            client.post(messages.Lease(mine=False, holder=held.name, reason=reason))
             return
         self._drop_suggestion(client)
         reason = f"{client.name} has control."
@@ -176,12 +170,10 @@ class SessionHub:
         self._command = _NOTHING
         self._broadcast_lease(f"No client has control: {why}.")
 
-    def command(self, client: Client, command: Command, sent: Sent | None = None) -> None:
+    def command(self, client: Client, command: messages.Command, sent: Sent | None = None) -> None:
         """Pass a valid command of the lease holder, which answers `sent`, to the guard."""
         now_ns = self.now_ns()
-        self._arrivals[self.lease, command.seq] = now_ns
-        if len(self._arrivals) > _ARRIVALS:
-            self._arrivals.popitem(last=False)
+        self._arrivals.append(((self.lease, command.seq), now_ns))
         values = tuple(command.scale * value for value in command.values)
         until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.card.deadline_ms)
         self._command = PendingCommand(client, values, until_ns)
@@ -215,7 +207,7 @@ class SessionHub:
         until_ns = self.now_ns() + _NS_PER_MS * self.plan.card.deadline_ms
         self._suggestion = PendingCommand(client, values, until_ns)
 
-    def observation(self, client: Client, seq: int, frame_sent: int | None) -> Observation:
+    def observation(self, client: Client, seq: int, frame_sent: int | None) -> messages.Observation:
         """Build the observation for one client.
 
         `frame_sent` is the number of the last frame sent to it; None if it wants no frames.
@@ -230,7 +222,7 @@ class SessionHub:
             for pending in (self._command if state.armed else _NOTHING, self._suggestion)
         )
         is_new = frame_sent is not None and frame_sent != self.frame_seq
-        return Observation(
+        return messages.Observation(
             seq=seq,
             captured_ns=at_ns if frame is None else frame.captured_ns,
             state_ns=at_ns,
@@ -242,7 +234,7 @@ class SessionHub:
             action_applied=state.applied,
             applied_seq=state.applied_seq if drives else None,
             applied_ns=state.applied_ns if drives else None,
-            command_ns=self._arrivals.get((state.applied_session, state.applied_seq or 0))
+            command_ns=dict(self._arrivals).get((self.lease, state.applied_seq or 0))
             if drives
             else None,
             stop_reason=state.stop_reason,
@@ -269,7 +261,7 @@ class SessionHub:
         if before.at_ns and state.bumps > before.bumps:
             self.event("bump", "The robot bumped into something.")
         if state.refused:
-            refused = Refused(reason=state.refused, seq=state.refused_seq)
+            refused = messages.Refused(reason=state.refused, seq=state.refused_seq)
             if state.refused_seq is None:
                 self._broadcast(refused)
             elif self.holder is not None:
@@ -301,16 +293,16 @@ class SessionHub:
 
     def event(self, name: str, text: str) -> None:
         """Report an event to all clients."""
-        self._broadcast(Event(name=name, text=text, at_ns=self.now_ns()))
+        self._broadcast(messages.Event(name=name, text=text, at_ns=self.now_ns()))
 
-    def _broadcast(self, message: RobotMessage) -> None:
+    def _broadcast(self, message: messages.RobotMessage) -> None:
         for client in self._clients.values():
             client.post(message)
 
     def _broadcast_lease(self, reason: str) -> None:
         for client in self._clients.values():
             mine = self.holder is client
-            client.post(Lease(mine=mine, holder=self.holder_name, reason=reason))
+            client.post(messages.Lease(mine=mine, holder=self.holder_name, reason=reason))
 
     def _drop_suggestion(self, client: Client) -> None:
         """Drop the suggestion of a client that left or took the lease."""

@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import contextlib
 import ctypes
+import itertools
 import json
 import logging
 import os
@@ -23,25 +24,14 @@ import msgspec
 
 from shapechanger.errors import ShapechangerError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.daemon import credentials
 from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
-from shapechanger.robot.daemon.credentials import (
-    Authenticator,
-    check_exposure,
-    read_key,
-    server_tls,
-)
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.server import Server
 from shapechanger.robot.discovery import announce, withdraw
-from shapechanger.robot.guard.channel import (
-    MAX_DATAGRAM,
-    GuardState,
-    Heartbeat,
-    Order,
-    decode_state,
-    encode,
-)
+from shapechanger.robot.guard import channel
+from shapechanger.robot.guard.channel import GuardState, Heartbeat, Order
 from shapechanger.robot.guard.running import log_to_stderr, read_plan_fd, run_early
 from shapechanger.robot.hardware import Clock, connect
 from shapechanger.robot.link.address import Address, is_loopback
@@ -50,7 +40,7 @@ from shapechanger.robot.link.authentication import fingerprint_short
 _log = logging.getLogger("shapechanger.robot.daemon")
 
 _HEARTBEAT_S: Final = 0.05  # The supervisor expects one each 100 ms.
-_RECORDER_S: Final = 1.0  # Period of the recorder's reports.
+_BEATS_A_REPORT: Final = 20  # The recorder reports once a second.
 
 LIFELINE: Final = b"life"
 """The message that carries the lifeline's descriptor."""
@@ -102,7 +92,7 @@ class GuardLink:
         """Read all states that have arrived."""
         while self._is_open:
             try:
-                data = self._socket.recv(MAX_DATAGRAM)
+                data = self._socket.recv(channel.MAX_DATAGRAM)
             except BlockingIOError:
                 return
             except ConnectionResetError:
@@ -111,7 +101,7 @@ class GuardLink:
                 self._lose()
                 return
             try:
-                state = decode_state(data)
+                state = channel.decode_state(data)
             except ValueError as error:
                 _log.warning("A message of the guard is not a state: %s", error)
             else:
@@ -126,7 +116,7 @@ class GuardLink:
 
     def _try(self, order: Order) -> bool:
         try:
-            self._socket.send(encode(order))
+            self._socket.send(channel.encode(order))
         except BlockingIOError:
             return False
         except (BrokenPipeError, ConnectionResetError):
@@ -153,13 +143,11 @@ class Daemon:
     def __init__(
         self, plan: DaemonPlan, clock: Clock, guard_fd: int, heartbeat_fd: int | None = None
     ) -> None:
-        self._plan = plan
-        self._now_ns = clock.now_ns
         self._ended = asyncio.Event()
         self._guard_reported = asyncio.Event()  # The guard has reported, or never will.
         self._why = ""
-        self._guard = GuardLink(guard_fd, self._on_state, lambda: self.end("The guard is gone."))
         self._loop = asyncio.get_running_loop()
+        self._guard = GuardLink(guard_fd, self._on_state, lambda: self.end("The guard is gone."))
         self._hub = SessionHub(plan, clock, self._guard.send, self._guard.drain, self._call)
         self._heartbeat_fd = heartbeat_fd
 
@@ -169,16 +157,16 @@ class Daemon:
         Returns:
             The reason why it ended; "" if it was asked to.
         """
-        plan, hub = self._plan, self._hub
-        check_exposure(plan)
-        key = read_key(Path(plan.key_file)) if plan.key_file else b""
+        hub, plan = self._hub, self._hub.plan
+        credentials.check_exposure(plan)
+        key = credentials.read_key(Path(plan.key_file)) if plan.key_file else b""
         tls, fingerprint = None, b""
         if plan.certificate:
-            tls, fingerprint = server_tls(Path(plan.certificate), Path(plan.private_key))
-        server = Server(hub, Authenticator(key, fingerprint), tls)
-        tasks = [
-            asyncio.create_task(work) for work in (self._heartbeats(), self._report_recorder())
-        ]
+            tls, fingerprint = credentials.server_tls(
+                Path(plan.certificate), Path(plan.private_key)
+            )
+        server = Server(hub, credentials.Authenticator(key, fingerprint), tls)
+        beating = asyncio.create_task(self._beat())
         camera = None if plan.camera is None else self._camera(plan.camera)
         announcement = None
         try:
@@ -206,9 +194,8 @@ class Daemon:
             await server.close()
             if announcement is not None:
                 await withdraw(announcement)
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            beating.cancel()
+            await asyncio.gather(beating, return_exceptions=True)
             await asyncio.to_thread(hub.recorder.close)
             await asyncio.to_thread(hub.library.close)
         return self._why
@@ -223,19 +210,18 @@ class Daemon:
         self._hub.on_state(state)
         self._guard_reported.set()
 
-    async def _heartbeats(self) -> None:
-        if self._heartbeat_fd is None:
-            return
-        heartbeat = Heartbeat(self._heartbeat_fd, 0.0)
-        while not heartbeat.lost:
-            heartbeat.beat()
+    async def _beat(self) -> None:
+        """Send heartbeats, and report the recorder's state while it records."""
+        heartbeat = None if self._heartbeat_fd is None else Heartbeat(self._heartbeat_fd, 0.0)
+        for beats in itertools.count():
+            if heartbeat is not None:
+                heartbeat.beat()
+                if heartbeat.lost:
+                    self.end("The supervisor is gone.")
+                    return
+            if beats % _BEATS_A_REPORT == 0:
+                self._hub.recorder.tick()
             await asyncio.sleep(_HEARTBEAT_S)
-        self.end("The supervisor is gone.")
-
-    async def _report_recorder(self) -> None:
-        while True:
-            await asyncio.sleep(_RECORDER_S)
-            self._hub.recorder.tick()
 
     def _call(self, work: Callable[[], None]) -> None:
         """Run a function in the event loop's thread, from any other thread."""
@@ -258,12 +244,12 @@ class Daemon:
             _log.warning("Camera: %s", text)
             self._call(lambda: self._hub.event("camera", text))
 
-        now_ns = None if self._hub.in_steps else self._now_ns
-        return FrameReader(plan, FrameChecks(now_ns), deliver, report)
+        checks = FrameChecks(None if self._hub.in_steps else self._hub.now_ns)
+        return FrameReader(plan, checks, deliver, report)
 
     def _report_ready(self, port: int, fingerprint: bytes) -> None:
         """Report the port in the log, and in the file that says that the robot can be reached."""
-        plan = self._plan
+        plan = self._hub.plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
         _log.info("%s listens at %s, %s.", plan.card.robot, Address(plan.host, port), secured)
         if not plan.ready_file:

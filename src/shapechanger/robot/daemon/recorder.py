@@ -21,15 +21,8 @@ from shapechanger.layout import Layout
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client, Sent
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.link import messages
 from shapechanger.robot.link.card import RobotCard
-from shapechanger.robot.link.messages import (
-    Mark,
-    Observation,
-    RecorderState,
-    Refused,
-    RobotMessage,
-    Undo,
-)
 
 _log = logging.getLogger(__name__)
 
@@ -96,14 +89,16 @@ class _Episode:
 
     def __init__(self, folder: Path, header: EpisodeHeader, starter: Client) -> None:
         self.starter = starter
-        self.progress = RecorderState()
+        self.progress = messages.RecorderState()
         self.jobs = 0
         self.bytes = 0
         self._trouble = ""
         self._create = partial(EpisodeWriter.create, folder, header)
         self._writer: EpisodeWriter | None = None
 
-    def attempt(self, job: Callable[[EpisodeWriter], object]) -> tuple[object, RecorderState]:
+    def attempt(
+        self, job: Callable[[EpisodeWriter], object]
+    ) -> tuple[object, messages.RecorderState]:
         """Do a job unless there was an error, and return its result and the episode's state."""
         result = None
         try:
@@ -119,8 +114,8 @@ class _Episode:
                 if self._writer is not None:
                     self._writer.close(self._trouble)
         if (writer := self._writer) is None:
-            return result, RecorderState(text=self._trouble)
-        return result, RecorderState(
+            return result, messages.RecorderState(text=self._trouble)
+        return result, messages.RecorderState(
             text=self._trouble,
             episode=writer.path.name,
             steps=writer.steps,
@@ -152,7 +147,7 @@ class Recorder:
     def __init__(
         self,
         plan: DaemonPlan,
-        broadcast: Callable[[RobotMessage], None],
+        broadcast: Callable[[messages.RobotMessage], None],
         call: Callable[[Callable[[], None]], None],
     ) -> None:
         self.on = False
@@ -167,13 +162,13 @@ class Recorder:
         self._newest: _Decided | None = None
         self._frame: Frame | None = None
 
-    def state(self) -> RecorderState:
+    def state(self) -> messages.RecorderState:
         """Return the state of the recorder."""
-        progress = RecorderState() if self._episode is None else self._episode.progress
+        progress = messages.RecorderState() if self._episode is None else self._episode.progress
         text = self._text or progress.text
         return msgspec.structs.replace(progress, recording=self.on, text=text)
 
-    def observed(self, client: Client, observation: Observation) -> None:
+    def observed(self, client: Client, observation: messages.Observation) -> None:
         """Complete the step of a client with the next observation that it is sent."""
         decided = self._decided
         if decided is None or decided.client is not client:
@@ -239,7 +234,7 @@ class Recorder:
         self._stop(self._episode, text)
         return ""
 
-    def edit(self, request: Mark | Undo, client: Client) -> str:
+    def edit(self, request: messages.Mark | messages.Undo, client: Client) -> str:
         """Mark the newest step, or drop the newest ones, after the pending step.
 
         Returns:
@@ -250,7 +245,7 @@ class Recorder:
             return _NOT_RECORDING
 
         def write(writer: EpisodeWriter) -> str:
-            if isinstance(request, Undo):
+            if isinstance(request, messages.Undo):
                 return "" if writer.undo(request.seconds) else "There is nothing to undo."
             if not writer.steps:
                 return "There is no step to mark yet."
@@ -259,7 +254,7 @@ class Recorder:
 
         def answer(refusal: str) -> None:
             if refusal:
-                client.post(Refused(reason=refusal))
+                client.post(messages.Refused(reason=refusal))
             else:
                 self._broadcast(self.state())
 
@@ -316,7 +311,7 @@ class Recorder:
         episode.jobs += 1
         episode.bytes += size
 
-        def done(result: tuple[Any, RecorderState]) -> None:
+        def done(result: tuple[Any, messages.RecorderState]) -> None:
             episode.jobs -= 1
             episode.bytes -= size
             before, episode.progress = episode.progress, result[1]
@@ -326,7 +321,7 @@ class Recorder:
             elif not before.text:
                 _log.warning("Recorder: %s", now.text)
                 if not now.episode:  # It could not even begin.
-                    episode.starter.post(Refused(reason=now.text))
+                    episode.starter.post(messages.Refused(reason=now.text))
             is_news = (before.episode, before.text) != (now.episode, now.text)
             if is_news and episode is self._episode:
                 self.on = self.on and not now.text

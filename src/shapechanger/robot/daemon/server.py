@@ -24,11 +24,9 @@ from shapechanger.robot.daemon.session import Session
 from shapechanger.robot.link.address import cannot_listen, is_loopback, parse_address
 from shapechanger.robot.link.messages import VERSION
 
-_PRE_AUTH_TIMEOUT_S: Final = 3.0
-"""Time that a connection has for its first request, and for each one after it, s."""
-
 _log = logging.getLogger(__name__)
 
+_PRE_AUTH_TIMEOUT_S: Final = 3.0  # For its first request, and for each one after it.
 _MAX_TOTAL: Final = 48
 _MAX_PER_ADDRESS: Final = 16  # A browser opens six, and a person may have two pages open.
 _BACKLOG: Final = 32
@@ -232,10 +230,7 @@ class Server:
     """Serves the robot on one port."""
 
     def __init__(
-        self,
-        hub: SessionHub,
-        authenticator: Authenticator,
-        tls: ssl.SSLContext | None,
+        self, hub: SessionHub, authenticator: Authenticator, tls: ssl.SSLContext | None
     ) -> None:
         self._hub = hub
         self._authenticator = authenticator
@@ -247,9 +242,8 @@ class Server:
 
     async def start(self) -> int:
         """Start listening, and return the port."""
-        plan = self._hub.plan
         await self._runner.setup()
-        return await self._listener.start(plan.host, plan.port)
+        return await self._listener.start(self._hub.plan.host, self._hub.plan.port)
 
     async def close(self) -> None:
         """Close all connections."""
@@ -260,9 +254,9 @@ class Server:
         app = web.Application(middlewares=[self._renew_timeout], client_max_size=1024)
         app.on_response_prepare.append(_add_headers)
         files = console_files()
-        app.router.add_get("/", _serve_file(*files[ENTRY]))
+        app.router.add_get("/", partial(_serve_file, *files[ENTRY]))
         for name, file in files.items():
-            app.router.add_get(f"{_CONSOLE}{name}", _serve_file(*file))
+            app.router.add_get(f"{_CONSOLE}{name}", partial(_serve_file, *file))
         app.router.add_get(f"{_CONSOLE}robot.json", self._robot)
         app.router.add_get("/healthz", self._health)
         app.router.add_get("/link", self._link)
@@ -321,8 +315,5 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
     response.headers.update(_HEADERS)
 
 
-def _serve_file(content_type: str, body: bytes) -> _Handler:
-    async def serve(_: web.Request) -> web.Response:
-        return web.Response(body=body, content_type=content_type, charset="utf-8")
-
-    return serve
+async def _serve_file(content_type: str, body: bytes, _: web.Request) -> web.Response:
+    return web.Response(body=body, content_type=content_type, charset="utf-8")

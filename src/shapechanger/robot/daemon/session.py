@@ -17,7 +17,7 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from shapechanger.errors import LinkError, RobotRefused, ShapechangerError, translate_errors
-from shapechanger.robot.daemon.client import Client, Sent
+from shapechanger.robot.daemon.client import NOT_READING, Client, Sent
 from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.library import Answer
@@ -30,8 +30,6 @@ MESSAGES_PER_S: Final = 500.0
 
 HELLO_TIMEOUT_S: Final = 3.0
 """Time that a client has for its hello, s."""
-
-_NOT_READING: Final = "The client does not read its messages."
 
 _log = logging.getLogger(__name__)
 
@@ -194,8 +192,6 @@ class Session:
                     hub.library.ask(message, self._library_answered)
             case _:
                 raise LinkError("The hello was sent already.")
-        if client.is_full:
-            raise LinkError(_NOT_READING)
 
     def observe(self) -> messages.Observation:
         """Build the observation to send now, which uses up the credit."""
@@ -211,10 +207,6 @@ class Session:
             self._tokens = min(self._messages_per_s, self._tokens + 1.0)
         self._credit = False
         return observation
-
-    def close(self) -> None:
-        """End the session."""
-        self._hub.leave(self.client)
 
     def _count(self) -> None:
         """Count a message, and refuse it above the rate."""
@@ -329,7 +321,7 @@ class Session:
                 await asyncio.sleep(_WRONG_KEY_S)
         finally:
             # If this client was in control, the robot stops before anything else happens.
-            self.close()
+            self._hub.leave(client)
         if reason is not None:
             _log.info("%s: %s", client.name or request.remote, reason)
             with contextlib.suppress(LinkError):  # The client may read no more.
@@ -359,18 +351,14 @@ class Session:
 
     async def _exchange(self) -> None:
         """Exchange messages until the client disconnects."""
-        tasks = [
-            asyncio.create_task(work) for work in (self._listen(), self._answer(), self._observe())
-        ]
         try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in tasks:
-                task.cancel()
-            results = await asyncio.gather(*tasks, return_exceptions=True)
-        for result in results:
-            if isinstance(result, BaseException) and not isinstance(result, asyncio.CancelledError):
-                raise result
+            async with asyncio.TaskGroup() as group:
+                others = [group.create_task(work) for work in (self._answer(), self._observe())]
+                await self._listen()
+                for task in others:
+                    task.cancel()
+        except ExceptionGroup as errors:
+            raise errors.exceptions[0] from None
 
     async def _send(self, message: messages.RobotMessage) -> None:
         await self._in_time(self._socket.send_bytes(messages.encode(message)))
@@ -378,7 +366,7 @@ class Session:
     async def _in_time(self, sending: Awaitable[None]) -> None:
         """Wait for a message to be sent."""
         with (
-            translate_errors(TimeoutError, to=lambda _: LinkError(_NOT_READING)),
+            translate_errors(TimeoutError, to=lambda _: LinkError(NOT_READING)),
             translate_errors(ConnectionError, RuntimeError, to=_ended),
         ):
             async with asyncio.timeout(_SEND_S):
@@ -398,8 +386,8 @@ class Session:
             client.posted.clear()
             while (message := client.take()) is not None:
                 await self._send(message)
-            if client.is_full or client.expelled:
-                raise LinkError(client.expelled or _NOT_READING)
+            if client.expelled:
+                raise LinkError(client.expelled)
 
     async def _observe(self) -> None:
         """Send each observation once it is due and the client has credit for it."""

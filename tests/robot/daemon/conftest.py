@@ -1,0 +1,77 @@
+"""A daemon for each test that takes `robot`. Tests may be coroutines, which run in its loop."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from shapechanger.robot.daemon.credentials import make_credentials, read_key
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.hardware import Clock
+from tests.robot.daemon.fakes import SteppedClock
+from tests.robot.daemon.plans import car_plan
+from tests.robot.daemon.running import Running, running
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Add the marker."""
+    text = "plan(secured=False, **changes): plan of the daemon; secured: with TLS and a key"
+    config.addinivalue_line("markers", text)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Run a test that is a coroutine."""
+    if not inspect.iscoroutinefunction(pyfuncitem.obj):
+        return None
+    names = inspect.signature(pyfuncitem.obj).parameters
+    script = pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in names})
+    run = pyfuncitem.funcargs["runner"].run if "runner" in pyfuncitem.funcargs else asyncio.run
+    run(script)
+    return True
+
+
+@pytest.fixture
+def plan(request: pytest.FixtureRequest, tmp_path: Path) -> DaemonPlan:
+    """The plan of a car with the changes of `@pytest.mark.plan`."""
+    changes = {}
+    for marker in reversed([*request.node.iter_markers("plan")]):
+        changes |= marker.kwargs
+    if changes.pop("secured", False):
+        made = make_credentials(tmp_path / "car", "car")
+        names = ("certificate", "private_key", "key_file")
+        changes |= {name: str(getattr(made, name)) for name in names}
+    for name in changes.keys() & {"recordings", "policies"}:  # Folders, or "" for none.
+        changes[name] = changes[name] and str(tmp_path / changes[name])
+    return car_plan(**changes)
+
+
+@pytest.fixture
+def key(plan: DaemonPlan) -> bytes:
+    """The key of the robot; empty for none."""
+    return read_key(Path(plan.key_file)) if plan.key_file else b""
+
+
+@pytest.fixture
+def runner() -> Iterator[asyncio.Runner]:
+    """The event loop of the daemon and of the test."""
+    with asyncio.Runner() as runner:
+        yield runner
+
+
+@pytest.fixture
+def robot(
+    plan: DaemonPlan, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Running]:
+    """A served robot, whose time moves in steps if the plan says so."""
+    clock = SteppedClock() if plan.card.clock == "twin" else Clock()
+    serving = running(plan, monkeypatch, clock)
+    robot = runner.run(serving.__aenter__())
+    if isinstance(clock, SteppedClock):
+        clock.tick = robot.guard.tick
+    yield robot
+    runner.run(serving.__aexit__(None, None, None))
