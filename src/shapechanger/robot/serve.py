@@ -24,10 +24,16 @@ from shapechanger.robot.daemon.credentials import (
     credentials_folder,
     load_credentials,
     make_credentials,
+    user_folder,
 )
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.running import ServePlan
-from shapechanger.robot.link.address import Address, cannot_listen, is_loopback, parse_address
+from shapechanger.robot.link.address import (
+    address_here,
+    cannot_listen,
+    is_loopback,
+    parse_address,
+)
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -161,9 +167,8 @@ class Service:
         if self.insecure or (self.credentials is not None and not self.port):
             return
         credentials = load_credentials(self.credentials or credentials_folder(name))
-        host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
         try:
-            robot = robot_at(str(Address(host, port)), name, credentials)
+            robot = robot_at(str(address_here(self.host, port)), name, credentials)
         except LinkError:  # Not every name of a robot is a file's.
             return
         plan.daemon["port"] = port  # A daemon that is started again keeps it.
@@ -211,10 +216,9 @@ def require_free(host: str, port: int) -> int:
 
 def recordings_folder(name: str) -> Path:
     """Return the default folder for a robot's recordings."""
-    data = os.environ.get("XDG_DATA_HOME", "")
-    # As for credentials: a relative path is ignored.
-    base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
-    return base / "shapechanger" / "recordings" / credentials_folder(name).name
+    return (
+        user_folder("XDG_DATA_HOME", ".local/share") / "recordings" / credentials_folder(name).name
+    )
 
 
 def store(robot: KnownRobot) -> str:
@@ -224,12 +228,10 @@ def store(robot: KnownRobot) -> str:
         Summary message.
     """
     name = robot.name
-    drives = f"`shapechanger robot drive {name}` drives it from here"
     try:
         known = recall(name)
     except UnknownName:
-        remember(robot)
-        return f"Known here as {name}: {drives}."
+        known = robot
     except LinkError as error:
         return f"It is not stored as a known robot: {error}"
     if (known.key, known.fingerprint) != (robot.key, robot.fingerprint):
@@ -238,12 +240,11 @@ def store(robot: KnownRobot) -> str:
             f"`shapechanger robot forget {name}` makes room for this one."
         )
     before, now = parse_address(known.address), parse_address(robot.address)
-    if before == now:
-        return f"Known here as {name}: {drives}."
-    if not is_loopback(before.host):
+    if before != now and not is_loopback(before.host):
         return f"Known here as {name} at {before}, which stays; this one is at {now}."
     remember(robot)
-    return f"Known here as {name}, now at {now} and no more at {before}: {drives}."
+    moved = "" if before == now else f", now at {now} and no more at {before}"
+    return f"Known here as {name}{moved}: `shapechanger robot drive {name}` drives it from here."
 
 
 def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:

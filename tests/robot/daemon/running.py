@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import socket
 import ssl
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -168,15 +167,6 @@ class Running:
             tls = socket.get_extra_info("ssl_object")
             certificate = fingerprint_of(tls.getpeercert(binary_form=True)) if tls else b""
             yield Client(socket, certificate)
-
-    @contextlib.asynccontextmanager
-    async def idle(self, stranger: socket.socket) -> AsyncIterator[None]:
-        """Complete the TLS handshake, and send nothing."""
-        context = ssl.create_default_context()
-        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-        _, writer = await asyncio.open_connection(sock=stranger, ssl=context, server_hostname="x")
-        yield
-        writer.transport.abort()
 
     @contextlib.asynccontextmanager
     async def client(self, key: bytes = b"", **hello: Any) -> AsyncIterator[Client]:

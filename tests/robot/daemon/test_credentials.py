@@ -6,6 +6,7 @@ import shutil
 import ssl
 import subprocess
 import sys
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -22,41 +23,28 @@ from shapechanger.robot.daemon.credentials import (
     server_tls,
 )
 from shapechanger.robot.link.authentication import fingerprint_of
+from shapechanger.robot.serve import recordings_folder
 from tests.robot.daemon.plans import car_plan
 
 
-def test_credentials_are_made_once(tmp_path: Path) -> None:
-    made = make_credentials(tmp_path / "car", "car")
-    assert make_credentials(tmp_path / "car", "car") == made == load_credentials(tmp_path / "car")
-    assert len(read_key(made.key_file)) == 16
-
-
-def test_a_new_folder_has_a_new_key_and_a_new_certificate(tmp_path: Path) -> None:
-    folder = tmp_path / "car"
-    old = make_credentials(folder, "car")
-    key, private = read_key(old.key_file), old.private_key.read_text()
-    shutil.rmtree(folder)
-    new = make_credentials(folder, "car")
-    assert read_key(new.key_file) != key
-    assert new.private_key.read_text() != private
-    assert new.fingerprint != old.fingerprint
-
-
-def test_only_the_owner_can_read_credentials(tmp_path: Path) -> None:
-    made = make_credentials(tmp_path / "a" / "car", "car")
-    assert made.key_file.stat().st_mode & 0o777 == 0o600
-    assert made.private_key.stat().st_mode & 0o777 == 0o600
-    assert (tmp_path / "a" / "car").stat().st_mode & 0o777 == 0o700
-
-
-def test_the_certificate_fields(tmp_path: Path) -> None:
-    made = make_credentials(tmp_path, "my car")
+def test_credentials_are_made_once_and_are_the_owners(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "car"
+    made = make_credentials(folder, "my car")
+    assert make_credentials(folder, "my car") == made == load_credentials(folder)
+    key = read_key(made.key_file)
+    assert len(key) == 16
+    modes = [path.stat().st_mode & 0o777 for path in (folder, made.key_file, made.private_key)]
+    assert modes == [0o700, 0o600, 0o600]
     certificate = x509.load_pem_x509_certificate(made.certificate.read_bytes())
     assert certificate.subject.rfc4514_string() == "CN=my car"
     assert certificate.not_valid_before_utc < datetime(2020, 1, 2, tzinfo=UTC)
     assert certificate.not_valid_after_utc > datetime.now(UTC) + timedelta(days=3_600)
     der = ssl.PEM_cert_to_DER_cert(made.certificate.read_text())
     assert made.fingerprint == fingerprint_of(der)
+    shutil.rmtree(folder)
+    new = make_credentials(folder, "my car")
+    assert read_key(new.key_file) != key
+    assert new.fingerprint != made.fingerprint
 
 
 def test_tls_1_3_is_required(tmp_path: Path) -> None:
@@ -64,11 +52,6 @@ def test_tls_1_3_is_required(tmp_path: Path) -> None:
     context, fingerprint = server_tls(made.certificate, made.private_key)
     assert context.minimum_version is ssl.TLSVersion.TLSv1_3
     assert fingerprint == made.fingerprint
-
-
-def test_missing_credentials_name_the_command(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="shapechanger robot init"):
-        load_credentials(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["key", "certificate.key"])
@@ -117,19 +100,33 @@ def test_a_folder_that_cannot_be_created_raises(tmp_path: Path) -> None:
         make_credentials(tmp_path / "file" / "car", "car")
 
 
-def test_the_folder_follows_xdg_config_home(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize(
+    ("variable", "folder_of", "default"),
+    [
+        ("XDG_CONFIG_HOME", credentials_folder, ".config/shapechanger/robots/car"),
+        ("XDG_DATA_HOME", recordings_folder, ".local/share/shapechanger/recordings/car"),
+    ],
+)
+def test_folders_follow_the_xdg_specification(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    variable: str,
+    folder_of: Callable[[str], Path],
+    default: str,
 ) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert credentials_folder("car") == tmp_path / "shapechanger/robots/car"
-    monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
-    assert credentials_folder("car") == Path.home() / ".config/shapechanger/robots/car"
+    monkeypatch.delenv(variable, raising=False)
+    assert folder_of("car") == Path.home() / default
+    monkeypatch.setenv(variable, "relative")
+    assert folder_of("car") == Path.home() / default
+    monkeypatch.setenv(variable, str(tmp_path))
+    assert folder_of("car") == tmp_path / default[default.index("shapechanger") :]
 
 
 @pytest.mark.parametrize("name", ["", "..", ".hidden", "a/b", "a\0b"])
 def test_a_name_cannot_leave_the_folder(name: str) -> None:
-    with pytest.raises(RobotError, match="valid folder name"):
-        credentials_folder(name)
+    for folder_of in (credentials_folder, recordings_folder):
+        with pytest.raises(RobotError, match="valid folder name"):
+            folder_of(name)
 
 
 def test_serving_other_machines_needs_a_key() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.guard.channel import GuardState
+from shapechanger.robot.guard.channel import GuardState, Order
 from shapechanger.robot.link.messages import Command, Lease, Observation
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
@@ -116,6 +116,16 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
     other = observed(hub)
     assert (other.applied_seq, other.applied_ns, other.command_ns) == (None, None, None)
     assert other.action_applied == (0.0, 0.5)
+
+
+def test_an_order_carries_the_limits_of_its_command_and_the_time_of_the_frame() -> None:
+    orders: list[Order] = []
+    hub = SessionHub(car_plan(), SteppedClock(), orders.append)
+    hub.on_frame(Frame(b"jpeg", 30))
+    hub.take(ANN)
+    hub.command(ANN, Command(seq=1, answers=1, values=(-1.0, 0.5), scale=0.5, ttl_ms=80))
+    (order,) = orders
+    assert (order.values, order.ttl_ms, order.frame_ns) == ((-0.5, 0.25), 80, 30)
 
 
 @given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))

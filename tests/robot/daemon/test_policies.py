@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.robot.daemon import policies
+from shapechanger.robot.daemon.client import Declined
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.link.messages import PolicyState, Refused, RunPolicy
@@ -86,15 +87,16 @@ async def test_a_policy_starts_with_the_robot(one: PolicyRunner, said: list[Poli
     robot = json.loads(said[1].text)
     assert (robot["address"], robot["key"]) == ("127.0.0.1:5000", "")
     assert robot["fingerprint"] == "01" * 32
-    assert one.run("student") == "student runs already."
+    with pytest.raises(Declined, match="student runs already"):
+        one.run("student")
 
 
 async def test_another_policy_takes_the_place(one: PolicyRunner, said: list[PolicyState]) -> None:
-    assert one.run("student") == ""
+    one.run("student")
     await until(lambda: said and said[-1].text == "it drives", "the first drives")
-    assert one.run("teacher") == ""
+    one.run("teacher")
     await until(lambda: (said[-1].running, said[-1].text) == ("teacher", "it drives"), "the second")
-    assert one.run("") == ""
+    one.run("")
     await until(lambda: said[-1] == PolicyState(names=_NAMES), "none runs")
 
 
@@ -109,10 +111,10 @@ async def test_another_policy_takes_the_place(one: PolicyRunner, said: list[Poli
 async def test_a_policy_that_ends_is_reported(
     one: PolicyRunner, said: list[PolicyState], name: str, words: str
 ) -> None:
-    assert one.run(name) == ""
+    one.run(name)
     await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
     assert said[-1].text.startswith(words)
-    assert one.run("student") == ""
+    one.run("student")
     await until(lambda: said[-1].text == "it drives", "another drives")
 
 
@@ -120,21 +122,26 @@ async def test_a_deaf_policy_is_killed(
     one: PolicyRunner, said: list[PolicyState], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(policies, "_END_S", 0.05)
-    assert one.run("deaf") == ""
+    one.run("deaf")
     await until(lambda: said and said[-1].text == "deaf", "it hears nothing")
-    assert one.run("") == ""
+    one.run("")
     await until(lambda: said[-1].running == "", "it is gone")
 
 
 async def test_an_unknown_policy_is_refused(one: PolicyRunner, said: list[PolicyState]) -> None:
-    assert "Did you mean 'student'?" in one.run("studnt")
-    assert one.run("../student") != ""
+    for name, words in (
+        ("studnt", "Did you mean 'student'?"),
+        ("../student", "No policy on board"),
+    ):
+        with pytest.raises(Declined, match=words):
+            one.run(name)
     assert said == []
 
 
 @pytest.mark.plan(policies="")
-async def test_a_robot_without_policies_refuses(one: PolicyRunner, said: list[PolicyState]) -> None:
-    assert "--policy" in one.run("student")
+async def test_a_robot_without_policies_refuses(one: PolicyRunner) -> None:
+    with pytest.raises(Declined, match="--policy"):
+        one.run("student")
     assert one.state() == PolicyState(names=())
 
 

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import queue
-import random
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import Episode, Step, episodes_of, read_episode, repair, writer
+from shapechanger.demos.episodes import Episode, Step, episodes_of, read_episode, writer
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.client import Client, Sent
+from shapechanger.robot.daemon.client import Client, Declined, Sent
+from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.recorder import DISK_TOO_SLOW, Recorder
-from shapechanger.robot.link.messages import Mark, Observation, RecorderState, Refused, Undo
+from shapechanger.robot.link import messages
+from shapechanger.robot.link.messages import Mark, RecorderState, Refused, Undo
+from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, picture
 
 pytestmark = pytest.mark.realtime
@@ -52,7 +50,7 @@ class Recording:
         self._calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         plan = car_plan(recordings=str(folder))
         self.recorder = Recorder(plan, self.told.append, self._calls.put)
-        assert self.recorder.begin(self.ada, "corridor", "") == ""
+        self.recorder.begin(self.ada, "corridor", "")
 
     @property
     def state(self) -> RecorderState:
@@ -62,7 +60,7 @@ class Recording:
         self.recorder._add(made, jpeg)
 
     def edit(self, request: Mark | Undo) -> None:
-        assert self.recorder.edit(request, self.ada) == ""
+        self.recorder.edit(request, self.ada)
 
     def listen(self, until: Callable[[], object]) -> None:
         """Call the functions of the thread until a condition holds."""
@@ -95,7 +93,8 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
     recording.edit(Mark(text="here"))
     recording.edit(Undo(seconds=0.5))
     (episode,) = recording.end("time")
-    assert recording.recorder.end() == "Nothing is being recorded."
+    with pytest.raises(Declined, match=r"Nothing is being recorded\."):
+        recording.recorder.end()
     assert recording.refusals() == ["There is no step to mark yet.", "There is nothing to undo."]
     assert [state.marks for state in recording.told] == [0, 1, 1, 1]
     assert (episode.closed, episode.outcome) == (True, "time")
@@ -159,72 +158,17 @@ def test_an_error_of_the_disk_is_reported_once(tmp_path: Path) -> None:
     assert recording.told == [recording.state] == [RecorderState(text=refusal)]
 
 
-_WRITES_FOR_EVER = """
-import sys
-from pathlib import Path
-from tests.robot.daemon.test_recorder import Recording, step
-
-recording, number = Recording(Path(sys.argv[1])), 0
-while True:
-    recording.add(*step(number))
-    number += 1
-    recording.listen(lambda: recording.state.steps >= number - 100)
-    if number % 20 == 0:
-        print(recording.state.steps, flush=True)
-"""
-
-
-def test_an_episode_of_a_killed_daemon_can_be_repaired(tmp_path: Path) -> None:
-    rng = random.Random(5)
-    for number in range(2):
-        folder = tmp_path / str(number)
-        writing = subprocess.Popen(
-            [sys.executable, "-c", _WRITES_FOR_EVER, str(folder)], stdout=subprocess.PIPE, text=True
-        )
-        assert writing.stdout is not None
-        enough, reported = rng.randrange(1, 400), 0
-        until_s = time.monotonic() + WITHIN_S
-        while reported < enough and time.monotonic() < until_s:
-            reported = int(writing.stdout.readline())
-        os.kill(writing.pid, signal.SIGKILL)
-        reported = max([reported, *(int(line) for line in writing.stdout.read().split("\n")[:-1])])
-        writing.wait()
-        writing.stdout.close()
-        (path,) = episodes_of(folder)
-        repair(path)
-        episode = read_episode(path)
-        assert reported >= enough
-        assert len(episode.steps) >= reported
-        assert [s.index for s in episode.steps] == list(range(len(episode.steps)))
-        assert all(episode.jpeg(s) == picture(s.index % 5) for s in episode.steps)
-
-
 ADA, NET = Client(1, "Ada", "person"), Client(2, "net")
 
 
-def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
-    """Build an observation sent to a client."""
-    fields: dict[str, Any] = {
-        "seq": seq,
-        "captured_ns": at_ns,
-        "state_ns": at_ns,
-        "sent_ns": at_ns,
-        "frame": None,
-        "frame_seq": 0,
-        "state": (float(at_ns),),
-        "sources": {},
-        "action_applied": (0.25,),
-        "applied_seq": None,
-        "applied_ns": None,
-        "command_ns": None,
-        "stop_reason": "",
-        "armed": True,
-        "emergency": False,
-        "emergencies": 0,
-        "holder": "",
-        "mine": True,
-    }
-    return Observation(**(fields | changes))
+HUB = SessionHub(car_plan(), SteppedClock(), lambda order: None)
+
+
+def seen(seq: int, at_ns: int, **changes: Any) -> messages.Observation:
+    """Build an observation sent to a client with control."""
+    fields = {"captured_ns": at_ns, "state": (float(at_ns),), "action_applied": (0.25,)}
+    fields |= {"stop_reason": "", "mine": True} | changes
+    return msgspec.structs.replace(HUB.observation(ADA, seq, None), **fields)
 
 
 def frame(seq: int) -> Frame:
@@ -243,7 +187,9 @@ class Built(Recorder):
     def _add(self, step: Step, jpeg: bytes | None) -> None:
         self.written.append((step, jpeg))
 
-    def see(self, client: Client, observation: Observation, frame: Frame | None = None) -> Sent:
+    def see(
+        self, client: Client, observation: messages.Observation, frame: Frame | None = None
+    ) -> Sent:
         """Send an observation to a client."""
         self.observed(client, observation)
         return Sent(observation, frame)
@@ -255,7 +201,7 @@ def test_the_next_observation_brings_the_applied_outputs() -> None:
     built.decided(ADA, sent, (0.5, 7.0), 110)
     assert built.written == []
     built.see(ADA, seen(2, 120, stop_reason="A bump."), frame(2))
-    built.end()
+    built._complete()
     ((step, jpeg),) = built.written
     assert jpeg == b"jpeg 1"
     assert (step.action, step.applied, step.wanted) == ((0.5, 1.0), (0.25,), (0.9, 0.0))
@@ -268,7 +214,7 @@ def test_the_later_of_two_decisions_counts() -> None:
     sent = built.see(ADA, seen(1, 100))
     built.decided(ADA, sent, (0.5, 0.0), 110)
     built.decided(ADA, sent, (0.0, 0.0), 115)
-    built.end()
+    built._complete()
     ((step, _),) = built.written
     assert (step.action, step.decided_ns, step.applied) == ((0.0, 0.0), 115, None)
 
@@ -297,7 +243,7 @@ def test_times_increase_and_no_frame_repeats(events: list[tuple[bool, Client, in
             sent[who].append(built.see(who, seen(number, picture.captured_ns), picture))
         elif back < len(sent[who]):
             built.decided(who, sent[who][-1 - back], (0.5, 0.0), now_ns)
-    built.end()
+    built._complete()
     for times in ("captured_ns", "decided_ns"):
         found = [getattr(step, times) for step, _ in built.written]
         assert found == sorted(found)

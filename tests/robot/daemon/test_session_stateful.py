@@ -7,7 +7,13 @@ from typing import Any
 
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+)
 
 from shapechanger.errors import LinkError
 from shapechanger.robot.cameras.camera import Frame
@@ -61,7 +67,6 @@ class Robot(RuleBasedStateMachine):
         self.clock = SteppedClock()
         self.orders: list[Order] = []
         self.allowed: list[tuple[int, tuple[float, ...]]] = []
-        self.hub = SessionHub(car_plan(), self.clock, self.orders.append)
         self.sessions: dict[int, Session] = {}
         self.models: dict[int, ClientModel] = {}
         self.holder: int | None = None
@@ -71,6 +76,11 @@ class Robot(RuleBasedStateMachine):
         self.halts = 0
         # Place, values and expiry (ns) of the newest suggestion.
         self.suggestion: tuple[int, tuple[float, ...], int] | None = None
+
+    @initialize(arming=st.sampled_from(("person", "anyone")))
+    def serve(self, arming: Any) -> None:
+        self.anyone_arms, self.emergency = arming == "anyone", False
+        self.hub = SessionHub(car_plan(arming=arming), self.clock, self.orders.append)
 
     def connected(self) -> bool:
         """Return True if any client is connected."""
@@ -116,14 +126,20 @@ class Robot(RuleBasedStateMachine):
 
     @rule(place=_places, emergency=st.integers(0, 2), back=st.integers(-1, 3))
     def arm(self, place: int, emergency: int, back: int) -> None:
-        """Only a person who sees the robot can arm it, and only if a client has control."""
+        """A client that sees the robot can arm it if a client has control.
+
+        It must be a person; or, if anyone may arm, a program in control without an emergency.
+        """
         if place not in self.sessions:
             return
         before, answers = len(self.orders), self.answers(place, back)
         self.send(place, Arm(answers=answers, emergency=emergency))
-        may = self.models[place].role == "person" and self.holder is not None
-        orders = [(order.kind, order.person) for order in self.orders[before:]]
-        assert orders == ([("arm", True)] if may and self.is_fresh(place, answers) else [])
+        person = self.models[place].role == "person"
+        program = self.anyone_arms and not self.emergency and self.holder == place
+        may = self.holder is not None and (person or program)
+        orders = [(order.kind, order.person, order.emergency) for order in self.orders[before:]]
+        arms = [("arm", person, emergency)] if may and self.is_fresh(place, answers) else []
+        assert orders == arms
 
     @rule(place=_places)
     def stop(self, place: int) -> None:
@@ -232,10 +248,11 @@ class Robot(RuleBasedStateMachine):
             assert len(self.orders) == before
             self.leave(place)
 
-    @rule()
-    def report(self) -> None:
+    @rule(emergency=st.booleans())
+    def report(self, emergency: bool) -> None:
         """A state of the guard and a frame arrive."""
-        self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True))
+        self.emergency = emergency
+        self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True, emergency=emergency))
         self.hub.on_frame(Frame(b"jpeg", self.clock.ns))
 
     @invariant()

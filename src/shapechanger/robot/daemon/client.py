@@ -16,6 +16,10 @@ _MAX_MESSAGES: Final = 256
 _KEPT: Final = {messages.Lease: 1, messages.RecorderState: 1, messages.Event: 32}
 
 
+class Declined(Exception):
+    """The robot declines a request, for a reason that is a sentence; the connection goes on."""
+
+
 class Sent(NamedTuple):
     """An observation that a client was sent, and the newest frame at that time."""
 

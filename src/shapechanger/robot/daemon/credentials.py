@@ -70,10 +70,13 @@ def credentials_folder(name: str) -> Path:
     """Return the folder of a robot's credentials."""
     if not name or name.startswith(".") or "/" in name or "\0" in name:
         raise RobotError(f"A robot's name must be a valid folder name, got {name!r}.")
-    config = os.environ.get("XDG_CONFIG_HOME", "")
-    # The XDG base directory specification requires relative paths to be ignored.
-    base = Path(config) if config.startswith("/") else Path.home() / ".config"
-    return base / "shapechanger" / "robots" / name
+    return user_folder("XDG_CONFIG_HOME", ".config") / "robots" / name
+
+
+def user_folder(variable: str, default: str) -> Path:
+    """Return a folder of the XDG base directory specification, which excludes relative paths."""
+    path = os.environ.get(variable, "")
+    return (Path(path) if path.startswith("/") else Path.home() / default) / "shapechanger"
 
 
 def make_credentials(folder: Path, name: str) -> Credentials:

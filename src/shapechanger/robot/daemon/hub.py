@@ -102,7 +102,7 @@ class SessionHub:
         self._arrivals: deque[tuple[tuple[int, int], int]] = deque(maxlen=_ARRIVALS)
         self._command = self._suggestion = _NOTHING
         self.recorder = Recorder(plan, self._broadcast, call)
-        self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
+        self.library = RecordingLibrary(Path(plan.recordings), call)
         self.policies = PolicyRunner(plan, self._broadcast)
 
     @property

@@ -29,7 +29,6 @@ Answer = messages.Recordings | messages.Piece | messages.Refused
 
 _EPISODE_ID: Final = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,127}")
 _MAX_TEXT: Final = 200
-_JOIN_S: Final = 2.0
 
 
 class RecordingLibrary:
@@ -38,23 +37,19 @@ class RecordingLibrary:
     An unchanged episode is read once for the list.
     """
 
-    def __init__(self, folder: Path | None, call: Callable[[Callable[[], None]], None]) -> None:
-        self._folder = folder or Path()
-        self._has_folder = folder is not None
+    def __init__(self, folder: Path, call: Callable[[Callable[[], None]], None]) -> None:
+        self._folder = folder
         self._worker = Worker("library", call)
         self._known: dict[str, tuple[object, messages.EpisodeSummary]] = {}
         self._index = LineIndex(Path())
 
     def ask(self, question: Question, then: Callable[[Answer], None]) -> None:
         """Ask a question; the caller bounds how many are open."""
-        if self._has_folder:
-            self._worker.put(partial(self._answer, question), then)
-        else:
-            then(messages.Refused(reason="This robot was served without a folder for recordings."))
+        self._worker.put(partial(self._answer, question), then)
 
     def close(self) -> None:
-        """End the thread, without waiting for a disk that hangs."""
-        self._worker.close(_JOIN_S)
+        """End the thread, and wait for the disk, up to a limit."""
+        self._worker.close()
 
     def _answer(self, question: Question) -> Answer:
         """Answer a question; errors of the disk are refusals."""

@@ -20,9 +20,10 @@ from typing import Final
 import msgspec
 
 from shapechanger.errors import UnknownName
+from shapechanger.robot.daemon.client import Declined
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.running import run_normally
-from shapechanger.robot.link.address import Address
+from shapechanger.robot.link.address import address_here
 from shapechanger.robot.link.messages import PolicyState
 
 _log = logging.getLogger(__name__)
@@ -30,7 +31,6 @@ _log = logging.getLogger(__name__)
 ENDING: Final = ".onnx"
 """Ending of the files of policies that run on board."""
 
-_EVERYWHERE: Final = frozenset({"", "0.0.0.0", "::"})
 _END_S: Final = 2.0  # For a policy to release the robot and exit.
 _MOST_NAMES: Final = 256
 _LONGEST: Final = 1024  # Of a line that a policy's process writes, characters.
@@ -70,37 +70,34 @@ class PolicyRunner:
 
     def serve(self, port: int, fingerprint: bytes) -> None:
         """Start the policy that starts with the robot, once the robot can be reached."""
-        host = self._plan.host
         self._robot = {
             "name": self._plan.card.robot,
-            "address": str(Address("127.0.0.1" if host in _EVERYWHERE else host, port)),
+            "address": str(address_here(self._plan.host, port)),
             "key": Path(self._plan.key_file).read_text().strip() if self._plan.key_file else "",
             "fingerprint": fingerprint.hex() if fingerprint else "insecure",
         }
-        if self._plan.policy and (refusal := self.run(self._plan.policy)):
-            _log.warning("%s", refusal)
+        if self._plan.policy:
+            try:
+                self.run(self._plan.policy)
+            except Declined as error:
+                _log.warning("%s", error)
 
     def state(self) -> PolicyState:
         """Return the message that describes the policies."""
         names = policies_in(Path(self._plan.policies)) if self._plan.policies else []
         return PolicyState(names=tuple(names), running=self._running, text=self._text)
 
-    def run(self, name: str) -> str:
-        """Start a policy instead of the running one, or end the running one.
-
-        Returns:
-            The reason why it is refused, a sentence; "" if it is not.
-        """
+    def run(self, name: str) -> None:
+        """Start a policy instead of the running one, or end the running one."""
         if not self._plan.policies:
-            return "This robot has no policies on board: serve it with --policy."
+            raise Declined("This robot has no policies on board: serve it with --policy.")
         names = policies_in(Path(self._plan.policies))
         if name and name not in names:
-            return str(UnknownName("policy on board", name, names))
+            raise Declined(str(UnknownName("policy on board", name, names)))
         if name == self._running:
-            return f"{name} runs already." if name else "No policy runs."
+            raise Declined(f"{name} runs already." if name else "No policy runs.")
         before = self._task
         self._task = asyncio.get_running_loop().create_task(self._supervise(before, name))
-        return ""
 
     async def close(self) -> None:
         """End the policy that runs."""

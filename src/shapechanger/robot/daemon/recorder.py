@@ -19,7 +19,7 @@ from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.client import Client, Sent
+from shapechanger.robot.daemon.client import Client, Declined, Sent
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.card import RobotCard
@@ -31,7 +31,6 @@ DISK_TOO_SLOW: Final = "The disk is too slow: recording ended, and the steps so 
 _MAX_JOBS: Final = 256  # Over ten seconds of steps at 20 Hz: memory cards pause for seconds.
 _MAX_BYTES: Final = 16 << 20  # Bytes of queued frames.
 _CLOSE_S: Final = 5.0
-_NOT_RECORDING: Final = "Nothing is being recorded."
 
 # Facts of the card that an episode keeps, under the same names.
 _SHARED: Final = tuple(f.name for f in fields(EpisodeHeader) if hasattr(RobotCard, f.name))
@@ -50,9 +49,7 @@ class _Decided(NamedTuple):
 class Worker:
     """Thread that does one job after another; a disk that hangs keeps no process alive.
 
-    Args:
-        name: Name of the thread.
-        call: Calls a function in the event loop's thread.
+    `call` calls a function in the event loop's thread.
     """
 
     def __init__(self, name: str, call: Callable[[Callable[[], None]], None]) -> None:
@@ -66,11 +63,11 @@ class Worker:
             self._thread.start()
         self._jobs.put(lambda: partial(then, job()))
 
-    def close(self, at_most_s: float) -> None:
+    def close(self) -> None:
         """End the thread after the jobs so far, and wait for it, up to a limit."""
         if self._thread.ident is not None:
             self._jobs.put(None)
-            self._thread.join(at_most_s)
+            self._thread.join(_CLOSE_S)
 
     def _run(self) -> None:
         while (job := self._jobs.get()) is not None:
@@ -78,20 +75,14 @@ class Worker:
 
 
 class _Episode:
-    """An episode, which the recorder's thread writes; a full one goes on in the next.
-
-    Attributes:
-        starter: The client that began it.
-        progress: Its newest state that the event loop knows; the text is an error that ended it.
-        jobs: Number of jobs that wait for the disk.
-        bytes: Size of their frames, bytes.
-    """
+    """An episode, which the recorder's thread writes; a full one goes on in the next."""
 
     def __init__(self, folder: Path, header: EpisodeHeader, starter: Client) -> None:
         self.starter = starter
+        # Of the event loop: the newest state it knows, whose text is an error that ended the
+        # episode; and how many jobs wait for the disk, with how many bytes of frames.
         self.progress = messages.RecorderState()
-        self.jobs = 0
-        self.bytes = 0
+        self.jobs = self.bytes = 0
         self._trouble = ""
         self._create = partial(EpisodeWriter.create, folder, header)
         self._writer: EpisodeWriter | None = None
@@ -207,13 +198,11 @@ class Recorder:
         )
         self._decided = self._newest = _Decided(client, sent, step)
 
-    def begin(self, client: Client, name: str, driver: str) -> str:
-        """Begin an episode, and return the reason for a refusal, or ""."""
-        if not self._plan.recordings:
-            return "This robot was served without a folder for recordings."
+    def begin(self, client: Client, name: str, driver: str) -> None:
+        """Begin an episode."""
         if self.on:
             begun = self.state().episode or "it starts now"
-            return f"An episode is being recorded already: {begun}."
+            raise Declined(f"An episode is being recorded already: {begun}.")
         header = EpisodeHeader(
             **{name: getattr(self._plan.card, name) for name in _SHARED},
             driver=driver or client.name,
@@ -224,25 +213,14 @@ class Recorder:
         self.on, self._text = True, ""
         self._decided = self._newest = self._frame = None
         self._put(self._episode, lambda _: None)
-        return ""
 
-    def end(self, text: str = "") -> str:
-        """End the episode, and return the reason for a refusal, or ""."""
-        self._complete()
-        if self._episode is None or not self.on:
-            return _NOT_RECORDING
-        self._stop(self._episode, text)
-        return ""
+    def end(self, text: str = "") -> None:
+        """End the episode."""
+        self._stop(self._recorded(), text)
 
-    def edit(self, request: messages.Mark | messages.Undo, client: Client) -> str:
-        """Mark the newest step, or drop the newest ones, after the pending step.
-
-        Returns:
-            The reason for a refusal, or "".
-        """
-        self._complete()
-        if self._episode is None or not self.on:
-            return _NOT_RECORDING
+    def edit(self, request: messages.Mark | messages.Undo, client: Client) -> None:
+        """Mark the newest step, or drop the newest ones, after the pending step."""
+        episode = self._recorded()
 
         def write(writer: EpisodeWriter) -> str:
             if isinstance(request, messages.Undo):
@@ -258,8 +236,7 @@ class Recorder:
             else:
                 self._broadcast(self.state())
 
-        self._put(self._episode, write, answer)
-        return ""
+        self._put(episode, write, answer)
 
     def tick(self) -> None:
         """Report the state to all clients while recording; called once a second."""
@@ -268,8 +245,16 @@ class Recorder:
 
     def close(self) -> None:
         """End the episode, and wait for the disk, up to a limit."""
-        self.end()
-        self._worker.close(_CLOSE_S)
+        if self.on:
+            self.end()
+        self._worker.close()
+
+    def _recorded(self) -> _Episode:
+        """Complete the pending step of the episode that is being recorded, and return it."""
+        if self._episode is None or not self.on:
+            raise Declined("Nothing is being recorded.")
+        self._complete()
+        return self._episode
 
     def _complete(self) -> None:
         """Write the pending step, if there is one, with the outputs known so far."""

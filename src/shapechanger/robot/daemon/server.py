@@ -57,8 +57,7 @@ class Listener:
         self._timeout_s = timeout_s
         self._sockets = contextlib.ExitStack()
         self._tasks: list[asyncio.Task[None]] = []
-        # Oldest first.
-        self._waiting: dict[Hashable, tuple[AcceptedSocket, asyncio.TimerHandle]] = {}
+        self._waiting: dict[Hashable, AcceptedSocket] = {}  # Oldest first.
 
     async def start(self, host: str, port: int) -> int:
         """Start listening, and return the port."""
@@ -89,38 +88,42 @@ class Listener:
 
     def add(self, key: Hashable, connection: AcceptedSocket) -> None:
         """Add a connection, and drop another one if there are too many."""
-        for other in [k for k, (known, _) in self._waiting.items() if known.is_gone]:
+        for other in [k for k, known in self._waiting.items() if known.is_gone]:
             self.remove(other)
-        here = [k for k, (c, _) in self._waiting.items() if c.address == connection.address]
+        here = [k for k, c in self._waiting.items() if c.address == connection.address]
         if len(here) >= self._max_per_address:
             self._drop(here[0])
         elif len(self._waiting) >= self._max_total:
             self.drop_one()
-        timer = asyncio.get_running_loop().call_later(self._timeout_s, self._drop, key)
-        self._waiting[key] = connection, timer
+        loop = asyncio.get_running_loop()
+        connection.timer = loop.call_later(self._timeout_s, self._drop, key)
+        self._waiting[key] = connection
 
     def renew(self, key: Hashable) -> None:
         """Restart the timeout after a request was served; the connection becomes the youngest."""
-        if key in self._waiting:
-            connection, _ = self._waiting[key]
-            self.remove(key)
+        if connection := self.remove(key):
             self.add(key, connection)
 
     def stop_timer(self, key: Hashable) -> None:
         """End the timeout of a connection that opened the link, whose hello has its own limit."""
-        if key in self._waiting:
-            self._waiting[key][1].cancel()
+        if connection := self._waiting.get(key):
+            connection.timer.cancel()
 
-    def remove(self, key: Hashable) -> None:
-        """Forget a connection that has authenticated or ended."""
-        if key in self._waiting:
-            self._waiting.pop(key)[1].cancel()
+    def remove(self, key: Hashable) -> AcceptedSocket | None:
+        """Forget a connection that has authenticated or ended, and return it if it was here."""
+        if connection := self._waiting.pop(key, None):
+            connection.timer.cancel()
+        return connection
 
     def drop_one(self) -> None:
         """Drop the oldest connection of the address that has the most."""
-        counts = Counter(connection.address for connection, _ in self._waiting.values())
+        counts = Counter(connection.address for connection in self._waiting.values())
         if self._waiting:  # Of keys with equal counts, the first one is the oldest.
-            self._drop(max(self._waiting, key=lambda key: counts[self._waiting[key][0].address]))
+            self._drop(max(self._waiting, key=lambda key: counts[self._waiting[key].address]))
+
+    def _drop(self, key: Hashable) -> None:
+        if connection := self.remove(key):
+            connection.drop()
 
     async def _accept(self, listening: socket.socket) -> None:
         listening.setblocking(False)
@@ -141,14 +144,11 @@ class Listener:
             self.add(protocol, AcceptedSocket(accepted, address[0], protocol, self._tls))
             await asyncio.sleep(0)  # Let the connected clients run, however many arrive.
 
-    def _drop(self, key: Hashable) -> None:
-        connection, _ = self._waiting[key]
-        self.remove(key)
-        connection.drop()
-
 
 class AcceptedSocket:
     """A connection from its acceptance on, through the TLS handshake."""
+
+    timer: asyncio.TimerHandle  # It drops the connection.
 
     def __init__(
         self,
@@ -202,8 +202,6 @@ _HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
-
-_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
@@ -269,7 +267,9 @@ class Server:
         return server()
 
     @web.middleware
-    async def _renew_timeout(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+    async def _renew_timeout(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
         response = await handler(request)
         # A slow radio loads the files of the console one by one.
         self._listener.renew(request.protocol)

@@ -17,7 +17,7 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from shapechanger.errors import LinkError, RobotRefused, ShapechangerError, translate_errors
-from shapechanger.robot.daemon.client import NOT_READING, Client, Sent
+from shapechanger.robot.daemon.client import NOT_READING, Client, Declined, Sent
 from shapechanger.robot.daemon.credentials import Authenticator
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.library import Answer
@@ -49,6 +49,10 @@ _WRONG_KEY_S: Final = 0.5
 # frame. It is worth waiting for a frame that is a little late: an observation without it would use
 # up the client's credit.
 _FRAME_PACE: Final = 1.25
+
+
+_BY_PERSONS: Final = (messages.Record, messages.Mark, messages.Undo, messages.Judge)
+_OF_RECORDINGS: Final = (*_BY_PERSONS, messages.Browse, messages.Fetch)
 
 
 class WrongKey(RobotRefused):
@@ -143,9 +147,18 @@ class Session:
         if self.client.expelled:
             raise LinkError(self.client.expelled)
         self._count()
+        message = messages.decode_client_message(data)
+        try:
+            self._handle(message)
+        except Declined as error:
+            is_numbered = isinstance(message, messages.Command | messages.Suggest)
+            seq = message.seq if is_numbered else None
+            self.client.post(messages.Refused(reason=str(error), seq=seq))
+
+    def _handle(self, message: messages.ClientMessage) -> None:
         hub, client = self._hub, self.client
-        match messages.decode_client_message(data):
-            case messages.Command() | messages.Suggest() as message:
+        match message:
+            case messages.Command() | messages.Suggest():
                 self._receive_values(message)
             case messages.Acknowledge():
                 self._give_credit()
@@ -153,43 +166,42 @@ class Session:
                 hub.take(client)
             case messages.Release():
                 hub.release(client, f"{client.name} released it")
-            case messages.Arm() as message:
+            case messages.Arm():
                 self._arm(message)
-            case messages.Disarm() if client.is_person or hub.holder is client:
-                hub.give_order(Order(kind="disarm", reason=f"{client.name} disarmed"))
             case messages.Disarm():
-                self._refuse(
-                    "Only the client in control, or a person, can disarm this robot; any client "
-                    "can stop it with an emergency stop."
-                )
-            case messages.EmergencyStop(reason=reason):
-                reason = f"{client.name}: {printable(reason) or 'stop'}"
+                if not client.is_person and hub.holder is not client:
+                    raise Declined(
+                        "Only the client in control, or a person, can disarm this robot; any "
+                        "client can stop it with an emergency stop."
+                    )
+                hub.give_order(Order(kind="disarm", reason=f"{client.name} disarmed"))
+            case messages.EmergencyStop():
+                reason = f"{client.name}: {printable(message.reason) or 'stop'}"
                 hub.give_order(Order(kind="emergency", reason=reason))
-            case messages.Ping(token=token):
-                client.post(messages.Pong(token=token, now_ns=hub.now_ns()))
-            case messages.RunPolicy() if not client.is_person:
-                self._refuse("Only a person can start a policy on this robot, or end it.")
-            case messages.RunPolicy(policy=policy):
-                self._refuse(hub.policies.run(policy))
-            case messages.Record() | messages.Mark() | messages.Undo() | messages.Judge() if (
-                not client.is_person
-            ):
-                self._refuse("Only a person can record on this robot, and judge recordings.")
+            case messages.Ping():
+                client.post(messages.Pong(token=message.token, now_ns=hub.now_ns()))
+            case messages.RunPolicy():
+                if not client.is_person:
+                    raise Declined("Only a person can start a policy on this robot, or end it.")
+                hub.policies.run(message.policy)
+            case _ if isinstance(message, _BY_PERSONS) and not client.is_person:
+                raise Declined("Only a person can record on this robot, and judge recordings.")
+            case _ if isinstance(message, _OF_RECORDINGS) and not hub.plan.recordings:
+                raise Declined("This robot was served without a folder for recordings.")
             case messages.Record(on=False):
-                self._refuse(hub.recorder.end())
-            case messages.Record(name=name):
-                self._refuse(hub.recorder.begin(client, printable(name), hub.holder_name))
-            case messages.Mark(text=text):
-                self._refuse(hub.recorder.edit(messages.Mark(text=printable(text)), client))
-            case messages.Undo() as message:
-                self._refuse(hub.recorder.edit(message, client))
-            case messages.Browse() | messages.Fetch() | messages.Judge() as message:
+                hub.recorder.end()
+            case messages.Record():
+                hub.recorder.begin(client, printable(message.name), hub.holder_name)
+            case messages.Mark():
+                hub.recorder.edit(messages.Mark(text=printable(message.text)), client)
+            case messages.Undo():
+                hub.recorder.edit(message, client)
+            case messages.Browse() | messages.Fetch() | messages.Judge():
                 # An answer may be large, so the next question waits until it has left.
                 if self._awaits_library or client.awaits(messages.Recordings, messages.Piece):
-                    self._refuse("Ask one question about recordings at a time.")
-                else:
-                    self._awaits_library = True
-                    hub.library.ask(message, self._library_answered)
+                    raise Declined("Ask one question about recordings at a time.")
+                self._awaits_library = True
+                hub.library.ask(message, self._library_answered)
             case _:
                 raise LinkError("The hello was sent already.")
 
@@ -218,84 +230,69 @@ class Session:
             raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
         self._tokens -= 1.0
 
-    def _refuse(self, reason: str, seq: int | None = None) -> None:
-        """Report a refusal, unless `reason` is empty."""
-        if reason:
-            self.client.post(messages.Refused(reason=reason, seq=seq))
-
     def _give_credit(self) -> None:
         self._credit = True
         self.client.updated.set()
 
     def _receive_values(self, message: messages.Command | messages.Suggest) -> None:
         """Handle a command, or a suggestion; both ask for the next observation."""
-        hub, kind = self._hub, type(message)
-        is_command, newest = kind is messages.Command, self._newest_seq[kind]
-        sent = self._sent_as(message.answers)
+        hub, kind, is_command = self._hub, type(message), isinstance(message, messages.Command)
+        newest = self._newest_seq[kind]
+        self._newest_seq[kind] = max(newest, message.seq)
+        self._give_credit()
         if is_command and hub.holder is not self.client:
-            refusal = "You do not have control; take it first."
-        elif not is_command and hub.holder is self.client:
-            refusal = "You have control: send a command instead of a suggestion."
-        elif message.seq <= newest:
+            raise Declined("You do not have control; take it first.")
+        if not is_command and hub.holder is self.client:
+            raise Declined("You have control: send a command instead of a suggestion.")
+        if message.seq <= newest:
             name = "Command" if is_command else "Suggestion"
-            refusal = f"{name} {message.seq} is not newer than {newest}."
-        elif refusal := self._values_refusal(message.values):
+            raise Declined(f"{name} {message.seq} is not newer than {newest}.")
+        fault = ""
+        if len(message.values) != hub.action_size:
+            fault = (
+                f"A command of this robot has {hub.action_size} values, got {len(message.values)}."
+            )
+        elif not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in message.values):
+            fault = f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
+        if fault:
             # The previous command is no longer what the client wants. A late or repeated command
             # proves nothing of that kind, and must not stop a newer one.
             if is_command:
                 hub.halt()
-        else:
-            refusal = self._age_refusal(message.answers)
-        self._newest_seq[kind] = max(newest, message.seq)
-        self._refuse(refusal, message.seq)
-        if not refusal and isinstance(message, messages.Command):
+            raise Declined(fault)
+        sent = self._answered(message.answers)
+        if isinstance(message, messages.Command):
             hub.command(self.client, message, sent)
-        elif not refusal:
+        else:
             hub.suggest(self.client, message.values)
-        self._give_credit()
 
-    def _values_refusal(self, values: tuple[float, ...]) -> str:
-        """Return the fault in the values of a command, or ""."""
-        if len(values) != self._hub.action_size:
-            return f"A command of this robot has {self._hub.action_size} values, got {len(values)}."
-        if not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in values):
-            return f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
-        return ""
-
-    def _sent_as(self, seq: int) -> Sent | None:
-        """Return the observation of a number, if it was sent recently."""
-        return next((sent for sent in self._sent if sent.observation.seq == seq), None)
-
-    def _age_refusal(self, answers: int) -> str:
-        """Return why a message that answers an observation is too late to act, or ""."""
-        sent, most_ms = self._sent_as(answers), self._hub.plan.card.max_observation_age_ms
+    def _answered(self, seq: int, result: str = "") -> Sent:
+        """Return the observation that a message answers, unless it is too late to act on it."""
+        sent = next((sent for sent in self._sent if sent.observation.seq == seq), None)
         if sent is None:
-            return f"Observation {answers} was not sent to this client recently."
+            raise Declined(f"{result}Observation {seq} was not sent to this client recently.")
         age_ms = (self._hub.now_ns() - sent.observation.sent_ns) / _NS_PER_MS
+        most_ms = self._hub.plan.card.max_observation_age_ms
         if age_ms > most_ms:
-            return (
-                f"Observation {answers} was sent {age_ms:.0f} ms ago; "
+            raise Declined(
+                f"{result}Observation {seq} was sent {age_ms:.0f} ms ago; "
                 f"at most {most_ms} ms are allowed."
             )
-        return ""
+        return sent
 
     def _arm(self, arm: messages.Arm) -> None:
         hub, person = self._hub, self.client.is_person
-        refusal = ""
         if hub.holder is None:
-            refusal = "No client has control; take control first."
-        elif not person and hub.plan.card.arming != "anyone":
-            refusal = "Only a person can arm this robot."
-        elif not person and hub.state.emergency:
-            refusal = "Only a person can end an emergency stop."
-        elif not person and hub.holder is not self.client:
-            refusal = "Only the client in control, or a person, can arm this robot."
-        elif late := self._age_refusal(arm.answers):
-            refusal = f"Not armed. {late}"
-        self._refuse(refusal)
-        if not refusal:
-            # The guard knows every emergency stop; this process only those reported to it.
-            hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
+            raise Declined("No client has control; take control first.")
+        if not person and hub.plan.card.arming != "anyone":
+            raise Declined("Only a person can arm this robot.")
+        if not person and hub.state.emergency:
+            raise Declined("Only a person can end an emergency stop.")
+        if not person and hub.holder is not self.client:
+            raise Declined("Only the client in control, or a person, can arm this robot.")
+        self._answered(arm.answers, "Not armed. ")
+        # The guard knows every emergency stop; this process only those reported to it.
+        hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _library_answered(self, answer: Answer) -> None:
         self._awaits_library = False

@@ -67,6 +67,11 @@ def is_loopback(host: str) -> bool:
     return host == "localhost" if ip is None else ip.is_loopback
 
 
+def address_here(host: str, port: int) -> Address:
+    """Return the address at which this machine reaches a server that listens at `host`."""
+    return Address("127.0.0.1" if host in {"", "0.0.0.0", "::"} else host, port)
+
+
 def cannot_listen(host: str, port: int, error: OSError) -> RobotError:
     """Return the error of a robot that cannot be served at an address."""
     # Python adds the address to the text of the system; the numbers of the resolver are negative.
