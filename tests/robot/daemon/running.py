@@ -17,8 +17,8 @@ import msgspec
 import pytest
 
 from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon import camera as daemon_camera
 from shapechanger.robot.daemon import process
-from shapechanger.robot.daemon.camera import FrameReader
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.link.authentication import fingerprint_of, make_proof
@@ -194,8 +194,7 @@ async def running(
     """Run a daemon with a fake guard and a fake camera."""
     clock = Clock() if clock is None else clock
     camera = FakeCamera()
-    reader = lambda *arguments: FrameReader(*arguments, opener=camera.open)  # noqa: E731
-    monkeypatch.setattr(process, "FrameReader", reader)
+    monkeypatch.setattr(daemon_camera, "open_camera", camera.open)
     guard = FakeGuard(clock.now_ns)
     if plan.card.clock == "real":
         guard.attach()

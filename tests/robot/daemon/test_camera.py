@@ -9,6 +9,7 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.daemon import camera as daemon_camera
 from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from tests.robot.daemon.fakes import FakeCamera
 from tests.robot.daemon.plans import SIZE, picture
@@ -19,13 +20,13 @@ NOW_NS = 10_000_000_000
 class Watched:
     """A reader of a fake camera, with the frames and reports that it delivered."""
 
-    def __init__(self, camera: FakeCamera) -> None:
+    def __init__(self) -> None:
         self.frames: list[Frame] = []
         self.reports: list[str] = []
         self._changed = threading.Condition()
         checks = FrameChecks(lambda: NOW_NS)
         plan = CameraPlan("pattern", SIZE, fps=500.0)
-        self.reader = FrameReader(plan, checks, self._frame, self._report, camera.open)
+        self.reader = FrameReader(plan, checks, self._frame, self._report)
 
     def until(self, condition: Callable[[], bool]) -> None:
         """Wait for a condition."""
@@ -44,14 +45,16 @@ class Watched:
 
 
 @pytest.fixture
-def camera() -> FakeCamera:
-    return FakeCamera()
+def camera(monkeypatch: pytest.MonkeyPatch) -> FakeCamera:
+    camera = FakeCamera()
+    monkeypatch.setattr(daemon_camera, "open_camera", lambda plan: camera.open(plan))
+    return camera
 
 
 @pytest.fixture
 def watched(camera: FakeCamera) -> Iterator[Watched]:
     """A reader of the fake camera."""
-    watched = Watched(camera)
+    watched = Watched()
     yield watched
     watched.reader.close()
 
@@ -105,7 +108,7 @@ def test_a_camera_that_fails_is_opened_again(
     camera.put(Frame(picture(1), 1))
     camera.fail("The camera was unplugged.")
     camera.put(Frame(picture(2), 2))
-    watched = Watched(camera)
+    watched = Watched()
     watched.until(lambda: len(watched.frames) == 2 and len(watched.reports) == 4)
     again = "The camera works again."
     assert watched.reports == ["No camera is connected.", again, "The camera was unplugged.", again]

@@ -68,7 +68,8 @@ def one(
     folder: Path, plan: DaemonPlan, runner: asyncio.Runner, said: list[PolicyState]
 ) -> Iterator[PolicyRunner]:
     """Policies on board of a robot that can be reached."""
-    one = PolicyRunner(plan, said.append, _COMMAND)
+    one = PolicyRunner(plan, said.append)
+    one._command = _COMMAND
 
     async def serve() -> None:
         one.serve(5000, b"\x01" * 32)

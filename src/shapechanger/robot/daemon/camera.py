@@ -60,13 +60,11 @@ class FrameReader:
         checks: FrameChecks,
         deliver: Callable[[Frame], None],
         report: Callable[[str], None],
-        opener: Callable[[CameraPlan], Camera] = open_camera,
     ) -> None:
         self._plan = plan
         self._checks = checks
         self._deliver = deliver
         self._report = report
-        self._open = opener
         self._trouble = ""
         self._skips = False
         self._end = threading.Event()
@@ -93,7 +91,7 @@ class FrameReader:
         """Open the camera and read it until it fails. Return True if there was a valid frame."""
         good, bad = False, 0
         try:
-            with closing(self._open(self._plan)) as camera:
+            with closing(open_camera(self._plan)) as camera:
                 self._camera = camera
                 while not self._end.is_set() and bad < _BAD_UNTIL_REOPENED:
                     frame = camera.read()

@@ -54,15 +54,10 @@ def policies_in(folder: Path) -> list[str]:
 class PolicyRunner:
     """Runs at most one policy of a folder."""
 
-    def __init__(
-        self,
-        plan: DaemonPlan,
-        post: Callable[[PolicyState], None],
-        command: Sequence[str] = (),
-    ) -> None:
+    def __init__(self, plan: DaemonPlan, post: Callable[[PolicyState], None]) -> None:
         self._plan = plan
         self._post = post
-        self._command = command or (sys.executable, "-P", "-m", plan.pilot)
+        self._command: Sequence[str] = (sys.executable, "-P", "-m", plan.pilot)
         self._robot: dict[str, str] = {}
         self._running = ""
         self._text = ""

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import msgspec
 
@@ -87,15 +87,15 @@ class _Episode:
         self._create = partial(EpisodeWriter.create, folder, header)
         self._writer: EpisodeWriter | None = None
 
-    def attempt(
-        self, job: Callable[[EpisodeWriter], object]
-    ) -> tuple[object, messages.RecorderState]:
-        """Do a job unless there was an error, and return its result and the episode's state."""
-        result = None
+    def attempt(self, job: Callable[[EpisodeWriter], object]) -> tuple[str, messages.RecorderState]:
+        """Do a job unless there was an error. Return why it is declined, and the state then."""
+        declined = ""
         try:
             if not self._trouble:
                 self._writer = self._writer or self._create()
-                result = job(self._writer)
+                job(self._writer)
+        except Declined as error:
+            declined = str(error)
         except Exception as error:  # Whatever it is, the robot drives on.
             is_ours = isinstance(error, ShapechangerError)
             self._trouble = str(error) if is_ours else f"Recording failed: {error!r}."
@@ -105,8 +105,8 @@ class _Episode:
                 if self._writer is not None:
                     self._writer.close(self._trouble)
         if (writer := self._writer) is None:
-            return result, messages.RecorderState(text=self._trouble)
-        return result, messages.RecorderState(
+            return declined, messages.RecorderState(text=self._trouble)
+        return declined, messages.RecorderState(
             text=self._trouble,
             episode=writer.path.name,
             steps=writer.steps,
@@ -220,23 +220,17 @@ class Recorder:
 
     def edit(self, request: messages.Mark | messages.Undo, client: Client) -> None:
         """Mark the newest step, or drop the newest ones, after the pending step."""
-        episode = self._recorded()
 
-        def write(writer: EpisodeWriter) -> str:
+        def write(writer: EpisodeWriter) -> None:
             if isinstance(request, messages.Undo):
-                return "" if writer.undo(request.seconds) else "There is nothing to undo."
-            if not writer.steps:
-                return "There is no step to mark yet."
-            writer.mark(request.text)
-            return ""
-
-        def answer(refusal: str) -> None:
-            if refusal:
-                client.post(messages.Refused(reason=refusal))
+                if not writer.undo(request.seconds):
+                    raise Declined("There is nothing to undo.")
+            elif not writer.steps:
+                raise Declined("There is no step to mark yet.")
             else:
-                self._broadcast(self.state())
+                writer.mark(request.text)
 
-        self._put(episode, write, answer)
+        self._put(self._recorded(), write, reports=True, client=client)
 
     def tick(self) -> None:
         """Report the state to all clients while recording; called once a second."""
@@ -279,34 +273,34 @@ class Recorder:
     def _stop(self, episode: _Episode, outcome: str) -> None:
         self.on, self._decided = False, None
         self._text = self._text or outcome
-        self._put(
-            episode,
-            lambda writer: writer.close(outcome),
-            lambda _: self._broadcast(self.state()),
-        )
+        self._put(episode, lambda writer: writer.close(outcome), reports=True)
 
     def _put(
         self,
         episode: _Episode,
-        job: Callable[[EpisodeWriter], _T],
-        then: Callable[[_T], None] = lambda _: None,
+        job: Callable[[EpisodeWriter], object],
+        *,
         size: int = 0,
+        reports: bool = False,
+        client: Client | None = None,
     ) -> None:
-        """Let the thread do a job with a frame of a size, and call a function with its result."""
+        """Let the thread do a job with a frame of a size; report the new state, or a refusal."""
         episode.jobs += 1
         episode.bytes += size
 
-        def done(result: tuple[Any, messages.RecorderState]) -> None:
+        def done(result: tuple[str, messages.RecorderState]) -> None:
             episode.jobs -= 1
             episode.bytes -= size
-            before, episode.progress = episode.progress, result[1]
-            now = episode.progress
-            if not now.text:
-                then(result[0])
-            elif not before.text:
+            before, (declined, now) = episode.progress, result
+            episode.progress = now
+            if now.text and not before.text:
                 _log.warning("Recorder: %s", now.text)
                 if not now.episode:  # It could not even begin.
                     episode.starter.post(messages.Refused(reason=now.text))
+            elif declined and client is not None:
+                client.post(messages.Refused(reason=declined))
+            elif reports and not now.text:
+                self._broadcast(self.state())
             is_news = (before.episode, before.text) != (now.episode, now.text)
             if is_news and episode is self._episode:
                 self.on = self.on and not now.text
