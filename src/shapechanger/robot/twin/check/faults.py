@@ -59,12 +59,14 @@ class BadNetwork:
 
     def reset(self) -> None:
         """Reset all connections, as a router does after a restart."""
-        for end in self._ends:
-            if not end.is_closing():
-                # Lingers for 0 s, so that closing sends a reset instead of an orderly end.
-                option = (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                end.get_extra_info("socket").setsockopt(*option)
-                self._loop.call_soon_threadsafe(end.transport.abort)
+        ends = [end for end in self._ends if not end.is_closing()]
+        # All linger for 0 s before one closes, which closes the other end of its connection, so
+        # that each sends a reset instead of an orderly end.
+        option = (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        for end in ends:
+            end.get_extra_info("socket").setsockopt(*option)
+        for end in ends:
+            self._loop.call_soon_threadsafe(end.transport.abort)
 
     def half_close(self) -> None:
         """End the direction towards the robot of all connections."""
