@@ -11,7 +11,7 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS, OutputDriver, SensorDriver
-from shapechanger.robot.drivers.servos.registers import ServoPort
+from shapechanger.robot.drivers.servos.servo import ServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Clock
 

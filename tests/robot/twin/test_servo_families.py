@@ -108,7 +108,7 @@ def test_commands_move_the_finger(bench: _Bench, family: str) -> None:
     assert bench.state("FDP/length") < -0.008
     assert bench.state("FDS/length") < -0.005
     assert bench.seen.action_applied == pytest.approx(_FLEX)
-    friction = bench.rig.servo("FDP").motor._model.gears.friction_nm / 0.010
+    friction = bench.rig.servo("FDP").motor._model.friction_nm / 0.010
     most = 15.0 if family == "Dynamixel" else 25.0
     assert max(bench.rig.tensions().values()) < most + 2.0 * friction
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import Any, Final, Literal
 
@@ -15,7 +15,7 @@ from shapechanger.errors import RobotError, translate_errors
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, As5600
 from shapechanger.robot.drivers.chip import OUTPUTS, KeyMistake
 from shapechanger.robot.drivers.pulse import pulsed_keys
-from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
+from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.settings import DRIVER, BusSettings, bus_settings
 from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
@@ -128,23 +128,22 @@ def require_homing(settings: BusSettings) -> None:
     Its servo would stand still at once, with its tendon slack.
     """
     for servo in settings.servos:
-        gears, pull = servo.known.gears, servo.homing_n
-        friction = gears.friction_nm / servo.spool_radius_m
-        if gears.is_measured and pull <= friction:
+        pull, friction = servo.homing_n, servo.known.friction_nm / servo.spool_radius_m
+        if servo.known.is_measured and pull <= friction:
             raise RobotError(
                 f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
                 f"about {friction:.1f} N. Set homing_n, to {1.5 * friction:.1f} N for example."
             )
 
 
-def home(settings: BusSettings, cycle: Callable[[Mapping[str, float]], BusState]) -> dict[str, int]:
+def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
     """Pull all tendons of a held bus until nothing moves, so that they hold a known posture.
 
     Slack tendons are taken up meanwhile.
 
     Args:
-        settings: The bus.
-        cycle: Sends the tension of each tendon, N, and returns the state of the bus.
+        bus: The bus.
+        cycle: Sends what its servos are requested to pull, runs a cycle, and returns its time, ns.
 
     Returns:
         Position of each servo at the zero of its tendon, in counts, by name.
@@ -152,31 +151,33 @@ def home(settings: BusSettings, cycle: Callable[[Mapping[str, float]], BusState]
     Raises:
         RobotError: If a servo fails, or winds in too far or for too long.
     """
-    tensions = {servo.name: servo.homing_n for servo in settings.servos}
+    servos = {one.settings.name: one for one in bus.servos.values()}
     starts: dict[str, int] = {}
-    zeros: dict[str, int] = {}
     moved: dict[str, tuple[int, int]] = {}  # Position and time at which each last moved.
     began_ns: int | None = None
+    for one in servos.values():
+        one.request(one.settings.homing_n)
     while True:
-        state = cycle(tensions)
-        if state.faults:
-            raise RobotError(f"No zero: {state.reason}")
-        began_ns = state.at_ns if began_ns is None else began_ns
-        for servo in (one for one in settings.servos if one.name in state.servos):
-            name, at = servo.name, state.servos[servo.name].position
-            zeros[name] = at
+        now_ns = cycle()
+        if bus.reason:
+            raise RobotError(f"No zero: {bus.reason}")
+        began_ns = now_ns if began_ns is None else began_ns
+        for name, one in servos.items():
+            if one.missed:
+                continue
+            servo, at = one.settings, one.position
             wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
             if wound_m > _TRAVEL_M:
                 reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
                 raise RobotError(f"{servo.words} has no zero: {reason}. Its tendon has come off.")
-            was_at, _ = moved.setdefault(name, (at, state.at_ns))
+            was_at, _ = moved.setdefault(name, (at, now_ns))
             if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
-                moved[name] = at, state.at_ns
-        still_ns = state.at_ns - _STILL_MS * 1_000_000
-        moving = [name for name in tensions if name not in moved or moved[name][1] > still_ns]
+                moved[name] = at, now_ns
+        still_ns = now_ns - _STILL_MS * 1_000_000
+        moving = [name for name in servos if name not in moved or moved[name][1] > still_ns]
         if not moving:
-            return zeros
-        if state.at_ns - began_ns > _WITHIN_MS * 1_000_000:
+            return {name: one.position for name, one in servos.items()}
+        if now_ns - began_ns > _WITHIN_MS * 1_000_000:
             names = ", ".join(moving)
             raise RobotError(f"No zero: {names} still moved after {_WITHIN_MS / 1e3:g} s.")
 
@@ -199,12 +200,13 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
         closing(ServoBus(settings, hardware)) as bus,
     ):
 
-        def cycle(tensions: Mapping[str, float]) -> BusState:
+        def cycle() -> int:
             switches.toggle()
-            bus.send(tensions)
-            state = bus.cycle(hardware.clock.now_ns())
+            bus.flush(grip=False)
+            now_ns = hardware.clock.now_ns()
+            bus.cycle(now_ns)
             wait()
-            return state
+            return now_ns
 
         for _ in range(_START_TICKS if plan.enable_pin is not None else 0):
             switches.toggle()
@@ -212,4 +214,4 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
         bus.open()
         bus.set_up(switches.toggle)
         bus.hold()
-        return home(settings, cycle)
+        return home(bus, cycle)

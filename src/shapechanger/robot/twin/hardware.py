@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from shapechanger.errors import translate_errors
-from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Clock, Hardware
 from shapechanger.robot.twin.rpc import (

@@ -18,7 +18,7 @@ from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
-from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
 from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.drivers.simulation import (

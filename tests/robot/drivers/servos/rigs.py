@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from dynamixel_sdk import PortHandler
 from msgspec.structs import replace
 
-from shapechanger.robot.drivers.servos.bus import BusState, ServoBus
+from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.serial_port import SerialServoPort
+from shapechanger.robot.drivers.servos.servo import TendonServo
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 from shapechanger.robot.drivers.servos.simulation import Rig as Line
 from shapechanger.robot.drivers.servos.simulation import SimulatedServo
@@ -57,34 +57,29 @@ def of(family: str, **changes: Any) -> BusSettings:
     return settings(servos=tuple(make(name) for name in NAMES), **changes)
 
 
-class FaultyPort(PortHandler):
+class FaultyPort(SerialServoPort):
     """A port of the SDK at a simulated bus, without real time.
 
-    An answer that is late or missing counts as timed out as soon as the SDK asks.
-
-    Attributes:
-        is_cut: Whether the cable is cut: bytes arrive nowhere.
-        is_gone: Whether the device is gone: every use raises OSError.
-        is_closed: Whether it was closed.
-        late_ns: Delay of the answers of a servo, by id.
-        damaged: Ids of servos whose answers are damaged.
-        sent: Packets that were written.
-        received: Number of bytes that the servos have answered.
+    An answer that is late or missing counts as timed out as soon as the SDK asks. Every use of a
+    device that `is_gone` raises OSError.
     """
 
-    def __init__(self, line: Line) -> None:
-        super().__init__("the twin")
+    def __init__(self, settings: BusSettings, line: Line) -> None:
+        super().__init__(settings)
         self._line = line
         self._arrived = bytearray()
         self._late: list[tuple[int, bytes]] = []
-        self.is_cut = self.is_gone = self.is_closed = False
-        self.late_ns: dict[int, int] = {}
+        self.is_gone = self.is_closed = False
+        self.late_ns: dict[int, int] = {}  # By id, as are the damaged ones.
         self.damaged: set[int] = set()
         self.sent: list[bytes] = []
         self.received = 0
 
     def inject(self, data: bytes) -> None:
         self._arrived += data
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        return True
 
     def clearPort(self) -> None:
         self.getBytesAvailable()
@@ -93,14 +88,13 @@ class FaultyPort(PortHandler):
     def writePort(self, packet: Sequence[int]) -> int:
         self.getBytesAvailable()
         self.sent.append(bytes(packet))
-        if not self.is_cut:
-            for servo_id, answer in wire.execute(self._line, bytes(packet)).items():
-                if servo_id in self.late_ns:
-                    self._late.append((self._line.now_ns + self.late_ns[servo_id], answer))
-                    break  # Later servos wait for this one.
-                damage = 0x55 if servo_id in self.damaged else 0
-                self._arrived += answer[:-1] + bytes([answer[-1] ^ damage])
-                self.received += len(answer)
+        for servo_id, answer in wire.execute(self._line, bytes(packet)).items():
+            if servo_id in self.late_ns:
+                self._late.append((self._line.now_ns + self.late_ns[servo_id], answer))
+                break  # Later servos wait for this one.
+            damage = 0x55 if servo_id in self.damaged else 0
+            self._arrived += answer[:-1] + bytes([answer[-1] ^ damage])
+            self.received += len(answer)
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
@@ -109,15 +103,10 @@ class FaultyPort(PortHandler):
         del self._arrived[: max(length, 0)]
         return data
 
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Do nothing: answers take no time."""
-
     def isPacketTimeout(self) -> bool:
-        """Return whether nothing is left to read."""
         return not self.getBytesAvailable()
 
     def getBytesAvailable(self) -> int:
-        """Return the number of bytes that have arrived."""
         if self.is_gone:
             raise OSError(5, "Input/output error")
         due = [one for one in self._late if one[0] <= self._line.now_ns]
@@ -135,56 +124,68 @@ def line(*servos: ServoSettings) -> Line:
 
 
 class Rig(FakeHardware):
-    """A simulated bus, its port and its driver on one clock.
+    """A simulated bus, its port and its driver on one clock."""
 
-    Args:
-        bus: Settings of the bus.
-        wired: Servos that are on the bus; None for those of the settings.
-    """
-
-    def __init__(
-        self, bus: BusSettings | None = None, wired: Sequence[ServoSettings] | None = None
-    ) -> None:
+    def __init__(self, bus: BusSettings | None = None) -> None:
         super().__init__()
         self.settings = settings() if bus is None else bus
         # Anywhere: each servo is some turns away from its position 0.
-        there = [replace(one, zero=1304 * one.id) for one in wired or self.settings.servos]
-        self.line = line(*there)
-        self.port = FaultyPort(self.line)
+        self.line = line(*(replace(one, zero=1304 * one.id) for one in self.settings.servos))
+        self.port = FaultyPort(self.settings, self.line)
         self.bus = ServoBus(self.settings, self)
         self.bus.open()
 
-    def servo_port(self, settings: BusSettings, open_port: object) -> SerialServoPort:
-        return SerialServoPort(self.port, settings.device, settings.family)
+    def servo_port(self, settings: BusSettings, open_port: object) -> FaultyPort:
+        return self.port
 
-    def position(self, name: str) -> int:
-        """Return the present position in the registers of a servo, counts."""
-        return self.twin(name).register(self.settings.family.position.address)
-
-    def start(self) -> Rig:
-        """Set up and hold the bus, with zeros at the present positions."""
-        self.bus.set_up()
-        self.bus.set_zeros({name: self.position(name) for name in NAMES})
-        self.bus.hold()
-        return self
+    def one(self, name: str) -> TendonServo:
+        """Return the servo of a tendon as the driver has it."""
+        return self.bus.servos[NAMES.index(name) + 1]
 
     def twin(self, name: str) -> SimulatedServo:
         """Return the simulated servo of a tendon."""
         return self.line.servos[NAMES.index(name) + 1]
 
-    def run(self, tension: float | None, cycles: int = 1, **others: float) -> BusState:
-        """Command one tension for all tendons, except `others`, and return the last state."""
+    def prepare(self) -> Rig:
+        """Set up and hold the bus, without zeros."""
+        self.bus.set_up()
+        self.bus.hold()
+        return self
+
+    def start(self) -> Rig:
+        """Set up and hold the bus, with zeros at the present positions."""
+        self.prepare()
+        for one in self.bus.servos.values():
+            one.zero = one.read("position")
+        return self
+
+    def run(
+        self, tension: float | None, cycles: int = 1, length: float | None = None, **others: float
+    ) -> dict[str, dict[str, float]]:
+        """Request a tension of all tendons but `others`, N, and return the last readings."""
         assert cycles > 0
         for _ in range(cycles):
-            if tension is not None:
-                self.bus.send(dict.fromkeys(NAMES, tension) | others)
-            state = self.bus.cycle(self.line.now_ns)
+            if tension is not None and self.bus.mode == "held":
+                for one in self.bus.servos.values():
+                    one.request(others.get(one.settings.name, tension), length)
+                self.bus.flush(grip=False)
+            seen = self.bus.cycle(self.line.now_ns)
             self.line.advance(CYCLE_NS)
-        return state
+        return seen
 
-    def cycle(self, tensions: Mapping[str, float]) -> BusState:
-        return self.run(0.0, **tensions)
+    def until(self, mode: str) -> str:
+        """Pull with 10 N until the bus has a mode, and return the faults."""
+        for _ in range(120):
+            self.run(10.0)
+            if self.bus.mode == mode:
+                return self.bus.reason
+        raise AssertionError(f"The bus never was {mode}: {self.bus.mode}")
 
     def pulls(self) -> list[float]:
         """Return the goal current in effect of each simulated servo, A."""
         return [one.pulls_a for one in self.line.servos.values()]
+
+    @property
+    def faulty(self) -> list[str]:
+        """Names of the servos with a fault."""
+        return [one.settings.name for one in self.bus.servos.values() if one.fault]

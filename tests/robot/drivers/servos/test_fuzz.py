@@ -8,13 +8,12 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.family import FAMILIES
 from tests.robot.drivers.servos.rigs import Rig, of
-from tests.robot.drivers.servos.wire import pack, status
+from tests.robot.drivers.servos.wire import FEETECH, pack, status
 
 
 def _feetech(servo_id: int, error: int, data: bytes = b"") -> bytes:
-    return status(servo_id, error, data, FAMILIES["Feetech"])
+    return status(servo_id, error, data, FEETECH)
 
 
 _ids = st.integers(0, 255)
@@ -38,29 +37,21 @@ _slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 def test_noise_never_breaks_the_driver_or_its_caps(
     family: str, noise: list[bytes], tension: float
 ) -> None:
-    rig = Rig(of(family)).start()
-    first = rig.settings.servos[0]
-    cap = first.most_counts * first.known.ampere_per_goal
-    for data in noise:
-        rig.port.inject(data)
-        state = rig.run(tension)
-        assert all(0.0 <= one <= cap for one in rig.pulls())
-        for reading in state.servos.values():
-            assert math.isfinite(reading.tension_n)
-    rig.bus.close()
-
-
-@pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
-@_slow
-@given(noise=st.lists(_noise, max_size=2))
-def test_setup_with_noise_succeeds_or_raises(family: str, noise: list[bytes]) -> None:
-    rig = Rig(of(family))
-    errors: list[str] = []
-    for data in noise:
+    """Setting up succeeds or raises a whole sentence, and no servo pulls more than its cap."""
+    rig, errors = Rig(of(family)), list[str]()
+    for data in noise[:2]:
         rig.port.inject(data)
         try:
             rig.bus.set_up()
         except RobotError as error:
             errors.append(str(error))
     assert all(one.endswith(".") for one in errors)
-    rig.bus.set_up()
+    rig.start()
+    first = rig.settings.servos[0]
+    cap = first.most_counts * first.known.ampere_per_goal
+    for data in noise:
+        rig.port.inject(data)
+        seen = rig.run(tension)
+        assert all(0.0 <= one <= cap for one in rig.pulls())
+        assert all(math.isfinite(x) for found in seen.values() for x in found.values())
+    rig.bus.close()

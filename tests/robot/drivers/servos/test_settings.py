@@ -1,15 +1,26 @@
-"""Validation of bus and servo settings."""
+"""Settings of servos and their bus, families and models, and the goals of one servo."""
 
 import math
 from collections.abc import Callable
 from typing import Any, get_args
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
 
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import KeyMistake
-from shapechanger.robot.drivers.servos.family import MODELS, ModelName
-from shapechanger.robot.drivers.servos.settings import BusSettings
+from shapechanger.robot.drivers.servos.servo import TendonServo
+from shapechanger.robot.drivers.servos.settings import (
+    MODELS,
+    BusSettings,
+    ModelName,
+    ServoFamily,
+    ServoSettings,
+)
 from tests.robot.drivers.servos.rigs import feetech, servo, settings
+from tests.robot.drivers.servos.wire import DYNAMIXEL, FEETECH
 
 
 @pytest.mark.parametrize(
@@ -21,6 +32,7 @@ from tests.robot.drivers.servos.rigs import feetech, servo, settings
         (servo, {"pretension_n": 21.0}, "must be 0.029 to 20 N, not 21 N"),
         (servo, {"pretension_n": 0.01}, "must be 0.029 to 20 N, not 0.01 N"),
         (servo, {"homing_n": 30.0}, "must be 0.029 to 20 N, not 30 N"),
+        (servo, {"control": "length", "shortest_m": 0.0}, "below longest_m, not 0 and 0 m"),
         (
             feetech,
             {"control": "tension"},
@@ -57,10 +69,145 @@ def test_what_a_bus_cannot_do_is_refused(changes: dict[str, Any], key: str, word
     assert caught.value.key == key
 
 
-def test_the_watchdog_is_on_by_default() -> None:
+def test_the_table_is_complete() -> None:
+    """A profile takes the names of `servos.toml`, and every family has the registers in use."""
+    assert get_args(ModelName) == tuple(MODELS)
+    own = [name for name, one in DYNAMIXEL.registers.items() if one.value is None]
+    assert set(own) <= set(FEETECH.registers)
     assert BusSettings(device="x", servos=(servo("FDP"),)).watchdog_ms == 100
 
 
-def test_the_models_are_those_of_the_table() -> None:
-    """A profile takes the names of `servos.toml`."""
-    assert get_args(ModelName) == tuple(MODELS)
+@pytest.mark.parametrize("family", [DYNAMIXEL, FEETECH])
+@given(value=st.integers(-32766, 32766))
+def test_encoded_values_decode_to_themselves(family: ServoFamily, value: int) -> None:
+    """Two's complement and a bit for the sign both keep the value."""
+    register = family["goal_position"]
+    assert register.decode(register.encode(value)) == value
+
+
+def test_each_hardware_error_has_a_description() -> None:
+    """Bit 1 is unused by Dynamixel; Feetech has six."""
+    assert DYNAMIXEL.error_words(0x24) == "it is overheated, it is overloaded"
+    assert DYNAMIXEL.error_words(0x02) == "it gives the unknown code 2"
+    assert FEETECH.error_words(0x12) == "its encoder fails, its angle is out of range"
+
+
+@st.composite
+def _servos(draw: st.DrawFn) -> ServoSettings:
+    model = MODELS[draw(st.sampled_from(sorted(MODELS)))]
+    radius = draw(st.floats(0.003, 0.02))
+    least = model.torque_constant * model.ampere_per_goal / radius
+    most = draw(st.floats(2 * least, model.most_counts * least))
+    return ServoSettings(
+        name="FDP",
+        id=1,
+        model=model.name,
+        spool_radius_m=radius,
+        most_tension_n=most,
+        pretension_n=draw(st.floats(least, most)),
+        homing_n=most,
+        direction=draw(st.sampled_from((1, -1))),
+        control="length" if model.family_name == "Feetech" else "tension",
+        shortest_m=-0.001,
+    )
+
+
+def _one(servo: ServoSettings) -> TendonServo:
+    made = TendonServo(servo, settings())
+    made.zero = 0
+    return made
+
+
+@given(servo=_servos(), tension=st.floats(), share=st.floats(0.0, 1.0))
+def test_goals_stay_between_zero_and_the_cap(
+    servo: ServoSettings, tension: float, share: float
+) -> None:
+    """Any finite tension maps to a goal within the cap, rounded down by less than a count."""
+    one, unit = _one(servo), servo.newton_per_goal
+    if not math.isfinite(tension):
+        for wrong in ((tension, None), (servo.pretension_n, tension)):
+            with pytest.raises(RobotError, match=r"FDP \(id 1\) cannot pull"):
+                one.request(*wrong)
+        assert (one.tension, one.length) == (servo.pretension_n, None)
+        return
+    assert abs(one.goal_of(tension)) <= servo.most_counts
+    assert abs(one.goal_of(tension)) * unit <= servo.most_tension_n * (1 + 1e-8)
+    one.request(tension)
+    assert servo.pretension_n <= one.tension <= servo.most_tension_n
+    wanted = share * servo.most_counts * unit
+    assert -1e-6 <= wanted - abs(one.goal_of(wanted)) * unit <= unit * (1 + 1e-6)
+
+
+@given(length=st.floats(-1.0, 1.0), direction=st.sampled_from((1, -1)))
+def test_a_length_is_clipped_to_its_range(length: float, direction: int) -> None:
+    """Its position winds in by the circumference of the spool per turn, in either direction."""
+    ends = {"longest_m": 0.01, "shortest_m": -0.02}
+    one = _one(servo("FDP", control="length", direction=direction, **ends))
+    one.request(5.0, length)
+    kept = min(max(length, -0.02), 0.01)
+    turns = -kept / (2 * math.pi * 0.005)
+    assert one.goal_position == pytest.approx(direction * turns * 4096, abs=0.6)
+
+
+def test_known_spools() -> None:
+    """An XL330-M288 with 5 mm pulls 0.52 N·m / 1.47 A / 5 mm / 1000 a count, 0.071 N.
+
+    A thousandth of an STS3215's 1.91 N·m is 0.382 N. docs/finger-rig.md has its numbers on 10 mm.
+    """
+    one = servo("FDP", model="XL330-M288")
+    assert one.newton_per_goal == pytest.approx(0.0708, abs=1e-4)
+    assert _one(one).goal_of(10.0) == 141
+    assert _one(replace(one, direction=-1)).goal_of(10.0) == -141
+    one = feetech("FDP")
+    assert one.newton_per_goal == pytest.approx(0.382, abs=1e-4)
+    assert (_one(one).goal_of(10.0), one.most_counts) == (26, 157)
+    assert _one(replace(one, direction=-1)).goal_of(10.0) == 26  # A limit has no sign.
+    one, radius = feetech("FDP", spool_radius_m=0.010), 0.010
+    assert one.newton_per_goal == pytest.approx(0.19, abs=5e-3)
+    assert one.known.friction_nm / radius == pytest.approx(5.0, abs=0.5)
+    assert one.known.inertia / radius**2 == pytest.approx(260.0, abs=5.0)
+    assert math.pi * radius == pytest.approx(0.031, abs=5e-4)
+
+
+_DYNAMIXEL = bytes.fromhex("ffff fdffffff 00f0ffff 00000000 00000000 3200 1f".replace(" ", ""))
+_FEETECH = bytes.fromhex("0590 0380 0000 4a 1f 00 00 00 0000 0780".replace(" ", ""))
+
+
+def test_present_values_are_signed() -> None:
+    """A velocity of -3 is FD FF FF FF, or 3 with a bit for the sign; a count of current is 7 mA.
+
+    Feetech has position, speed, load, voltage, temperature, two flags, status, and last the
+    current.
+    """
+    seen = _one(servo("FDP", direction=-1)).see(_DYNAMIXEL, 0, pulls=False)
+    assert seen["length"] == pytest.approx(-2 * math.pi * 0.005)
+    assert seen["speed"] == pytest.approx(-3 * 0.0239808 * 0.005, rel=1e-4)
+    assert seen["tension"] == pytest.approx(0.0293, rel=1e-2)
+    one = _one(feetech("FDP", direction=-1))
+    seen = one.see(_FEETECH, 0, pulls=False)
+    assert one.position == -4101
+    assert seen["speed"] == pytest.approx(-3 * 0.00153398 * 0.005, rel=1e-4)
+    assert seen["tension"] == pytest.approx(7 * 1.018, abs=0.01)
+    assert one.fault == ""
+
+
+def _see(one: TendonServo, mm_per_s: float, now_ms: int, length_mm: float = 0.0) -> str:
+    """Return the fault after a cycle in which a tendon has a length and gets longer."""
+    speed = round(-mm_per_s / 5 / DYNAMIXEL.rad_per_s)
+    position = round(length_mm * -4096 / (2 * math.pi * 5))
+    data = b"\0\0" + speed.to_bytes(4, "little", signed=True)
+    data += position.to_bytes(4, "little", signed=True) + bytes(8) + b"\x32\0\x1e"
+    one.see(data, now_ms * 1_000_000, pulls=True)
+    return one.fault
+
+
+def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
+    """70 % of the speed without load are 140 mm/s; a short flick of the finger is no snap."""
+    one = _one(servo("FDP"))
+    speeds = [(500, 0), (-150, 0), (-150, 99), (-130, 100), (-150, 110), (-150, 209)]
+    assert [_see(one, speed, at_ms) for speed, at_ms in speeds] == [""] * 6
+    assert "winds in at 150 mm/s" in _see(one, -150, 210)
+
+
+def test_a_tendon_shorter_than_the_finger_allows_is_slack_at_once() -> None:
+    assert "wound in by 61 mm" in _see(_one(servo("FDP")), 0, 0, -61)

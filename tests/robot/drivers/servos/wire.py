@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dynamixel_sdk import PacketHandler
 
-from shapechanger.robot.drivers.servos.family import FAMILIES, ServoFamily
-from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.servo import ServoReply
+from shapechanger.robot.drivers.servos.settings import FAMILIES, ServoFamily
 from shapechanger.robot.drivers.servos.simulation import Rig
 
-DYNAMIXEL = FAMILIES["Dynamixel"]
+DYNAMIXEL, FEETECH = FAMILIES["Dynamixel"], FAMILIES["Feetech"]
 _SDK = PacketHandler(2.0)
 _STATUS = 0x55
 
 
 def pack(servo_id: int, code: int, body: bytes, family: ServoFamily = DYNAMIXEL) -> bytes:
-    if family is not DYNAMIXEL:
+    if family is FEETECH:
         plain = bytes([servo_id, len(body) + 2, code]) + body
         return b"\xff\xff" + plain + bytes([~sum(plain) & 0xFF])
     size = (len(body) + 3).to_bytes(2, "little")
@@ -24,7 +24,7 @@ def pack(servo_id: int, code: int, body: bytes, family: ServoFamily = DYNAMIXEL)
 
 
 def status(servo_id: int, error: int, data: bytes = b"", family: ServoFamily = DYNAMIXEL) -> bytes:
-    if family is not DYNAMIXEL:
+    if family is FEETECH:
         return pack(servo_id, error, data, family)
     return pack(servo_id, _STATUS, bytes([error]) + data)
 
@@ -35,9 +35,7 @@ def family_of(bus: Rig) -> ServoFamily:
 
 def size_of(data: bytes | bytearray, family: ServoFamily = DYNAMIXEL) -> int:
     """Return the size of the packet at the start of `data`, once its header is there."""
-    if family is not DYNAMIXEL:
-        return 4 + data[3]
-    return 7 + int.from_bytes(data[5:7], "little")
+    return 4 + data[3] if family is FEETECH else 7 + int.from_bytes(data[5:7], "little")
 
 
 def execute(bus: Rig, packet: bytes) -> dict[int, bytes]:
@@ -46,15 +44,14 @@ def execute(bus: Rig, packet: bytes) -> dict[int, bytes]:
     A damaged packet of protocol 1.0 is ignored; the SDK makes those of 2.0.
     """
     family = family_of(bus)
-    if family is not DYNAMIXEL:
+    if family is FEETECH:
         if ~sum(packet[2:-1]) & 0xFF != packet[-1]:
             return {}
-        servo_id, code, body = packet[2], packet[4], packet[5:-1]
+        servo_id, code, body, size = packet[2], packet[4], packet[5:-1], 1
     else:
         plain = _SDK.removeStuffing(list(packet))
         end = size_of(bytes(plain[:7])) - 2
-        servo_id, code, body = plain[4], plain[7], bytes(plain[8:end])
-    size = family.address_size
+        servo_id, code, body, size = plain[4], plain[7], bytes(plain[8:end]), 2
     at, rest = int.from_bytes(body[:size], "little"), body[size:]
     length, content = int.from_bytes(rest[:size], "little"), rest[size:]
     replies: dict[int, ServoReply] = {}

@@ -1,7 +1,7 @@
 """Drivers of the tendons of a servo bus: outputs and their sensor.
 
-The sensor runs the one cycle of each tick, which reads all servos. The outputs only stage their
-tensions, which are sent in one packet when all of them are staged.
+The sensor runs the one cycle of each tick, which reads all servos. The outputs only request their
+tensions, which are sent in one packet when all of them are requested.
 """
 
 from __future__ import annotations
@@ -38,41 +38,40 @@ class TendonOutput:
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         place = hardware, plan.settings["device"]
         bus = _OPEN.get(place)
-        if bus is None or not bus.in_use:
+        if bus is None or not bus.users:
             bus = _OPEN[place] = ServoBus(BusSettings.of(plan.settings), hardware)
         self.device = bus
-        self._servo = ServoSettings.of(plan.settings)
-        bus.add(self._servo)
+        self._servo = bus.add(ServoSettings.of(plan.settings))
+        bus.users.add(self._servo.settings.name)
 
     def write(self, value: float, now_ns: int) -> float:
-        """Set the value from the next flush on.
-
-        Args:
-            value: From 0, the pretension, to 1; negative values count as 0.
-            now_ns: Not used.
+        """Request a value, 0 to 1, from the next flush on; negative values count as 0.
 
         Returns:
             The value in effect: 0 if the bus has a fault and lets go.
         """
-        value = min(max(value, 0.0), 1.0)
-        servo, bus = self._servo, self.device
-        bus.lengths.pop(servo.name, None)
-        tension = servo.pretension_n
+        if self.device.reason:
+            return 0.0
+        value, servo = min(max(value, 0.0), 1.0), self._servo.settings
         if servo.control == "tension":
-            tension += value * (servo.most_tension_n - servo.pretension_n)
+            tension = servo.pretension_n + value * (servo.most_tension_n - servo.pretension_n)
+            self._servo.request(tension)
         elif value > 0.0:
-            tension = servo.most_tension_n
-            bus.lengths[servo.name] = servo.longest_m + value * (servo.shortest_m - servo.longest_m)
-        bus.tensions[servo.name] = tension
-        return 0.0 if bus.faults else value
+            length = servo.longest_m + value * (servo.shortest_m - servo.longest_m)
+            self._servo.request(servo.most_tension_n, length)
+        else:
+            self._servo.request(servo.pretension_n)
+        return value
 
     def release(self) -> None:
         """Switch the torque of all servos on the bus off."""
         self.device.let_go()
 
     def close(self) -> None:
-        """Leave the bus."""
-        self.device.leave(self._servo.name)
+        """Close the bus with the last of its outputs."""
+        self.device.users.discard(self._servo.settings.name)
+        if not self.device.users:
+            self.device.close()
 
 
 class TendonSensor:
@@ -84,30 +83,20 @@ class TendonSensor:
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         device: str = plan.settings["device"]
         bus = _OPEN.get((hardware, device))
-        if bus is None or not bus.in_use:
+        if bus is None or not bus.users:
             raise RobotError(f"No output is on the servo bus at {device}.")
         self._bus = bus
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Run a cycle and return its readings, without servos that did not answer.
-
-        Returns:
-            For each tendon, such as FDP, `FDP/length`, its length beyond its zero, m, if it has
-            one; `FDP/speed`, m/s, positive while it gets longer; and `FDP/tension`, N, at least 0.
+        """Run a cycle and return its readings, such as `FDP/length`; see `TendonServo.see`.
 
         Raises:
             RobotError: If there is a fault.
         """
-        state = self._bus.cycle(now_ns)
-        if state.reason:
-            raise RobotError(state.reason)
-        readings: dict[str, float] = {}
-        for name, servo in state.servos.items():
-            if servo.length_m is not None:
-                readings[f"{name}/length"] = servo.length_m
-            readings[f"{name}/speed"] = servo.lengthening_m_per_s
-            readings[f"{name}/tension"] = max(servo.tension_n, 0.0)
-        return readings
+        seen = self._bus.cycle(now_ns)
+        if self._bus.reason:
+            raise RobotError(self._bus.reason)
+        return {f"{name}/{key}": x for name, found in seen.items() for key, x in found.items()}
 
     def close(self) -> None:
         """Do nothing: the bus belongs to the outputs."""
@@ -117,18 +106,16 @@ def _features(sensor: SensorPlan) -> list[Feature]:
     """Return length, speed and tension of each tendon."""
     from shapechanger.layout import Element, Feature  # The guard needs no layouts.
 
-    servos = [ServoSettings.of(one) for one in sensor.settings["tendons"].values()]
-    parts = [(one, one.name, Element("tendon", one.name)) for one in servos]
-    free = (-math.inf, math.inf)
-    ends = {s.name: (s.shortest_m, s.longest_m) if s.control == "length" else free for s in servos}
-    return [
-        *(Feature(f"{name}/length", "m", *ends[name], element=part) for _, name, part in parts),
-        *(Feature(f"{name}/speed", "m/s", element=part) for _, name, part in parts),
-        *(
-            Feature(f"{name}/tension", "N", 0.0, one.most_tension_n, part)
-            for one, name, part in parts
-        ),
-    ]
+    features: dict[str, list[Feature]] = {"length": [], "speed": [], "tension": []}
+    for servo in map(ServoSettings.of, sensor.settings["tendons"].values()):
+        name, part = servo.name, Element("tendon", servo.name)
+        ends = (servo.shortest_m, servo.longest_m)
+        low, high = ends if servo.control == "length" else (-math.inf, math.inf)
+        features["length"].append(Feature(f"{name}/length", "m", low, high, part))
+        features["speed"].append(Feature(f"{name}/speed", "m/s", element=part))
+        most = servo.most_tension_n
+        features["tension"].append(Feature(f"{name}/tension", "N", 0.0, most, part))
+    return [one for kind in features.values() for one in kind]
 
 
 BUS_SERVO: Final = OutputChip(

@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from shapechanger.errors import MissingExtra, RobotError, translate_errors
-from shapechanger.robot.drivers.servos.family import ServoFamily
-from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
 
 with translate_errors(ImportError, to=lambda _: MissingExtra("dynamixel-sdk", "finger")):
@@ -34,21 +33,41 @@ _SUCCESS: Final = 0
 _RX_TIMEOUT: Final = -3001
 
 
-class PromptPort(PortHandler):
-    """The SDK's port with a timeout as short as the bus allows.
+class SerialServoPort(PortHandler):
+    """The SDK's port, which sends instructions and receives replies; see `ServoPort`.
 
-    The SDK alone waits 34 ms for each missing answer, by a clock that changes with the date, and
-    keeps the processor busy meanwhile. A stop cannot wait for that.
+    Its timeout is as short as the bus allows. The SDK alone waits 34 ms for each missing answer, by
+    a clock that changes with the date, and keeps the processor busy meanwhile. A stop cannot wait
+    for that.
 
     Args:
-        device: Serial device.
-        answer_ms: Time for the servos to start an answer, ms.
+        settings: The bus, whose family determines the packets.
+
+    Attributes:
+        has_stray: Whether a late answer was found before a request; the reader resets it.
     """
 
-    def __init__(self, device: str, answer_ms: float) -> None:
-        super().__init__(device)
-        self._answer_ms = answer_ms
+    def __init__(self, settings: BusSettings) -> None:
+        super().__init__(settings.device)
+        self._settings = settings
+        family = settings.family
+        self._refused = family.refused
+        self._sdk = PacketHandler(family.protocol)
+        # A packet has its id and then the length of the rest, of 1 or 2 bytes.
+        self._id_at, self._length_size = (4, 2) if family.protocol == 2.0 else (2, 1)
+        self._receive_options = (False,) if family.protocol == 2.0 else ()
         self._late_bytes = 0
+        self.has_stray = False
+        bus = f"The bus at {settings.device}"
+        with translate_errors(
+            OSError, to=lambda error: RobotError(f"{bus} cannot be opened: {error}.")
+        ):
+            opened = self.setBaudRate(settings.baud)
+        if not opened:
+            raise RobotError(
+                f"{bus} cannot have {settings.baud} baud; "
+                "57600, 115200, 1000000, 2000000, 3000000 and 4000000 are usual."
+            )
 
     def getCurrentTime(self) -> float:
         """Return the monotonic time in milliseconds."""
@@ -56,7 +75,9 @@ class PromptPort(PortHandler):
 
     def setPacketTimeout(self, packet_length: int) -> None:
         """Start the timeout of an answer of `packet_length` bytes."""
-        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self._answer_ms)
+        self.setPacketTimeoutMillis(
+            self.tx_time_per_byte * packet_length + self._settings.answer_ms
+        )
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
         """Start a timeout."""
@@ -74,30 +95,6 @@ class PromptPort(PortHandler):
         data = super().readPort(min(length, self._late_bytes))
         self._late_bytes -= len(data)
         return data
-
-
-class SerialServoPort:
-    """Sends instructions and receives replies on a serial port; see `ServoPort`.
-
-    Args:
-        port: Port of the SDK.
-        device: Name of the bus in messages.
-        family: Family of the servos, which determines the packets.
-
-    Attributes:
-        has_stray: Whether a late answer was found before a request; the reader resets it.
-    """
-
-    def __init__(self, port: PortHandler, device: str, family: ServoFamily) -> None:
-        self._port = port
-        self._device = device
-        self._refused = family.refused
-        # Each has its id and then the length of the rest, of `address_size` bytes.
-        self._sdk = PacketHandler(family.protocol)
-        self._id_at = 4 if family.protocol == 2.0 else 2
-        self._length_size = family.address_size
-        self._receive_options = (False,) if family.protocol == 2.0 else ()
-        self.has_stray = False
 
     def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
         """Read bytes of several servos; see `ServoPort.read`."""
@@ -117,36 +114,30 @@ class SerialServoPort:
     def close(self) -> None:
         """Close the port."""
         with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
-            self._port.closePort()
+            self.closePort()
 
     def _number(self, value: int) -> bytes:
         return value.to_bytes(self._length_size, "little")
 
     def _exchange(
-        self,
-        servo_id: int,
-        instruction: int,
-        parameters: bytes,
-        ids: Sequence[int],
-        length: int,
+        self, servo_id: int, instruction: int, parameters: bytes, ids: Sequence[int], length: int
     ) -> dict[int, ServoReply]:
         """Send an instruction and return the replies of `ids`, each with `length` bytes of data."""
-        size = len(parameters) + 1 + self._length_size
+        device = self._settings.device
+        size = self._number(len(parameters) + 1 + self._length_size)
         # The SDK fills in header and checksum, which is as long as the length.
-        packet = [0] * self._id_at + [servo_id, *self._number(size)]
-        packet += [instruction, *parameters] + [0] * self._length_size
-        self._port.is_using = False  # The SDK leaves it set after an exception.
-        with translate_errors(OSError, termios.error, to=self._gone):
-            self.has_stray |= self._port.getBytesAvailable() > 0
-            if self._sdk.txPacket(self._port, packet) != _SUCCESS:
-                raise RobotError(f"The bus at {self._device} does not take what is written to it.")
+        packet = [0] * self._id_at + [servo_id, *size, instruction, *parameters]
+        self.is_using = False  # The SDK leaves it set after an exception.
+        with translate_errors(
+            OSError, termios.error, to=lambda e: RobotError(f"The bus at {device} is gone: {e}.")
+        ):
+            self.has_stray |= self.getBytesAvailable() > 0
+            if self._sdk.txPacket(self, packet + [0] * self._length_size) != _SUCCESS:
+                raise RobotError(f"The bus at {device} does not take what is written to it.")
             if not ids:
                 return {}
-            self._port.setPacketTimeout((_STATUS_BYTES + length) * len(ids))
+            self.setPacketTimeout((_STATUS_BYTES + length) * len(ids))
             return self._replies(ids, length)
-
-    def _gone(self, error: Exception) -> RobotError:
-        return RobotError(f"The bus at {self._device} is gone: {error}.")
 
     def _replies(self, ids: Sequence[int], length: int) -> dict[int, ServoReply]:
         # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
@@ -154,37 +145,21 @@ class SerialServoPort:
         heard: dict[int, ServoReply] = {}
         for _ in range(len(ids) + _MAX_DAMAGED):
             try:
-                packet, result = self._sdk.rxPacket(self._port, *self._receive_options)
+                packet, result = self._sdk.rxPacket(self, *self._receive_options)
             except IndexError:  # The SDK trusts the length in a packet.
                 continue
             if result == _RX_TIMEOUT:
                 break
             if result != _SUCCESS:
                 continue
-            length_at = self._id_at + 1
-            rest = length_at + self._length_size
-            end = rest + int.from_bytes(bytes(packet[length_at:rest]), "little") - self._length_size
+            rest = self._id_at + 1 + self._length_size
+            size = int.from_bytes(bytes(packet[self._id_at + 1 : rest]), "little")
             # Packets of 2.0 repeat that they are a status; the error byte is the last before data.
             data_at = rest + self._length_size
-            servo_id = packet[self._id_at]
-            reply = ServoReply(packet[data_at - 1], bytes(packet[data_at:end]))
-            if servo_id in ids and (len(reply.data) == length or reply.error & self._refused):
+            data = bytes(packet[data_at : rest + size - self._length_size])
+            reply, servo_id = ServoReply(packet[data_at - 1], data), packet[self._id_at]
+            if servo_id in ids and (len(data) == length or reply.error & self._refused):
                 heard[servo_id] = reply
             if len(heard) == len(ids):
                 break
         return heard
-
-
-def open_serial_port(settings: BusSettings) -> SerialServoPort:
-    """Open the port of a bus."""
-    bus, port = f"The bus at {settings.device}", PromptPort(settings.device, settings.answer_ms)
-    with translate_errors(
-        OSError, to=lambda error: RobotError(f"{bus} cannot be opened: {error}.")
-    ):
-        opened = port.setBaudRate(settings.baud)
-    if not opened:
-        raise RobotError(
-            f"{bus} cannot have {settings.baud} baud; "
-            "57600, 115200, 1000000, 2000000, 3000000 and 4000000 are usual."
-        )
-    return SerialServoPort(port, settings.device, settings.family)

@@ -1,32 +1,215 @@
-"""Settings of a servo bus: the keys of servos with their tendons and of the bus, and units."""
+"""Servos of a bus: families and models of `servos.toml`, and the keys of servos and their bus."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
+import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
 from shapechanger.contract.plan import OutputPlan
-from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import Claim, FilePath, KeyMistake, Keys
-from shapechanger.robot.drivers.servos.family import (
-    COUNTS_PER_TURN,
-    MODELS,
-    WATCHDOG_STEP_MS,
-    Control,
-    ModelName,
-    ServoFamily,
-    ServoModel,
-)
 
 DRIVER: Final = "bus_servo"
 """Driver of the outputs and of the sensor of a servo bus, in a profile."""
 
-_ROUNDING: Final = 1e-9
+COUNTS_PER_TURN: Final = 4096
+"""Counts of position per turn."""
+WATCHDOG_STEP_MS: Final = 20
+"""Unit of a bus watchdog, ms."""
+TRIPPED: Final = 0xFF
+"""Value of a bus watchdog after it has stopped the servo."""
+ROUNDING: Final = 1e-9
 """Added to a quotient before rounding down: 3 may come out as 2.9999999999."""
+_RAD_PER_S_PER_RPM: Final = 2.0 * math.pi / 60.0
+
+Control = Literal["tension", "length"]
+"""Control of a tendon: by its tension, or by its length with a limit of the tension."""
+
+ModelName = Literal["XL330-M288", "XL330-M077", "XC330-M288", "XM430-W210", "XM430-W350", "STS3215"]
+"""Name of a model that the driver supports."""
+
+
+class Register(msgspec.Struct, frozen=True):
+    """A register of the control table.
+
+    Attributes:
+        name: Name in the manual.
+        address: Address of its first byte.
+        size: Size in bytes, little-endian.
+        sign: Code of a negative number, two's complement or a sign in the highest bit; "" without.
+        initial: Value at delivery, and after power-on if it is not in the EEPROM.
+        takes: Ranges of the values that it takes; empty if it is read-only.
+        value: Value that it must have; None for any.
+        kept_bits: Bits that are kept as they are then.
+    """
+
+    name: str
+    address: int
+    size: int
+    sign: Literal["", "complement", "bit"] = ""
+    initial: int = 0
+    takes: tuple[tuple[int, int], ...] = ()
+    value: int | None = None
+    kept_bits: int = 0
+
+    def encode(self, value: int) -> bytes:
+        """Encode a value."""
+        if self.sign == "bit" and value < 0:
+            value = -value | 1 << (8 * self.size - 1)
+        return value.to_bytes(self.size, "little", signed=self.sign == "complement")
+
+    def decode(self, data: bytes, start: int = 0) -> int:
+        """Decode the value in `data`, which is at `start` there."""
+        part = data[start : start + self.size]
+        value = int.from_bytes(part, "little", signed=self.sign == "complement")
+        top = 1 << (8 * self.size - 1)
+        return top - value if self.sign == "bit" and value >= top else value
+
+
+class ServoFamily(msgspec.Struct, frozen=True):
+    """A family of servos, which share registers and packets.
+
+    Attributes:
+        name: Name of the family.
+        protocol: Version of the packets in `dynamixel_sdk`; Feetech's follow 1.0, with the
+            instructions for several servos of 2.0. Addresses, lengths and checksums have 1 or 2
+            bytes.
+        most_id: Highest id.
+        baud_rates: Baud rates of servos and SDK.
+        has_watchdog: Whether a servo stops by itself when its bus is silent. Without, a power
+            switch must stop it, and without power it forgets its turns.
+        alert: Bits of a reply's error that say that the hardware error status is not 0.
+        refused: Bits of a reply's error with the reason of a refusal.
+        errors: Bits of the hardware error status, in words.
+        speed_rpm: Unit of the speed, turns per minute.
+        modes: Value of `mode` for each control that it has.
+        eeprom_end: First address behind the EEPROM.
+        registers: Registers by what they are for; others have a `value`.
+
+            - `model_number`, `firmware`: Number of the model and version of the firmware.
+            - `mode`: Operating mode.
+            - `most`: Limit of `goal`, in the EEPROM.
+            - `torque_enable`: 1 for torque, 0 for none.
+            - `mark`: Is 0 after a restart, and has another value meanwhile: the bus watchdog if
+              there is one, or an unlimited acceleration.
+            - `goal`: Goal of the current, or in control of the length its limit. Of a family
+              without control of the tension it is a limit in thousandths of the stall torque.
+            - `goal_position`: Goal position.
+            - `hardware_error`: Hardware error status.
+            - `lock`: Must be 0 to write to the EEPROM; without it that needs no torque.
+            - `present`: Block of the present values that follow.
+            - `current`, `speed`, `position`, `voltage`, `temperature`: Present values in counts,
+              0.1 V and degrees Celsius.
+    """
+
+    name: str
+    protocol: float
+    most_id: int
+    baud_rates: tuple[int, ...]
+    has_watchdog: bool
+    alert: int
+    refused: int
+    errors: Mapping[int, str]
+    speed_rpm: float
+    modes: Mapping[Control, int]
+    eeprom_end: int
+    registers: Mapping[str, Register]
+
+    def __getitem__(self, name: str) -> Register:
+        """Return a register."""
+        return self.registers[name]
+
+    @property
+    def rad_per_s(self) -> float:
+        """Unit of the speed, rad/s."""
+        return self.speed_rpm * _RAD_PER_S_PER_RPM
+
+    def error_words(self, bits: int) -> str:
+        """Describe the bits of the hardware error status."""
+        words = (words for bit, words in sorted(self.errors.items()) if bits >> bit & 1)
+        return ", ".join(words) or f"it gives the unknown code {bits}"
+
+
+class ServoModel(msgspec.Struct, frozen=True, array_like=True):
+    """Model of a servo, a row of `servos.toml`; motor and gears are as at the output.
+
+    Attributes:
+        name: Name of the model.
+        family_name: Name of its family.
+        number: Model number.
+        ampere_per_count: Unit of its present current, A.
+        most_counts: Largest value of its goal, see `ServoFamily.goal`.
+        stall_nm, stall_a: Stall torque and current at `volts`, N·m and A.
+        no_load_rpm: Speed without load at `volts`, turns per minute.
+        volts, least_v, most_v: Nominal, lowest and highest operating voltage, V.
+        most_c: Temperature at which it shuts itself off, degrees Celsius.
+        shutdown: Hardware errors that shut it off, as bits.
+        least_firmware: First version with a reliable bus watchdog.
+        inertia: Inertia of motor and gears, kg·m2.
+        friction_nm, viscous: Coulomb and viscous friction of the gears, N·m and N·m·s/rad.
+        is_measured: Whether the friction was measured.
+    """
+
+    name: str
+    family_name: str
+    number: int
+    ampere_per_count: float
+    most_counts: int
+    stall_nm: float
+    stall_a: float
+    no_load_rpm: float
+    volts: float
+    least_v: float
+    most_v: float
+    most_c: int
+    shutdown: int
+    least_firmware: int
+    inertia: float
+    friction_nm: float
+    viscous: float
+    is_measured: bool
+
+    @property
+    def family(self) -> ServoFamily:
+        """Family of the servo."""
+        return FAMILIES[self.family_name]
+
+    @property
+    def torque_constant(self) -> float:
+        """Torque at the output per current, N·m/A."""
+        return self.stall_nm / self.stall_a
+
+    @property
+    def no_load_rad_per_s(self) -> float:
+        """Speed without load, rad/s."""
+        return self.no_load_rpm * _RAD_PER_S_PER_RPM
+
+    @property
+    def ampere_per_goal(self) -> float:
+        """Unit of its goal, A; where that is a share of the stall torque, for a motor at rest."""
+        is_current = "tension" in self.family.modes
+        return self.ampere_per_count if is_current else self.stall_a / self.most_counts
+
+
+class _Table(msgspec.Struct):
+    family: list[ServoFamily]
+    models: list[ServoModel]
+
+
+_TABLE: Final = msgspec.toml.decode(
+    Path(__file__).with_name("servos.toml").read_bytes(), type=_Table
+)
+
+FAMILIES: Final[Mapping[str, ServoFamily]] = {one.name: one for one in _TABLE.family}
+"""Families of servos, keyed by name."""
+
+MODELS: Final[Mapping[str, ServoModel]] = {one.name: one for one in _TABLE.models}
+"""Models that the driver supports, keyed by name."""
 
 
 def stops_itself(output: OutputPlan) -> bool:
@@ -38,7 +221,7 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
     """A servo and its tendon.
 
     A tension follows from the current without friction. The gears take some newtons of it when the
-    spool winds in, and add as much when the tendon pulls it out; see `Gears.friction_nm`.
+    spool winds in, and add as much when the tendon pulls it out; see `ServoModel.friction_nm`.
 
     Attributes:
         name: Name of the tendon, such as "FDP"; that of its output.
@@ -82,11 +265,8 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         half = math.pi * self.spool_radius_m
         if not family.has_watchdog and max(-self.shortest_m, self.longest_m) >= half:
             far = "longest_m" if self.longest_m >= half else "shortest_m"
-            raise KeyMistake(
-                far,
-                f"must be within {half:.4f} m of the zero, half a turn of the spool, because the "
-                "servo forgets its turns with its power",
-            )
+            words = f"must be within {half:.4f} m of the zero, half a turn of the spool"
+            raise KeyMistake(far, f"{words}, because the servo forgets its turns with its power")
         least, most = self.newton_per_goal, self.known.most_counts * self.newton_per_goal
         end = f"{most:.0f} N with this spool"
         for key in ("most_tension_n", "pretension_n", "homing_n"):
@@ -105,6 +285,11 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         return MODELS[self.model]
 
     @property
+    def words(self) -> str:
+        """Name and id for messages."""
+        return f"Servo {self.name} (id {self.id})"
+
+    @property
     def newton_per_goal(self) -> float:
         """Tension per count of the goal, N."""
         return self.known.torque_constant * self.known.ampere_per_goal / self.spool_radius_m
@@ -112,73 +297,17 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
     @property
     def most_counts(self) -> int:
         """Limit of the goal in counts: the largest that pulls at most `most_tension_n`."""
-        return math.floor(self.most_tension_n / self.newton_per_goal + _ROUNDING)
+        return math.floor(self.most_tension_n / self.newton_per_goal + ROUNDING)
+
+    @property
+    def lever_m(self) -> float:
+        """Length of tendon that is wound in per angle, m/rad."""
+        return self.direction * self.spool_radius_m
 
     @property
     def metre_per_count(self) -> float:
         """Change of the tendon's length per count of position, m; negative if it winds in."""
         return -self.direction * 2.0 * math.pi * self.spool_radius_m / COUNTS_PER_TURN
-
-    def clip(self, tension: float, least: float | None = None) -> float:
-        """Clip a tension to the range of its servo, N.
-
-        Args:
-            tension: Tension, N.
-            least: Lower end of the range, N; None for the pretension.
-        """
-        if not math.isfinite(tension):
-            raise RobotError(f"{self.words} cannot pull {tension} N.")
-        return min(max(tension, self.pretension_n if least is None else least), self.most_tension_n)
-
-    def goal_count(self, tension: float) -> int:
-        """Return the goal for a tension, rounded towards slack and at most the limit.
-
-        Args:
-            tension: Tension, N; a negative one counts as 0, because a tendon does not push.
-
-        Returns:
-            Counts, with the sign that winds in.
-        """
-        # Clip first: the quotient of a huge number could overflow to infinity.
-        counts = math.floor(self.clip(tension, 0.0) / self.newton_per_goal + _ROUNDING)
-        counts = min(counts, self.most_counts)
-        # With control of the length the goal is a limit, which has no sign.
-        return counts if self.control == "length" else self.direction * counts
-
-    def position_at(self, length: float, zero: int) -> int:
-        """Return the position for a length, in counts, the inverse of `length_m`.
-
-        Args:
-            length: Length beyond the zero, m, clipped to its range.
-            zero: Position at the zero, in counts.
-        """
-        if not math.isfinite(length):
-            raise RobotError(f"{self.words} cannot go to a length of {length} m.")
-        kept = min(max(length, self.shortest_m), self.longest_m)
-        return zero + round(kept / self.metre_per_count)
-
-    def tension_n(self, current: int) -> float:
-        """Return the tension of a current in counts, N; negative for one that lets out."""
-        torque = self.known.torque_constant * self.known.ampere_per_count * current
-        return self.direction * torque / self.spool_radius_m
-
-    def length_m(self, position: int, zero: int) -> float:
-        """Return the length of the tendon beyond its zero, m, which grows as it is let out.
-
-        Args:
-            position: Present position, in counts.
-            zero: Position at the zero, in counts.
-        """
-        return (position - zero) * self.metre_per_count
-
-    def lengthening(self, speed: float) -> float:
-        """Return how fast the tendon gets longer, m/s, for a speed of the servo in rad/s."""
-        return -self.direction * speed * self.spool_radius_m
-
-    @property
-    def words(self) -> str:
-        """Name and id for messages."""
-        return f"Servo {self.name} (id {self.id})"
 
 
 class ServoBusKeys(Keys, frozen=True, kw_only=True):
@@ -206,12 +335,10 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
 
     Attributes:
         servos: Servos of one family, in the order in which they are read.
-        most_missed: Missed cycles in a row that make a fault.
         cut_ms: Time after which a power switch that is not fed has cut the servos' power, ms.
     """
 
     servos: tuple[ServoSettings, ...] = ()
-    most_missed: int = 5
     cut_ms: int = 200
 
     def __post_init__(self) -> None:
@@ -227,12 +354,6 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
     def family(self) -> ServoFamily:
         """Family of the servos."""
         return self.servos[0].known.family
-
-    @property
-    def mark(self) -> int:
-        """Value of `ServoFamily.mark` while a servo has not restarted."""
-        family = self.family
-        return self.watchdog_ms // WATCHDOG_STEP_MS if family.has_watchdog else 254
 
 
 def bus_settings(outputs: Sequence[OutputPlan]) -> BusSettings:

@@ -1,10 +1,10 @@
 """Servos of a twin on one bus: motors, registers, safety functions, control, and their load.
 
-Sources as of `shapechanger.robot.drivers.servos.family`, whose registers it has. Assumed for
-want of a source, to be tried on a rig:
+Sources as of `servos.toml`, whose registers they have. Assumed for want of a source, to be tried on
+a rig:
 
-- A bus watchdog that trips in current mode takes the current away; torque enable stays 1 or goes
-  to 0 (`releases_on_trip`). In the manual the servo "will stop".
+- A bus watchdog that trips in current mode takes the current away; in the manual the servo "will
+  stop". Torque enable stays 1.
 - Any valid instruction on the bus feeds the watchdog, whichever servo it is for.
 - The gaps between registers cannot be read, nor parts of registers, but for those in the block of
   present values. (Real servos may answer 0 for the gaps, so a driver must not rely on an error.)
@@ -24,25 +24,22 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
-from msgspec.structs import replace
-
 from shapechanger.contract.world import World
 from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.servos.family import (
+from shapechanger.robot.drivers.servos.servo import ServoReply
+from shapechanger.robot.drivers.servos.settings import (
     COUNTS_PER_TURN,
     TRIPPED,
     WATCHDOG_STEP_MS,
-    Register,
+    BusSettings,
+    ServoSettings,
 )
-from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 
 CABLE_N_PER_M: Final = 20e3
 """Stiffness of cable and frame, N/m. Chosen: a good millimetre for 25 N. The end of the load needs
 a mass of more than 0.01 kg to follow such a spring in steps of 1 ms."""
 
-COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
-"""Counts of position per rad."""
+_COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 
 # Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
 # degrees warmer, with a time constant of two minutes.
@@ -59,26 +56,22 @@ class SimulatedMotor:
         stiffness: Stiffness of the tendon, N/m.
 
     Attributes:
-        angle: Angle of the spool over many turns, rad.
-        speed: Speed of the spool, rad/s.
-        current: Current, A.
+        angle, speed: Angle of the spool over many turns, rad, and its speed, rad/s.
+        current, temperature: Current, A, and temperature, degrees Celsius.
         tension: Tension of the tendon, N.
-        temperature: Temperature, degrees Celsius.
         snapped: Whether the tendon is torn.
     """
 
     def __init__(self, settings: ServoSettings, stiffness: float = CABLE_N_PER_M) -> None:
         self._model = model = settings.known
         self._stiffness = stiffness
-        self._lever_m = settings.direction * settings.spool_radius_m  # Wound in per angle, m/rad.
-        no_load, gears = model.no_load_rad_per_s, model.gears
-        lost = (gears.friction_nm + gears.viscous * no_load) / model.stall_nm
+        self._lever_m = settings.lever_m
+        no_load = model.no_load_rad_per_s
+        lost = (model.friction_nm + model.viscous * no_load) / model.stall_nm
         self._electric_rad_per_s = no_load / (1.0 - lost)  # No current: friction takes some speed.
         # In the middle of a count, as it stands while the finger is straight.
-        self._taut = self.angle = (settings.zero + 0.5) / COUNTS_PER_RAD
-        self.speed = 0.0
-        self.current = 0.0
-        self.tension = 0.0
+        self._taut = self.angle = (settings.zero + 0.5) / _COUNTS_PER_RAD
+        self.speed = self.current = self.tension = 0.0
         self.temperature = _ROOM_C
         self.snapped = False
 
@@ -88,40 +81,46 @@ class SimulatedMotor:
         return self._model.stall_a * share
 
     def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
-        """Turn for one short step."""
-        model, gears, lever = self._model, self._model.gears, self._lever_m
+        """Turn for one short step, while the far end of the tendon is `travel_m` towards it."""
+        model, lever = self._model, self._lever_m
         # The faster it turns, the less current the voltage can still drive.
         least, most = min(self.current_at(-volts), 0.0), max(self.current_at(volts), 0.0)
         self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, least), most)
         # Friction and cable use the speed at the end of the step, so that a stiff cable does not
         # need a tiny step.
-        inertia = gears.inertia + dt_s * gears.viscous
+        inertia = model.inertia + dt_s * model.viscous
         torque = model.torque_constant * self.current
         if (pull := self._pull(travel_m)) > 0.0:
             torque -= lever * pull
             inertia += (dt_s * lever) ** 2 * self._stiffness
-        speed = (gears.inertia * self.speed + dt_s * torque) / inertia
-        held = dt_s * gears.friction_nm / inertia
+        speed = (model.inertia * self.speed + dt_s * torque) / inertia
+        held = dt_s * model.friction_nm / inertia
         self.speed = math.copysign(max(abs(speed) - held, 0.0), speed)
         self.angle += dt_s * self.speed
         self.tension = self._pull(travel_m)
-        self._warm(dt_s)
-
-    def _pull(self, travel_m: float) -> float:
-        """Return the tension for the positions of both ends, N."""
-        stretch = self._lever_m * (self.angle - self._taut) - travel_m
-        return 0.0 if self.snapped else max(0.0, self._stiffness * stretch)
+        warm = _ROOM_C + _KELVIN_PER_WATT * model.volts / model.stall_a * self.current**2
+        self.temperature += (warm - self.temperature) * -math.expm1(-dt_s / _HEAT_S)
 
     def settle(self, travel_m: float) -> None:
         """Turn the spool until the tendon is just taut, as a person does by hand."""
         self.angle = self._taut + travel_m / self._lever_m
         self.speed = self.tension = 0.0
 
-    def _warm(self, dt_s: float) -> None:
-        ohm = self._model.volts / self._model.stall_a
-        warm = _ROOM_C + _KELVIN_PER_WATT * ohm * self.current**2
-        self.temperature += (warm - self.temperature) * -math.expm1(-dt_s / _HEAT_S)
+    def _pull(self, travel_m: float) -> float:
+        stretch = self._lever_m * (self.angle - self._taut) - travel_m
+        return 0.0 if self.snapped else max(0.0, self._stiffness * stretch)
 
+
+ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
+"""Faults of a servo.
+
+"mute": it obeys without answering. "deaf": it receives nothing. "hot", "overload": it shuts itself
+off. "snapped": its tendon is torn for good. "power": its power fails for a moment. "" repairs
+"mute", "deaf" and "hot".
+"""
+
+_HOT_C: Final = 75.0
+_WELL_C: Final = 30.0
 
 # Reasons of refusals.
 _RANGE: Final = 4
@@ -134,6 +133,7 @@ _VOLTAGE: Final = 0x01
 _HOT: Final = 0x04
 _OVERLOAD: Final = 0x20
 
+_FIRMWARE: Final = 52
 _START_NS: Final = 300_000_000
 _STALL_AT: Final = 2.0 * math.pi / 32.0  # rad.
 
@@ -147,10 +147,8 @@ class SimulatedServo:
 
     Attributes:
         family: Family of the servo.
-        firmware: Version of its firmware.
-        releases_on_trip: Effect of its watchdog; see the module.
-        mute: Whether it obeys without answering.
-        deaf: Whether it receives nothing, as without its data line.
+        values: Values of its registers.
+        mute, deaf: Whether it obeys without answering, and whether it receives nothing.
         motor: Its motor.
         volts: Voltage of its supply; 0 without power.
         pulls_a: Goal current in effect, A, with the sign of its registers; of a length its limit.
@@ -159,33 +157,22 @@ class SimulatedServo:
     def __init__(self, settings: ServoSettings, stiffness: float) -> None:
         self._model = model = settings.known
         self.family = family = model.family
-        self.firmware = 52
-        self.releases_on_trip = False
         self.mute = self.deaf = False
         self.volts = model.volts
         self.motor = SimulatedMotor(settings, stiffness)
-        self._registers = {one.address: one for one in family.registers}
-        most = replace(family.most, range=(0, model.most_counts))
-        self._registers[most.address] = most
-        self._values = {one.address: one.initial for one in family.registers}
-        self._values[family.model_number.address] = model.number
-        self._values[family.most.address] = model.most_counts
-        self._values[family.goal.address] = model.most_counts
-        self._now_ns = 0
-        self._fed_ns = 0
-        self._starts_until_ns = 0
+        own = {name: one for name, one in family.registers.items() if name != "present"}
+        self._names = {one.address: name for name, one in own.items()}
+        self.values = {name: one.initial for name, one in own.items()}
+        self.values |= {"model_number": model.number, "firmware": _FIRMWARE}
+        self.values |= {"most": model.most_counts, "goal": model.most_counts}
+        self._now_ns = self._fed_ns = self._starts_until_ns = 0
         self._turns = 0  # Counts lost with the power.
         self._cache()
 
     @property
     def has_torque(self) -> bool:
         """True if torque enable is on."""
-        return bool(self._values[self.family.torque_enable.address])
-
-    def register(self, at: int) -> int:
-        """Return the current value of the register at an address."""
-        self._measure()
-        return self._values[at]
+        return bool(self.values["torque_enable"])
 
     def hears(self) -> bool:
         """Return whether it receives an instruction on the bus, which then feeds its watchdog."""
@@ -196,12 +183,19 @@ class SimulatedServo:
 
     def read(self, at: int, size: int) -> ServoReply:
         """Reply with bytes of the registers."""
-        self._measure()
-        data, block = b"", self.family.present
+        motor, family, block = self.motor, self.family, self.family["present"]
+        self.values |= {
+            "current": round(motor.current / self._model.ampere_per_count),
+            "speed": round(motor.speed / family.rad_per_s),
+            "position": math.floor(motor.angle * _COUNTS_PER_RAD) - self._turns,
+            "voltage": round(10 * self.volts),
+            "temperature": round(motor.temperature),
+        }
+        data = b""
         while len(data) < size:
             here = at + len(data)
-            if (register := self._registers.get(here)) is not None:
-                data += register.encode(self._values[here])
+            if name := self._names.get(here):
+                data += family[name].encode(self.values[name])
             elif block.address <= here < block.address + block.size:
                 data += b"\0"
             else:
@@ -210,28 +204,44 @@ class SimulatedServo:
 
     def write(self, at: int, data: bytes) -> ServoReply:
         """Write one register and reply."""
-        family, values, register = self.family, self._values, self._registers.get(at)
-        if register is None or not register.is_writable:
-            return self._reply(_ACCESS)
-        if len(data) != register.size:
-            return self._reply(_LENGTH)
-        locked = self.has_torque if family.lock is None else values[family.lock.address]
-        if at < family.eeprom_end and locked:
-            return self._reply(_ACCESS)
-        value = register.decode(data)
-        if refusal := self._refusal(register, value):
-            return self._reply(refusal)
-        values[at] = value
-        if register == family.mode:  # A change of mode sets the goal to its limit.
-            values[family.goal.address] = values[family.most.address]
-        if register in (family.torque_enable, family.mark):
-            self._fed_ns = self._now_ns
-        self._cache()
-        return self._reply(0)
+        name = self._names.get(at, "")
+        refusal = self._refusal(name, data)
+        if not refusal:
+            self.values[name] = self.family[name].decode(data)
+            if name == "mode":  # A change of mode sets the goal to its limit.
+                self.values["goal"] = self.values["most"]
+            if name in ("torque_enable", "mark"):
+                self._fed_ns = self._now_ns
+            self._cache()
+        return self._reply(refusal)
 
-    def overload(self) -> None:
-        """Set the overload error."""
-        self._fail(_OVERLOAD)
+    def _refusal(self, name: str, data: bytes) -> int:
+        """Return the reason for which a register does not take data; 0 if it does."""
+        family, values = self.family, self.values
+        if not name or not (takes := family[name].takes):
+            return _ACCESS
+        if len(data) != family[name].size:
+            return _LENGTH
+        locked = values.get("lock", self.has_torque)
+        if locked and family[name].address < family.eeprom_end:
+            return _ACCESS
+        value = family[name].decode(data)
+        if name == "most":
+            takes = ((0, self._model.most_counts),)
+        # A tripped watchdog refuses goals, and an error torque until a reboot.
+        tripped = name == "goal" and family.has_watchdog and values["mark"] == TRIPPED
+        failed = values["hardware_error"] & self._model.shutdown
+        blocked = tripped or (name == "torque_enable" and value and failed)
+        if blocked or not any(least <= value <= most for least, most in takes):
+            return _RANGE
+        return _LIMIT if name == "goal" and abs(value) > values["most"] else 0
+
+    def fail(self, bits: int) -> None:
+        """Set bits of the hardware error status, which may shut it off."""
+        self.values["hardware_error"] |= bits
+        if bits & self._model.shutdown:
+            self.values["torque_enable"] = 0
+        self._cache()
 
     def set_power(self, *, on: bool) -> None:
         """Switch its supply, from where it starts afresh."""
@@ -240,10 +250,10 @@ class SimulatedServo:
 
     def lose_power(self) -> None:
         """Interrupt its supply, so that it restarts."""
-        for at, register in self._registers.items():
-            if at >= self.family.eeprom_end:
-                self._values[at] = register.initial
-        self._values[self.family.goal.address] = self._values[self.family.most.address]
+        for name in self.values:
+            if (register := self.family[name]).address >= self.family.eeprom_end:
+                self.values[name] = register.initial
+        self.values["goal"] = self.values["most"]
         self._turns = math.floor(self.motor.angle / (2.0 * math.pi)) * COUNTS_PER_TURN
         self._starts_until_ns = self._fed_ns = self._now_ns + _START_NS
         self._cache()
@@ -253,29 +263,26 @@ class SimulatedServo:
         dt_s = (now_ns - self._now_ns) / 1e9
         self._now_ns = now_ns
         if self._watchdog_ns is not None and now_ns - self._fed_ns >= self._watchdog_ns:
-            self._values[self.family.mark.address] = TRIPPED
-            self._values[self.family.goal.address] = 0
-            if self.releases_on_trip:
-                self._values[self.family.torque_enable.address] = 0
+            self.values |= {"mark": TRIPPED, "goal": 0}
             self._cache()
         self.motor.advance(self._controlled_a(), self.volts, travel_m, dt_s)
         if self.motor.temperature > self._model.most_c:
-            self._fail(_HOT)
+            self.fail(_HOT)
         if self.volts and not self._model.least_v <= self.volts <= self._model.most_v:
-            self._fail(_VOLTAGE)
+            self.fail(_VOLTAGE)
 
     def _reply(self, refusal: int, data: bytes = b"") -> ServoReply:
-        failed = self._values[self.family.hardware_error.address]
+        failed = self.values["hardware_error"]
         if self.family.refused:
             return ServoReply(refusal | (self.family.alert if failed else 0), data)
         return ServoReply(failed, data)
 
     def _controlled_a(self) -> float:
         """Return the current that its controller asks for, A."""
-        if self.pulls_angle is None or not self.pulls_a:
+        if self._pulls_angle is None or not self.pulls_a:
             return self.pulls_a
         most = abs(self.pulls_a)
-        wanted = self._model.stall_a * (self.pulls_angle - self.motor.angle) / _STALL_AT
+        wanted = self._model.stall_a * (self._pulls_angle - self.motor.angle) / _STALL_AT
         wanted = min(max(wanted, -most), most)
         if "tension" in self.family.modes:
             return wanted
@@ -283,52 +290,19 @@ class SimulatedServo:
 
     def _cache(self) -> None:
         """Cache what each step needs of the registers."""
-        values, family = self._values, self.family
-        steps = values[family.mark.address] if family.has_watchdog else 0
+        values, family = self.values, self.family
+        steps = values["mark"] if family.has_watchdog else 0
         counts = self.has_torque and 0 < steps < TRIPPED
         self._watchdog_ns = steps * WATCHDOG_STEP_MS * 1_000_000 if counts else None
-        mode = values[family.mode.address]
+        mode = values["mode"]
         pulls = self.has_torque and steps != TRIPPED and mode in family.modes.values()
-        counts_ahead = values[family.goal_position.address] + self._turns + 0.5
+        counts_ahead = values["goal_position"] + self._turns + 0.5
         has_length = mode == family.modes["length"]
-        self.pulls_angle = counts_ahead / COUNTS_PER_RAD if has_length else None
-        goal = values[family.goal.address]
-        self.pulls_a = goal * self._model.ampere_per_goal if pulls else 0.0
-
-    def _fail(self, bit: int) -> None:
-        self._values[self.family.hardware_error.address] |= bit
-        if bit & self._model.shutdown:
-            self._values[self.family.torque_enable.address] = 0
-        self._cache()
-
-    def _refusal(self, register: Register, value: int) -> int:
-        """Return why the register, or the present state of the servo, refuses a value; 0 if not."""
-        family, values = self.family, self._values
-        failed = values[family.hardware_error.address] & self._model.shutdown
-        tripped = family.has_watchdog and values[family.mark.address] == TRIPPED
-        if not register.takes(value) or (register == family.goal and tripped):
-            return _RANGE
-        if register == family.goal and abs(value) > values[family.most.address]:
-            return _LIMIT
-        # Until a reboot.
-        return _RANGE if register == family.torque_enable and value and failed else 0
-
-    def _measure(self) -> None:
-        """Update the registers of its measurements."""
-        motor, values, family = self.motor, self._values, self.family
-        values[family.firmware.address] = self.firmware
-        values[family.current.address] = round(motor.current / self._model.ampere_per_count)
-        values[family.speed.address] = round(motor.speed / family.rad_per_s)
-        values[family.position.address] = math.floor(motor.angle * COUNTS_PER_RAD) - self._turns
-        values[family.voltage.address] = round(10 * self.volts)
-        values[family.temperature.address] = round(motor.temperature)
+        self._pulls_angle = counts_ahead / _COUNTS_PER_RAD if has_length else None
+        self.pulls_a = values["goal"] * self._model.ampere_per_goal if pulls else 0.0
 
 
 _STEP_NS: Final = 1_000_000
-# Of the end stops.
-_SPRING_N_PER_M: Final = 300.0
-_DAMPER_NS_PER_M: Final = 60.0
-_NEAREST_M: Final = 0.02  # How far an end can be pulled; it cannot go the other way.
 
 
 @runtime_checkable
@@ -353,38 +327,17 @@ class TendonWorld(Protocol):
         ...
 
 
-class EndStops:
-    """For each tendon a massless spring with a damper between two stops; see `TendonWorld`."""
-
-    cable_stiffness = CABLE_N_PER_M
-
-    def __init__(self, count: int) -> None:
-        self._travels = [0.0] * count
-
-    def travels(self) -> Sequence[float]:
-        """Return how far the ends are towards their spools, m."""
-        return list(self._travels)
-
-    def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
-        """Move under these tensions; see `TendonWorld.pull`."""
-        keep = math.exp(-dt_s * _SPRING_N_PER_M / _DAMPER_NS_PER_M)
-        for i, tension in enumerate(tensions_n):
-            rest = tension / _SPRING_N_PER_M
-            travel = rest + keep * (self._travels[i] - rest)
-            self._travels[i] = min(max(travel, 0.0), _NEAREST_M)
-        return self.travels()
+# Without such a world, each tendon pulls a massless spring with a damper between two stops.
+_SPRING_N_PER_M: Final = 300.0
+_DAMPER_NS_PER_M: Final = 60.0
+_NEAREST_M: Final = 0.02  # How far an end can be pulled; it cannot go the other way.
 
 
-ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
-"""Faults of a servo.
-
-"mute": it obeys without answering. "deaf": it receives nothing. "hot", "overload": it shuts itself
-off. "snapped": its tendon is torn for good. "power": its power fails for a moment. "" repairs
-"mute", "deaf" and "hot".
-"""
-
-_HOT_C: Final = 75.0
-_WELL_C: Final = 30.0
+def pull_spring(travel_m: float, tension_n: float, dt_s: float) -> float:
+    """Return how far the end of a tendon is after it has pulled its spring for a step, m."""
+    rest = tension_n / _SPRING_N_PER_M
+    keep = math.exp(-dt_s * _SPRING_N_PER_M / _DAMPER_NS_PER_M)
+    return min(max(rest + keep * (travel_m - rest), 0.0), _NEAREST_M)
 
 
 class Rig:
@@ -404,11 +357,12 @@ class Rig:
     def __init__(self, settings: BusSettings, world: World | None = None) -> None:
         names = [servo.name for servo in settings.servos]
         self.device = settings.device
-        self._load: TendonWorld | EndStops = EndStops(len(names))
-        if isinstance(world, TendonWorld):
-            world.connect(names, self)
-            self._load = world
-        stiffness = self._load.cable_stiffness
+        self._world = world if isinstance(world, TendonWorld) else None
+        self._travels: Sequence[float] = [0.0] * len(names)
+        stiffness = CABLE_N_PER_M
+        if self._world is not None:
+            self._world.connect(names, self)
+            stiffness = self._world.cable_stiffness
         self.servos = {one.id: SimulatedServo(one, stiffness) for one in settings.servos}
         self._names = dict(zip(names, self.servos.values(), strict=True))
         self.now_ns = 0
@@ -427,7 +381,8 @@ class Rig:
 
     def settle(self) -> None:
         """Turn all spools until their tendons are just taut, wherever the load was moved."""
-        self._travels = self._load.travels()
+        if self._world is not None:
+            self._travels = self._world.travels()
         for servo, travel in zip(self.servos.values(), self._travels, strict=True):
             servo.motor.settle(travel)
 
@@ -462,15 +417,15 @@ class Rig:
             for servo, travel in zip(servos, self._travels, strict=True):
                 servo.advance(self.now_ns, travel)
             dt_s = (self.now_ns - before_ns) / 1e9
-            self._travels = self._load.pull([one.motor.tension for one in servos], dt_s)
+            tensions = [one.motor.tension for one in servos]
+            if self._world is not None:
+                self._travels = self._world.pull(tensions, dt_s)
+            else:
+                pairs = zip(self._travels, tensions, strict=True)
+                self._travels = [pull_spring(*pair, dt_s) for pair in pairs]
 
     def break_servo(self, tendon: str, fault: ServoFault | str) -> None:
-        """Make a servo fail.
-
-        Args:
-            tendon: Name of its tendon.
-            fault: The fault; "" repairs what can be repaired.
-        """
+        """Make the servo of a tendon fail, or repair it."""
         servo = self.servo(tendon)
         match fault:
             case "":
@@ -483,7 +438,7 @@ class Rig:
             case "hot":
                 servo.motor.temperature = _HOT_C
             case "overload":
-                servo.overload()
+                servo.fail(_OVERLOAD)
             case "snapped":
                 servo.motor.snapped = True
             case "power":
