@@ -93,33 +93,17 @@ def _factory() -> Any:
     return importlib.import_module(_OURS).LowAtOnceFactory()
 
 
-def _motor(factory: Any) -> Any:
+def test_pwm_ends_low_at_once_and_stays_low_when_closed(lgpio: _Lgpio) -> None:
+    """Plain gpiozero leaves a pin high for up to 20 ms at 50 Hz, and closes it as an input."""
     from gpiozero import Motor
 
-    return Motor(22, 27, pin_factory=factory)
-
-
-def test_zero_is_low_at_once(lgpio: _Lgpio) -> None:
-    """Plain gpiozero leaves the pin high for up to 20 ms at 50 Hz."""
-    motor = _motor(_factory())
-    motor.forward(0.4)
-    motor.stop()
-    assert lgpio.levels[22] == 0
-    motor.close()
-
-
-def test_both_inputs_are_never_high_when_reversing(lgpio: _Lgpio) -> None:
-    motor = _motor(_factory())
+    factory = _factory()
+    motor = Motor(22, 27, pin_factory=factory)
     motor.forward(0.4)
     motor.backward(0.4)
     assert (lgpio.levels[22], lgpio.levels[27]) == (0, 1)
-    motor.close()
-
-
-def test_closed_outputs_stay_low_outputs(lgpio: _Lgpio) -> None:
-    """Closed pins remain outputs, since inputs would float without a pull-down."""
-    factory = _factory()
-    motor = _motor(factory)
+    motor.stop()
+    assert (lgpio.levels[22], lgpio.levels[27]) == (0, 0)
     motor.forward(1.0)
     motor.close()
     factory.close()

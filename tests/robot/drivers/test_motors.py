@@ -15,19 +15,12 @@ _values = st.floats(-1.0, 1.0)
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
 def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
+    """The smallest value starts the motor; gpiozero truncates, which would make 28 of 0.29."""
     duty = Duty(start, full)
-    assert duty.size_at(duty.of(value)) == pytest.approx(abs(value), abs=0.011 / (full - start))
-
-
-@given(steps=st.integers(1, 100))
-def test_duty_survives_the_truncation_of_lgpio(steps: int) -> None:
-    """Gpiozero computes int(duty * 100), which makes 28 out of 0.29."""
-    assert int(Duty().of(steps / 100) * 100) == steps
-
-
-def test_smallest_value_starts_the_motor() -> None:
-    assert Duty(start=0.25).of(1e-6) == 0.25
-    assert Duty(start=0.25).of(0.0) == 0.0
+    size = duty.of(value)
+    assert duty.size_at(size) == pytest.approx(abs(value), abs=0.011 / (full - start))
+    assert size >= start - 0.005 if value else size == 0.0
+    assert int(size * 100) == round(size * 100)
 
 
 @given(values=st.lists(_values, min_size=1, max_size=8))

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -71,23 +70,20 @@ def test_controller_gets_neutral_until_it_is_armed() -> None:
     assert hardware.factory.widths_us == {12: 0}
 
 
-def _armed(reverse: str) -> tuple[Any, FakeHardware]:
-    hardware = FakeHardware()
-    return hardware.output("esc", **_AT | {"reverse": reverse, "arm_s": 0.0}), hardware
-
-
 @pytest.mark.parametrize(("reverse", "value", "us"), [("none", 0.0, 1500), ("direct", -1.0, 1000)])
 def test_controller_without_a_brake_reverses_at_once_or_not(
     reverse: str, value: float, us: int
 ) -> None:
-    esc, hardware = _armed(reverse)
+    hardware = FakeHardware()
+    esc = hardware.output("esc", **_AT | {"reverse": reverse, "arm_s": 0.0})
     assert esc.write(-1.0, 0) == value
     assert hardware.factory.widths_us == {12: us}
 
 
 def test_controller_brakes_before_it_reverses() -> None:
     """With reverse = "double": brake, neutral, reverse, and again after going forward."""
-    esc, hardware = _armed("double")
+    hardware = FakeHardware()
+    esc = hardware.output("esc", **_AT | {"reverse": "double", "arm_s": 0.0})
     esc.write(1.0, 0)
     sent: list[tuple[float, int]] = []
     for ms in range(0, 600, 100):
