@@ -59,7 +59,7 @@ FilePath = Annotated[str, _printable(4096)]
 class KeyMistake(ValueError):
     """A value of a key that the other keys of its table do not allow.
 
-    `words` say what is wrong, as the end of a sentence that begins with the key and its table.
+    `words` are the reason, as the end of a sentence that begins with the key and its table.
     """
 
     def __init__(self, key: str, words: str) -> None:
