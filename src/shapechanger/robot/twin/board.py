@@ -102,6 +102,7 @@ class Board:
         ledger = at.ledger_path.open("xb", buffering=0)
         wiring = TwinWiring(plan, settings.one_shot_ms)
         self._pins = PinBoard(wiring, world, ledger, seed, self.now_ns, self._camera)
+        self._tick_hz = plan.tick_hz
         self._clock: Literal["real", "twin"] = settings.clock
         own = (self.greet, self.leave, self.wait, self.sleep)
         functions = (*own, *self._pins.functions, *operator_functions(self._pins))
@@ -237,7 +238,6 @@ class TwinTimeBoard(Board):
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
-        self._tick_hz = GuardPlan.from_json(settings.plan).tick_hz
         self._now_ns = START_NS
         self._ticks = 0
         self._sleepers: list[_Sleeper] = []
