@@ -10,7 +10,7 @@ import importlib
 import select
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Final, Protocol
+from typing import Any, ClassVar, Final, NamedTuple, Protocol
 
 from shapechanger.errors import RobotError, translate_errors
 
@@ -87,6 +87,18 @@ class I2cBus(Protocol):
 
     def close(self) -> None:
         """Close the bus."""
+
+
+class ServoReply(NamedTuple):
+    """Reply of a servo.
+
+    Attributes:
+        error: Error byte of the status packet.
+        data: Data of the status packet.
+    """
+
+    error: int
+    data: bytes
 
 
 class Hardware:

@@ -13,7 +13,6 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, Self, TypeVar, cast
 
@@ -337,6 +336,8 @@ _Chip = TypeVar("_Chip", SensorChip, OutputChip, PulseSource)
 @cache
 def _others() -> dict[str, SensorChip | OutputChip | PulseSource]:
     """Return the chips of other packages."""
+    from importlib.metadata import entry_points  # 2 MB that most guards do not need.
+
     found = {point.name: point.load() for point in entry_points(group=_GROUP)}
     for name, chip in found.items():
         if not isinstance(chip, SensorChip | OutputChip | PulseSource):

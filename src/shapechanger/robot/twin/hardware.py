@@ -9,9 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from shapechanger.errors import translate_errors
-from shapechanger.robot.drivers.servos.servo import ServoReply
-from shapechanger.robot.drivers.servos.settings import BusSettings
-from shapechanger.robot.hardware import Clock, Hardware
+from shapechanger.robot.hardware import Clock, Hardware, ServoReply
 from shapechanger.robot.twin.rpc import (
     MAX_MESSAGE,
     BoardClient,
@@ -165,7 +163,7 @@ class TwinHardware(Hardware):
         """Return the I2C bus of a number."""
         return TwinBus(self.board, bus)
 
-    def servo_port(self, settings: BusSettings, open_port: object) -> TwinServoPort:
+    def servo_port(self, settings: Any, open_port: object) -> TwinServoPort:
         """Return the port of the servo bus; its first use fails if the board has no such bus."""
         return TwinServoPort(self.board, settings.device)
 

@@ -18,7 +18,6 @@ from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
-from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
 from shapechanger.robot.drivers.servos.simulation import Rig
 from shapechanger.robot.drivers.simulation import (
@@ -29,6 +28,7 @@ from shapechanger.robot.drivers.simulation import (
     SimulatedChip,
     SimulatedSensor,
 )
+from shapechanger.robot.hardware import ServoReply
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.rpc import BoardConnection
 from shapechanger.robot.twin.wiring import TwinWiring

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.servo import ServoReply
+from shapechanger.robot.hardware import ServoReply
 from tests.robot.drivers.servos.rigs import CYCLE_NS, NAMES, Rig, of
 
 _Fault = Callable[[Rig], object]

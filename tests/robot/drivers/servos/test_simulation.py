@@ -2,8 +2,8 @@
 
 import pytest
 
-from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.simulation import Rig
+from shapechanger.robot.hardware import ServoReply
 from tests.robot.drivers.servos.rigs import NAMES, feetech, line, servo
 
 MS = 1_000_000

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dynamixel_sdk import PacketHandler
 
-from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import FAMILIES, ServoFamily
 from shapechanger.robot.drivers.servos.simulation import Rig
+from shapechanger.robot.hardware import ServoReply
 
 DYNAMIXEL, FEETECH = FAMILIES["Dynamixel"], FAMILIES["Feetech"]
 _SDK = PacketHandler(2.0)

@@ -12,9 +12,9 @@ from typing import Final, Literal
 from msgspec.structs import replace
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.servos.servo import ServoPort, ServoReply, TendonServo
+from shapechanger.robot.drivers.servos.servo import ServoPort, TendonServo
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
-from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.hardware import Hardware, ServoReply
 
 Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from shapechanger.errors import MissingExtra, RobotError, translate_errors
-from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import BusSettings
+from shapechanger.robot.hardware import ServoReply
 
 with translate_errors(ImportError, to=lambda _: MissingExtra("dynamixel-sdk", "finger")):
     from dynamixel_sdk import PacketHandler, PortHandler

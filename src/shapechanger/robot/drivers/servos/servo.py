@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.settings import (
@@ -17,13 +17,7 @@ from shapechanger.robot.drivers.servos.settings import (
     BusSettings,
     ServoSettings,
 )
-
-
-class ServoReply(NamedTuple):
-    """Reply of a servo: error byte and data of its status packet."""
-
-    error: int
-    data: bytes
+from shapechanger.robot.hardware import ServoReply
 
 
 class ServoPort(Protocol):

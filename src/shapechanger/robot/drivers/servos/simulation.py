@@ -26,7 +26,6 @@ from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.contract.world import World
 from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.servos.servo import ServoReply
 from shapechanger.robot.drivers.servos.settings import (
     COUNTS_PER_TURN,
     TRIPPED,
@@ -34,6 +33,7 @@ from shapechanger.robot.drivers.servos.settings import (
     BusSettings,
     ServoSettings,
 )
+from shapechanger.robot.hardware import ServoReply
 
 CABLE_N_PER_M: Final = 20e3
 """Stiffness of cable and frame, N/m. Chosen: a good millimetre for 25 N. The end of the load needs
