@@ -18,7 +18,7 @@ from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
 from shapechanger.robot.profile.profile import QUANTITIES, RobotTable
 from shapechanger.robot.profile.read import DRIVERS, GIVEN, TABLES
-from shapechanger.robot.profile.toml import fields_of, keys_of, permitted
+from shapechanger.robot.profile.toml import fields_of, permitted
 
 _MARK: Final = re.compile(r"^<!-- keys: (\w+) (\w+) -->$", re.MULTILINE)
 
@@ -36,7 +36,7 @@ def _profile_table(name: str) -> Iterator[str]:
     for choosing, chips in chosen.items():
         for driver, chip in chips.items():
             yield f'#### `{choosing} = "{driver}"`'
-            keys = keys_of(chip)
+            keys = chip.keys
             yield _summary(keys) if keys is not Keys else "It has no more keys."
             if quantities := [
                 f"`{quantity}` ({unit})" if unit != "1" else f"`{quantity}`"

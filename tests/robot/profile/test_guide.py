@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from scripts.key_tables import with_keys
+from shapechanger.robot.cameras.camera import CAMERAS
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
 from shapechanger.robot.link.messages import ClientMessage, RobotMessage
 from shapechanger.robot.profile import shipped_profiles
-from shapechanger.robot.profile.read import CAMERAS, TABLES
+from shapechanger.robot.profile.read import TABLES
 from tests.robot.profile.texts import read
 
 DOCS = Path(__file__).parents[3] / "docs"

@@ -40,14 +40,12 @@ def test_a_profile_in_the_working_folder_has_a_name(
 @pytest.mark.parametrize(
     ("name", "hint"),
     [
-        ("my-cra.toml", r"There is no file .*my-cra\.toml; did you mean .*my-car\.toml\?$"),
-        ("trcuk.toml", "did you mean truck, which comes with Shapechanger"),
-        ("zzz.toml", r"zzz\.toml; its folder has my-car\.toml\.$"),
-        ("m.toml", r"m\.toml; its folder has my-car\.toml\.$"),
+        ("my-cra.toml", r"There is no file .*my-cra\.toml \(did you mean my-car in .*\?\); there "),
+        ("trcuk.toml", r"\(did you mean truck of Shapechanger\?\)"),
+        ("zzz.toml", r"zzz\.toml; there are: boat, .*, my-car\.$"),
     ],
 )
 def test_a_missing_profile_has_a_nearest_spelling(tmp_path: Path, name: str, hint: str) -> None:
-    """Files next to it come first, then shipped profiles."""
     (tmp_path / "my-car.toml").touch()
     with pytest.raises(ProfileError, match=hint):
         load_profile(tmp_path / name)
@@ -60,7 +58,7 @@ def test_bom_and_crlf_are_accepted(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ProfileError, match=r"There is no file .*gone\.toml\."):
+    with pytest.raises(ProfileError, match=r"There is no file .*gone\.toml; there are: boat"):
         load_profile(tmp_path / "gone.toml")
     with pytest.raises(ProfileError, match="cannot be read: Is a directory"):
         load_profile(tmp_path)

@@ -1,4 +1,4 @@
-"""Camera interface, frames, and the registry of camera drivers."""
+"""Camera interface, frames, and the kinds of cameras."""
 
 from __future__ import annotations
 
@@ -6,21 +6,65 @@ import os
 import select
 import time
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 from msgspec import Meta
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import FilePath, Keys
 from shapechanger.robot.hardware import load
 
-CAMERA_DRIVERS: Final = {
-    "picamera2": "shapechanger.robot.cameras.picamera2:PiCamera",
-    "v4l2": "shapechanger.robot.cameras.v4l2:V4l2",
-    "file": "shapechanger.robot.cameras.sources:Folder",
-    "pipe": "shapechanger.robot.cameras.sources:Pipe",
-    "pattern": "shapechanger.robot.cameras.sources:Pattern",
+
+class _NumberKeys(Keys, frozen=True, kw_only=True):
+    """A camera on the ribbon cable.
+
+    Attributes:
+        number: Number of the camera.
+    """
+
+    number: Annotated[int, Meta(ge=0, le=9)] = 0
+
+
+class _DeviceKeys(Keys, frozen=True, kw_only=True):
+    """A webcam.
+
+    Attributes:
+        device: Device of the camera.
+    """
+
+    device: FilePath = "/dev/video0"
+
+
+class _PathKeys(Keys, frozen=True, kw_only=True):
+    """A folder of JPEG files, or a stream of them.
+
+    Attributes:
+        path: The folder, or the pipe, the file or "| program arguments" that streams.
+    """
+
+    path: FilePath
+
+
+class CameraKind(NamedTuple):
+    """A kind of camera.
+
+    Attributes:
+        keys: Its keys in a profile, besides those of every camera.
+        opens: MODULE:NAME of its driver, which is called with the plan.
+    """
+
+    keys: type[Keys]
+    opens: str
+
+
+CAMERAS: Final = {
+    "picamera2": CameraKind(_NumberKeys, "shapechanger.robot.cameras.picamera2:PiCamera"),
+    "v4l2": CameraKind(_DeviceKeys, "shapechanger.robot.cameras.v4l2:V4l2"),
+    "file": CameraKind(_PathKeys, "shapechanger.robot.cameras.sources:Folder"),
+    "pipe": CameraKind(_PathKeys, "shapechanger.robot.cameras.sources:Pipe"),
+    "pattern": CameraKind(Keys, "shapechanger.robot.cameras.sources:Pattern"),
 }
-"""MODULE:NAME of each camera driver, keyed by its name in a profile; called with the plan."""
+"""Kinds of cameras by driver."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,4 +177,4 @@ class Camera:
 
 def open_camera(plan: CameraPlan) -> Camera:
     """Open a camera."""
-    return load(CAMERA_DRIVERS[plan.driver])(plan)
+    return load(CAMERAS[plan.driver].opens)(plan)

@@ -16,7 +16,7 @@ from shapechanger.robot.profile.read import read_profile
 _SHIPPED: Final = Path(__file__).parent / "shipped"
 _SUFFIX: Final = ".toml"
 _LARGEST: Final = 1024 * 1024  # Size of the largest profile, bytes.
-_MOST_LISTED: Final = 10
+_MOST_LISTED: Final = 40
 
 CAMERAS: Final = {"ribbon": "picamera2", "usb": "v4l2", "none": ""}
 """Driver of each kind of camera that a new profile can have."""
@@ -67,34 +67,31 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         ProfileError: If the file is missing, unreadable or not UTF-8.
     """
     path = Path(path)
-
-    def refusal(error: Exception) -> ProfileError:
-        if isinstance(error, FileNotFoundError):
-            return ProfileError(f"There is no file {path}{_nearest(path)}")
-        if isinstance(error, UnicodeDecodeError):
-            line = error.object.count(b"\n", 0, error.start) + 1
-            return ProfileError(f"{path}, line {line}: this is not UTF-8 text.")
-        return ProfileError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.")
-
-    # ValueError: NUL in the path.
-    with translate_errors(OSError, ValueError, to=refusal), path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
+    try:
+        with path.open("rb") as file:
+            data = file.read(_LARGEST + 1)
         # Like tomllib for files; Windows editors may prepend a byte-order mark.
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError as error:
+        raise ProfileError(f"There is no file {path}{_instead_of(path)}.") from error
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from error
+    except (OSError, ValueError) as error:  # ValueError: NUL in the path.
+        words = getattr(error, "strerror", None) or error
+        raise ProfileError(f"{path} cannot be read: {words}.") from error
     if len(data) > _LARGEST:
         raise ProfileError(f"{path} is longer than a profile can be, 1 MiB.")
     return text
 
 
-def _nearest(path: Path) -> str:
-    """Return the end of a sentence about a missing profile: the nearest one, or its folder's."""
-    there = sorted(file.stem for file in path.parent.glob(f"*{_SUFFIX}"))
-    if close := difflib.get_close_matches(path.stem, there, n=1):
-        return f"; did you mean {path.with_name(close[0] + _SUFFIX)}?"
-    if close := difflib.get_close_matches(path.stem, shipped_profiles(), n=1):
-        return f"; did you mean {close[0]}, which comes with Shapechanger?"
-    listed = ", ".join(f"{name}{_SUFFIX}" for name in there[:_MOST_LISTED])
-    return f"; its folder has {listed}." if there else "."
+def _instead_of(path: Path) -> str:
+    """Return the end of a sentence about a missing profile: the nearest one, and all of them."""
+    known = dict.fromkeys(shipped_profiles(), " of Shapechanger")
+    known |= {file.stem: f" in {path.parent}" for file in sorted(path.parent.glob(f"*{_SUFFIX}"))}
+    close = difflib.get_close_matches(path.stem, known, n=1)
+    near = f" (did you mean {close[0]}{known[close[0]]}?)" if close else ""
+    return f"{near}; there are: {', '.join([*known][:_MOST_LISTED])}"
 
 
 def starter_text(

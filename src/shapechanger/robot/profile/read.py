@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -14,16 +14,15 @@ from msgspec import Meta
 
 from shapechanger.contract.plan import ActionPlan, LimitPlan, OutputPlan, SensorPlan, StopPlan
 from shapechanger.errors import ProfileError
-from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS, FilePath, Keys
+from shapechanger.robot.cameras.camera import CAMERAS, CameraPlan
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS, Keys
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.drivers.servos.settings import ServoBusKeys
 from shapechanger.robot.profile.profile import CommandTable, Profile, ResetStep, RobotTable
 from shapechanger.robot.profile.rules import RULES
-from shapechanger.robot.profile.toml import Table, choice, fields_of, keys_of
+from shapechanger.robot.profile.toml import Table, choice, fields_of
 
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
-_DIGITS: Final = re.compile(r"[0-9_]{600}")
 
 
 class RewardKeys(Keys, frozen=True, kw_only=True):
@@ -80,45 +79,6 @@ class EmergencyButtonKeys(Keys, frozen=True, kw_only=True):
     pin: Pin
 
 
-class _NumberKeys(Keys, frozen=True, kw_only=True):
-    """A camera on the ribbon cable.
-
-    Attributes:
-        number: Number of the camera.
-    """
-
-    number: Annotated[int, Meta(ge=0, le=9)] = 0
-
-
-class _DeviceKeys(Keys, frozen=True, kw_only=True):
-    """A webcam.
-
-    Attributes:
-        device: Device of the camera.
-    """
-
-    device: FilePath = "/dev/video0"
-
-
-class _PathKeys(Keys, frozen=True, kw_only=True):
-    """A folder of JPEG files, or a stream of them.
-
-    Attributes:
-        path: The folder, or the pipe, the file or "| program arguments" that streams.
-    """
-
-    path: FilePath
-
-
-CAMERAS: Final[Mapping[str, type[Keys]]] = {
-    "picamera2": _NumberKeys,
-    "v4l2": _DeviceKeys,
-    "file": _PathKeys,
-    "pipe": _PathKeys,
-    "pattern": Keys,
-}
-"""Keys of each camera driver."""
-
 TABLES: Final[Mapping[str, tuple[type, ...]]] = {
     "robot": (RobotTable,),
     "action": (ActionPlan,),
@@ -140,7 +100,7 @@ DRIVERS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
     "sensor": {"driver": SENSORS},
     "camera": {"driver": CAMERAS},
 }
-"""Chips, or their keys, that a key of a table chooses from; their keys are keys of the table."""
+"""Chips that a key of a table chooses from; their keys are keys of the table."""
 
 GIVEN: Final = ("name", "measures", "settings", "rows")
 """Fields of `TABLES` and of chips that are no keys of a table, but follow from it."""
@@ -160,37 +120,36 @@ def read_profile(text: str, path: Path) -> Profile:
     root = Table(path, text, (), _toml(text, path))
     for name in root.keys:
         if name not in TABLES:
-            raise root.error((name,), f"a profile has no table or key {choice(name, TABLES)}")
-    robot: RobotTable = _once(root, "robot")
-    actions = {
-        name: _read_action(name, table) for name, table in root.table("action").named().items()
-    }
+            raise root.error(f"a profile has no table or key {choice(name, TABLES)}", name)
+    (robot,) = root.table("robot").decode(RobotTable)
+    actions = tuple(_read_action(table) for table in root.table("action").named().values())
     if not actions:
-        raise root.error(("action",), "a robot needs an action, such as [action.throttle]")
+        raise root.error("a robot needs an action, such as [action.throttle]", "action")
     outputs = tuple(
-        _read_output(name, table) for name, table in root.table("output").named().items()
+        _read_part(table, OutputPlan, name=name)
+        for name, table in root.table("output").named().items()
     )
-    sensors = tuple(
-        _read_sensor(name, table) for name, table in root.table("sensor").named().items()
-    )
+    sensors = tuple(_read_sensor(table) for table in root.table("sensor").named().values())
     pins: dict[str, Any] = {}
     if "enable" in root.keys:
-        enable: EnableKeys = _once(root, "enable")
+        (enable,) = root.table("enable").decode(EnableKeys)
         pins = {"enable_pin": enable.pin, "enable_hold_ms": enable.hold_ms}
     if "emergency_button" in root.keys:
-        pins["stop_pin"] = _once(root, "emergency_button").pin
-    limits, commands = root.table("limits").decode(*TABLES["limits"])
-    reward: RewardKeys = _once(root, "reward")
+        (button,) = root.table("emergency_button").decode(EmergencyButtonKeys)
+        pins["stop_pin"] = button.pin
+    limits, commands = root.table("limits").decode(LimitPlan, CommandTable)
+    (reward,) = root.table("reward").decode(RewardKeys)
+    (stop,) = root.table("stop").decode(StopPlan)
     profile = Profile(
         path=path,
         **vars(robot),
-        actions=tuple(actions.values()),
+        actions=actions,
         outputs=outputs,
         sensors=sensors,
         camera=_read_part(root.table("camera"), CameraPlan) if "camera" in root.keys else None,
         limits=limits,
         **vars(commands),
-        stop=_once(root, "stop"),
+        stop=stop,
         reward={key: float(weight) for key, weight in msgspec.structs.asdict(reward).items()},
         reset=tuple(_reset(root, actions)),
         **pins,
@@ -203,29 +162,19 @@ def read_profile(text: str, path: Path) -> Profile:
 def _toml(text: str, path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except RecursionError:
-        raise ProfileError(f"{path} is not a profile: it is nested too deeply.") from None
     except tomllib.TOMLDecodeError as error:
-        message = str(error)
-        line = text.count("\n") + 1
-        if (at := _AT.fullmatch(message)) is not None:
-            line, message = int(at[2]), f"{at[1]} at column {at[3]}"
-        message = f"this is not valid TOML: {message[:1].lower()}{message[1:]}"
-    except ValueError:  # Python refuses to parse integers with thousands of digits.
-        long = _DIGITS.search(text)
-        line = text.count("\n", 0, long.start() if long else 0) + 1
-        message = "a number has too many digits"
-    raise ProfileError(f"{path}, line {line}: {message}.")
+        at = _AT.fullmatch(str(error))
+        line = int(at[2]) if at else text.count("\n") + 1
+        words = f"{at[1]} at column {at[3]}" if at else str(error)
+        words = f"this is not valid TOML: {words[:1].lower()}{words[1:]}"
+        raise ProfileError(f"{path}, line {line}: {words}.") from None
+    except (RecursionError, ValueError):  # Python refuses integers with thousands of digits.
+        words = "it is nested too deeply, or a number has too many digits"
+        raise ProfileError(f"{path} is not a profile: {words}.") from None
 
 
-def _once(root: Table, name: str) -> Any:
-    """Return the keys of a table that is there once."""
-    (keys,) = root.table(name).decode(*TABLES[name])
-    return keys
-
-
-def _read_action(name: str, table: Table) -> ActionPlan:
-    (action,) = table.decode(ActionPlan, given={"name": name})
+def _read_action(table: Table) -> ActionPlan:
+    (action,) = table.decode(ActionPlan, given={"name": table.place[-1]})
     if "low" not in table.keys and action.one_sided:
         action = replace(action, low=0.0)
     for key, words in action.mistakes():
@@ -233,27 +182,12 @@ def _read_action(name: str, table: Table) -> ActionPlan:
     return action
 
 
-def _read_output(name: str, table: Table) -> OutputPlan:
-    """Read one motor, servo or controller."""
-    for key in DRIVERS["output"]:
-        if "gpiozero" in str(table.keys.get(key)).lower():
-            raise table.refused(
-                key,
-                "cannot be of gpiozero, which makes the pulses of a servo in steps of 200 µs, and "
-                "1.4 ms out of a neutral of 1.5 ms (gpiozero#1209); use the driver servo or esc, "
-                f"over one of {', '.join(PULSES)}",
-            )
-    return _read_part(table, OutputPlan, name=name)
-
-
-def _read_sensor(name: str, table: Table) -> SensorPlan:
+def _read_sensor(table: Table) -> SensorPlan:
     """Read one sensor; one with a table for each joint has these as its rows."""
-    chip = SENSORS[table.chosen("driver", SENSORS)]
+    name, chip = table.place[-1], SENSORS[table.chosen("driver", SENSORS)]
     given: dict[str, Any] = {"name": name, "measures": chip.measures}
     if chip.rows is not None:
-        rows: dict[str, Any] = {
-            key: value for key, value in table.keys.items() if isinstance(value, dict)
-        }
+        rows: dict[str, Any] = {k: v for k, v in table.keys.items() if isinstance(v, dict)}
         if not rows:
             raise table.refused("", f"needs a table for each joint, such as [sensor.{name}.knee]")
         joints = replace(table, keys=rows).named()
@@ -268,28 +202,29 @@ def _read_part(table: Table, plan: type, **given: Any) -> Any:
     kinds: list[type[Keys]] = []
     for key, chips in drivers.items():
         if not kinds or key in fields_of(kinds[0]):
-            kinds.append(keys_of(chips[table.chosen(key, chips)]))
+            kinds.append(chips[table.chosen(key, chips)].keys)
     given["settings"] = {}
     part, *parts = table.decode(plan, *kinds, given=given, drivers=drivers)
     settings = {key: value for keys in parts for key, value in keys.settings().items()}
     return replace(part, settings=settings)
 
 
-def _reset(root: Table, actions: Mapping[str, ActionPlan]) -> Iterator[ResetStep]:
+def _reset(root: Table, actions: Sequence[ActionPlan]) -> Iterator[ResetStep]:
     """Read the reset routine; in each step, actions without a value are at rest."""
     tables = root.keys.get("reset", [])
     if not isinstance(tables, list):
         message = "the steps of the reset routine are written [[reset]], with two brackets"
-        raise root.error(("reset",), message)
+        raise root.error(message, "reset")
+    named = {action.name: action for action in actions}
     for i, keys in enumerate(cast("list[Any]", tables)):
         table = replace(root, place=("reset", i), keys=keys)
         (step,) = table.decode(ResetKeys)
         for name, value in step.values.items():
-            if name not in actions:
-                raise table.refused("values", f"names no action: {choice(name, actions)}", name)
-            low, high = actions[name].low, actions[name].high
+            if name not in named:
+                raise table.refused("values", f"names no action: {choice(name, named)}", name)
+            low, high = named[name].low, named[name].high
             if not low <= value <= high:
                 words = f"must have {low:g} to {high:g} for {name}, its own caps"
                 raise table.refused("values", words, name)
-        filled = tuple(step.values.get(action.name, action.rest) for action in actions.values())
+        filled = tuple(step.values.get(action.name, action.rest) for action in actions)
         yield ResetStep(filled, step.seconds)

@@ -20,7 +20,7 @@ from shapechanger.robot.drivers.servos.settings import (
     stops_itself,
 )
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.profile.toml import Table, choice
+from shapechanger.robot.profile.toml import Table, choice, line_of
 
 
 def check_claims(root: Table, profile: Profile) -> Profile:
@@ -30,10 +30,11 @@ def check_claims(root: Table, profile: Profile) -> Profile:
         before, earlier = users.setdefault(claim.what, (table, claim))
         if earlier is claim or (claim.group and claim.group == earlier.group):
             continue
+        line = line_of(before.text, (*before.place, earlier.key))
         raise table.error(
-            (claim.key,),
-            f"{claim.what}{claim.use} is used twice: by {earlier.key} of {before} "
-            f"(line {before.line(earlier.key)}) and by {claim.key} of {table}",
+            f"{claim.what}{claim.use} is used twice: by {earlier.key} of {before} (line {line}) "
+            f"and by {claim.key} of {table}",
+            claim.key,
         )
     return profile
 
@@ -48,16 +49,14 @@ def share_boards(root: Table, profile: Profile) -> Profile:
             if before == NO_PIN:
                 shared[name] = value
             elif value not in (before, NO_PIN):
-                raise root.error(
-                    ("output", output.name, name),
-                    f"the PCA9685 at {board[1]:#x} of I2C bus {board[0]} has one {name} for all "
-                    f"its channels, {before} or {value}",
-                )
-    outputs = [
+                words = f"the PCA9685 at {board[1]:#x} of I2C bus {board[0]} has one {name} for "
+                words += f"all its channels, {before} or {value}"
+                raise root.error(words, "output", output.name, name)
+    outputs = tuple(
         replace(output, settings=output.settings | boards.get(_board(output), {}))
         for output in profile.outputs
-    ]
-    return replace(profile, outputs=tuple(outputs))
+    )
+    return replace(profile, outputs=outputs)
 
 
 def _board(output: OutputPlan) -> tuple[int, ...]:
@@ -87,11 +86,8 @@ def check_mix(root: Table, profile: Profile) -> Profile:
             raise table.refused("mix", words)
         rest = output.offset + sum(weight * rests[name] for name, weight in output.mix.items())
         if _drives(profile, output) and abs(rest) > _NEARLY_ZERO:
-            raise table.error(
-                ("offset",),
-                f"{table} is at {rest:g} when its actions rest, and must be at 0 then, "
-                "because it propels the robot",
-            )
+            words = "and must be at 0 then, because it propels the robot"
+            raise table.error(f"{table} is at {rest:g} when its actions rest, {words}", "offset")
     for name in rests:
         if not any(name in output.mix for output in profile.outputs):
             raise root.table("action", name).refused("", "moves nothing: no mix names it")
@@ -101,14 +97,11 @@ def check_mix(root: Table, profile: Profile) -> Profile:
 def check_stop(root: Table, profile: Profile) -> Profile:
     """Refuse a stop that holds or ramps an action that contributes to a propelling output."""
     held = [key for key in ("hold_ms", "ramp_ms") if getattr(profile.stop, key)]
-    for output in profile.outputs if held else ():
+    for output in (one for one in profile.outputs if held and _drives(profile, one)):
         for name in output.mix.keys() - _propelling(profile):
-            if _drives(profile, output):
-                raise root.table("stop").refused(
-                    held[0],
-                    f"would keep [output.{output.name}] driving after a stop, because {name!r} "
-                    "moves it and does not propel",
-                )
+            words = f"would keep [output.{output.name}] driving after a stop, because {name!r} "
+            words += "moves it and does not propel"
+            raise root.table("stop").refused(held[0], words)
     return profile
 
 
@@ -142,10 +135,8 @@ def check_limits(root: Table, profile: Profile) -> Profile:
     for name, quantity in limits.measured.items():
         if table.keys.get(name) and quantity not in measured:
             drivers = " or ".join(d for d, chip in SENSORS.items() if chip.measures == quantity)
-            words = (
-                f"needs a sensor that measures {quantity}, such as one with the driver {drivers}"
-            )
-            raise table.refused(name, words)
+            words = f"needs a sensor that measures {quantity}, such as one with the driver "
+            raise table.refused(name, words + drivers)
     key = "camera_stale_ms"
     if camera is None:
         if key in table.keys:
@@ -176,11 +167,9 @@ def join_servo_bus(root: Table, profile: Profile) -> Profile:
     if "servo_bus" not in root.keys:
         raise root.table("output", servos[0].name).refused("", "is on a bus: add [servo_bus]")
     if len(sensing) != 1:
-        raise root.error(
-            ("sensor", *(sensor.name for sensor in sensing[1:2])),
-            f"servos need one sensor with the driver {DRIVER}, such as [sensor.tendons], which "
-            "reports their failures",
-        )
+        words = f"servos need one sensor with the driver {DRIVER}, such as [sensor.tendons], which "
+        second = (sensor.name for sensor in sensing[1:2])
+        raise root.error(f"{words}reports their failures", "sensor", *second)
     if profile.stop.then != "release":
         words = 'must be "release", so that no servo pulls while nobody commands'
         raise root.table("stop").refused("then", words)
@@ -206,12 +195,5 @@ def join_servo_bus(root: Table, profile: Profile) -> Profile:
     )
 
 
-RULES: Final = (
-    check_mix,
-    share_boards,
-    check_stop,
-    check_claims,
-    join_servo_bus,
-    check_limits,
-)
+RULES: Final = (check_mix, share_boards, check_stop, check_claims, join_servo_bus, check_limits)
 """All rules, in the order in which they apply."""

@@ -7,7 +7,7 @@ import re
 import reprlib
 import tomllib
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import date, time
@@ -37,25 +37,23 @@ def line_of(text: str, place: Place) -> int:
         place: The table or key; for a missing one the line of its table is returned.
     """
     lines = text.split("\n")
-    while not _has(lines, len(lines), place):
-        place = place[:-1]
-    counts = range(1, len(lines) + 1)
-    return 1 + bisect_left(counts, True, key=lambda count: _has(lines, count, place))
 
-
-def _has(lines: list[str], count: int, place: Place) -> bool:
-    """Return whether the first `count` lines, with all of their last statement, have a place."""
-    while True:
-        try:
-            data: Any = tomllib.loads("\n".join(lines[:count]))
-            break
-        except tomllib.TOMLDecodeError:
+    def depth(count: int) -> int:
+        """Return how much of the place is in the first lines, with all of their last statement."""
+        while True:
+            with suppress(tomllib.TOMLDecodeError):
+                data: Any = tomllib.loads("\n".join(lines[:count]))
+                break
             count += 1
-    with suppress(KeyError, IndexError, TypeError):
-        for name in place:
-            data = data[name]
-        return True
-    return False
+        found = 0
+        with suppress(KeyError, IndexError, TypeError):
+            for name in place:
+                data = data[name]
+                found += 1
+        return found
+
+    counts = range(1, len(lines) + 1)
+    return 1 + bisect_left(counts, depth(len(lines)), key=depth)
 
 
 def choice(name: str, known: Iterable[str]) -> str:
@@ -64,7 +62,7 @@ def choice(name: str, known: Iterable[str]) -> str:
     return f"{name!r}{_nearest(name, names)}; there are: {', '.join(names) or 'none'}"
 
 
-def _nearest(name: str, known: Sequence[str]) -> str:
+def _nearest(name: str, known: Iterable[str]) -> str:
     # A key without its unit, such as `slew` for `slew_per_s`, may not be close.
     with_unit = sorted((one for one in known if one.startswith(f"{name}_")), key=len)
     close = [*with_unit, *difflib.get_close_matches(name, known, n=1)]
@@ -90,11 +88,6 @@ def fields_of(kind: type) -> dict[str, inspect.Field]:
     """Return the keys that a Struct or dataclass declares, keyed by name."""
     info = cast("inspect.StructType", inspect.type_info(kind))
     return {field.encode_name: field for field in info.fields}
-
-
-def keys_of(chip: Any) -> type[Keys]:
-    """Return the keys of a chip, or of a camera, which is no chip."""
-    return getattr(chip, "keys", chip)
 
 
 def permitted(kind: inspect.Type) -> str:
@@ -159,25 +152,19 @@ class Table:
             return f"[[{'.'.join(map(str, names))}]] number {last + 1}"
         return f"[{'.'.join(map(str, self.place))}]"
 
-    def line(self, *keys: str | int) -> int:
-        """Return the line of one of its keys; for a missing one, the line of the table."""
-        return line_of(self.text, (*self.place, *keys))
-
-    def error(self, keys: Sequence[str | int], message: str) -> ProfileError:
-        """Return an error with the file, the line of a key and a message."""
-        return ProfileError(f"{self.path}, line {self.line(*keys)}: {message}.")
+    def error(self, message: str, *keys: str | int) -> ProfileError:
+        """Return an error with the file, a message, and the line of a key or of the table."""
+        line = line_of(self.text, (*self.place, *keys))
+        return ProfileError(f"{self.path}, line {line}: {message}.")
 
     def refused(self, key: str, words: str, *within: str) -> ProfileError:
         """Return an error about a key, or an entry within it; "" for the table itself.
 
-        Args:
-            key: Name of the key.
-            words: What is wrong, as the end of a sentence that begins with the key and its table.
-            within: Entry of the key.
+        `words` are the end of a sentence that begins with the key and its table.
         """
         if not key:
-            return self.error((), f"{self} {words}")
-        return self.error((key, *within), f"{key} of {self} {words}")
+            return self.error(f"{self} {words}")
+        return self.error(f"{key} of {self} {words}", key, *within)
 
     def table(self, *names: str) -> Table:
         """Return a nested table, which is empty if the file does not have it."""
@@ -193,19 +180,14 @@ class Table:
             raise self.refused("", words)
         for name in self.keys:
             if _NAME.fullmatch(name) is None:
-                raise self.error(
-                    (name,),
-                    f"the name {name!r} must begin with a letter and have at most 32 letters, "
-                    "digits, '_' and '-'",
-                )
+                words = "must begin with a letter and have at most 32 letters, digits, '_' and '-'"
+                raise self.error(f"the name {name!r} {words}", name)
         return {name: self.table(name) for name in self.keys}
 
     def chosen(self, key: str, names: Iterable[str]) -> str:
         """Return the value of a key that is one of some names."""
         kind = inspect.LiteralType(tuple(names))
-        if key not in self.keys:
-            raise self._lacks(key, kind)
-        if self.keys[key] not in kind.values:
+        if self.keys.get(key) not in kind.values:
             raise self._unfit(key, kind)
         return self.keys[key]
 
@@ -214,49 +196,44 @@ class Table:
         *kinds: type,
         given: Mapping[str, Any] | None = None,
         drivers: Mapping[str, Mapping[str, Any]] | None = None,
-    ) -> tuple[Any, ...]:
+    ) -> list[Any]:
         """Return one value of each type, whose fields together are the keys of the table.
 
         Args:
             kinds: Structs and dataclasses.
             given: Fields that are no keys of the table.
-            drivers: Chips, or their keys, that a key of the table chooses from, keyed by this key:
-                an unknown key may belong to another one.
+            drivers: Chips that a key of the table chooses from, keyed by this key: an unknown key
+                may belong to another one.
         """
         given = given or {}
         known = {n: one for kind in kinds for n, one in fields_of(kind).items() if n not in given}
-        for name in self.keys:
-            if name not in known:
-                raise self.error((name,), self._unknown(name, known, drivers or {}))
+        for name in (one for one in self.keys if one not in known):
+            for key, chips in (drivers or {}).items():
+                having = [repr(one) for one in chips if name in fields_of(chips[one].keys)]
+                if having:
+                    words = f"{name!r} belongs to {key} = {' or '.join(having)}, not to {self}"
+                    raise self.error(words, name)
+            raise self.error(f"{self} has no key {choice(name, known)}", name)
         for name, one in known.items():
             if one.required and name not in self.keys:
-                raise self._lacks(name, one.type)
-        found = tuple(self._converted(kind, {**self.keys, **given}) for kind in kinds)
+                raise self._unfit(name, one.type)
+        found: list[Any] = []
+        for kind in kinds:
+            try:
+                found.append(msgspec.convert({**self.keys, **given}, kind, dec_hook=_pin))
+            except msgspec.ValidationError as error:
+                cause = error.__cause__
+                if isinstance(cause, KeyMistake):
+                    raise self.refused(cause.key, str(cause)) from None
+                key = _PATH.findall(str(error))[0]  # Missing keys were found before.
+                raise self._unfit(key, fields_of(kind)[key].type, str(cause or "")) from None
         self.decoded.extend((self, keys) for keys in found if isinstance(keys, Keys))
         return found
 
-    def _unknown(self, name: str, known: Iterable[str], drivers: Mapping[str, Any]) -> str:
-        for key, chips in drivers.items():
-            having = [repr(one) for one in chips if name in fields_of(keys_of(chips[one]))]
-            if having:
-                return f"{name!r} belongs to {key} = {' or '.join(having)}, not to {self}"
-        return f"{self} has no key {choice(name, known)}"
-
-    def _converted(self, kind: type, keys: dict[str, Any]) -> Any:
-        try:
-            return cast("Any", msgspec.convert(keys, kind, dec_hook=_pin))
-        except msgspec.ValidationError as error:
-            cause = error.__cause__
-            if isinstance(cause, KeyMistake):
-                raise self.refused(cause.key, str(cause)) from None
-            key = _PATH.findall(str(error))[0]  # Missing keys were found before.
-            raise self._unfit(key, fields_of(kind)[key].type, str(cause or "")) from None
-
-    def _lacks(self, key: str, kind: inspect.Type) -> ProfileError:
-        return self.refused("", f"lacks the key {key!r}, {permitted(kind)}")
-
     def _unfit(self, key: str, kind: inspect.Type, why: str = "") -> ProfileError:
-        """Return an error about a value that the type of its key does not permit."""
+        """Return an error about a key that is missing, or whose type does not permit its value."""
+        if key not in self.keys:
+            return self.refused("", f"lacks the key {key!r}, {permitted(kind)}")
         value = self.keys[key]
         why = why or f"not {shown(value)}"
         if isinstance(kind, inspect.LiteralType) and isinstance(value, str):
