@@ -101,7 +101,7 @@ def test_stale_orders_have_no_effect() -> None:
     late = _T0 + 5_000 * MS
     orders = [arm(_T0), *(command(i, _T0 + i * 20 * MS) for i in range(1, 100))]
     assert all(rules.offer(order, late) for order in orders)
-    assert not rules.arming.armed
+    assert not rules.armed
     assert not rules.offer(arm(late), late)
     assert rules.tick(late).actions == (0.0, 0.0)
 
@@ -128,7 +128,7 @@ def test_a_halt_ends_the_newest_command_and_leaves_the_robot_armed() -> None:
     rules = _driving(quick_car())
     assert not rules.offer(Order("halt"), _T0)
     assert rules.tick(_T0).seq is None
-    assert rules.arming.armed
+    assert rules.armed
 
 
 def test_an_emergency_stop_latches_until_acknowledged() -> None:
@@ -136,7 +136,7 @@ def test_an_emergency_stop_latches_until_acknowledged() -> None:
     rules.offer(Order("emergency", reason="a child."), _T0)
     rules.offer(Order("emergency"), _T0)
     assert rules.tick(_T0).stop_reason == "Emergency stop: a child."
-    assert rules.arming.emergencies == 2
+    assert rules.emergencies == 2
     rules.offer(Order("disarm", reason="the lease was lost."), _T0)
     assert rules.tick(_T0).stop_reason == "Emergency stop: a child."
     for seen in (0, 1, 3):
@@ -155,7 +155,7 @@ def test_only_a_person_ends_an_emergency_stop() -> None:
     rules.stop("a child.")
     refusal = rules.offer(arm(_T0, 1, person=False), _T0)
     assert refusal == "Not armed: only a person ends an emergency stop."
-    assert not rules.arming.armed
+    assert not rules.armed
     assert not rules.offer(arm(_T0, 1), _T0)
 
 
@@ -171,7 +171,7 @@ def test_a_pressed_button_stops_and_prevents_arming() -> None:
     rules = _driving(quick_car())
     rules.press(True)
     rules.press(True)
-    assert rules.arming.emergencies == 1
+    assert rules.emergencies == 1
     assert "button" in rules.offer(arm(_T0, 1), _T0)
     rules.press(False)
     assert rules.tick(_T0).stop_reason == "Emergency stop: the button was pressed."
@@ -348,7 +348,7 @@ def test_a_near_obstacle_prevents_driving_forward() -> None:
 
 @pytest.mark.parametrize(
     "sensing",
-    [Sensing(), Sensing({"distance": 2.0}, {"distance": "eye"}, silent=frozenset({"other"}))],
+    [Sensing(), Sensing({"distance": 2.0}, {"distance": "eye"}, silent={"other"})],
 )
 def test_an_unknown_distance_prevents_driving_forward(sensing: Sensing) -> None:
     rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
@@ -377,7 +377,7 @@ def test_a_controller_at_neutral_does_not_stall() -> None:
 @pytest.mark.parametrize("name", ["wheel", "bumper"])
 def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
     rules = _driving(quick_car())
-    rules.sense(Sensing(failures={name: "Slow."}, slow=frozenset({name})), _T0)
+    rules.sense(Sensing(failures={name: "Slow."}, slow={name}), _T0)
     decision = rules.tick(_T0)
     assert decision.seq is None
     assert decision.stop_reason == f"Sensor {name} holds up the robot: Slow."
@@ -564,7 +564,7 @@ def test_a_failed_thermometer_stops() -> None:
 def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool) -> None:
     plan = replace(quick_car(), sensors=(SensorPlan("spools", "bus_servo", "tendons"),))
     rules = _driving(plan)
-    late = frozenset({"spools"}) if slow else frozenset[str]()
+    late = {"spools"} if slow else set[str]()
     rules.sense(Sensing(failures={"spools": "Overload."}, slow=late), _T0)
-    assert rules.arming.armed is armed
+    assert rules.armed is armed
     assert rules.tick(_T0).actions == (0.0, 0.0)

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from shapechanger.robot.guard.sensors import merge
+from shapechanger.robot.guard.sensors import Sensing
 
 
 @pytest.mark.parametrize(
@@ -23,16 +23,14 @@ def test_the_order_of_sensors_does_not_matter(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
     for pair in itertools.permutations(zip(values, ("one", "two"), strict=True)):
-        quantities: dict[str, float] = {}
-        sources: dict[str, str] = {}
+        sensing = Sensing()
         for value, sensor in pair:
-            merge(quantities, sources, {name: value}, sensor)
-        assert quantities == {name: counts}
-        assert sources == {name: dict(zip(values, ("one", "two"), strict=True))[counts]}
+            sensing.merge({name: value}, sensor)
+        assert sensing.quantities == {name: counts}
+        assert sensing.sources == {name: dict(zip(values, ("one", "two"), strict=True))[counts]}
 
 
 def test_the_last_reading_of_other_quantities_counts() -> None:
-    quantities = {"yaw_rate": 1.0}
-    sources = {"yaw_rate": "one"}
-    merge(quantities, sources, {"yaw_rate": 0.5}, "two")
-    assert (quantities, sources) == ({"yaw_rate": 0.5}, {"yaw_rate": "two"})
+    sensing = Sensing({"yaw_rate": 1.0}, {"yaw_rate": "one"})
+    sensing.merge({"yaw_rate": 0.5}, "two")
+    assert sensing == Sensing({"yaw_rate": 0.5}, {"yaw_rate": "two"})

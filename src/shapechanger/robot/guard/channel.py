@@ -6,11 +6,9 @@ of `SOCK_SEQPACKET` sockets, which preserve message boundaries, and share one mo
 
 from __future__ import annotations
 
-import contextlib
 import os
 import select
 import socket
-import sys
 import time
 from typing import Final, Literal
 
@@ -22,8 +20,6 @@ MAX_DATAGRAM: Final = 16 * 1024
 # A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
 # same, should it send as fast as it is read.
 _MOST_ORDERS_A_ROUND: Final = 1024
-_FD_BYTES: Final = 4  # A descriptor in an ancillary message is an int of C.
-_DESCRIPTOR: Final = socket.CMSG_SPACE(_FD_BYTES)
 
 
 class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -122,38 +118,62 @@ decode_order: Final = msgspec.json.Decoder(Order).decode
 decode_state: Final = msgspec.json.Decoder(GuardState).decode
 
 
-class DaemonChannel:
-    """Channel over the daemon's socket."""
+class _Socket:
+    """End of a socket to another process of the robot, which never blocks.
+
+    Attributes:
+        lost: Whether the other process has disconnected or died.
+    """
 
     def __init__(self, fd: int) -> None:
         self._socket = socket.socket(fileno=fd)
         self._socket.setblocking(False)
         self._socket.set_inheritable(False)
-        self._life: int | None = None
-        self._dead = select.poll()
+        self._dead = select.poll()  # What can be read only once the other process is dead.
         self.lost = False
-        """Whether the daemon has disconnected or died."""
+
+    def _look(self) -> None:
+        """Notice whether the other process is alive."""
+        if self._dead.poll(0):
+            self.lost = True
+
+    def _send(self, data: bytes) -> bool:
+        """Send data, and return whether it fitted into the socket."""
+        try:
+            self._socket.send(data)
+        except BlockingIOError:
+            return False
+        except (BrokenPipeError, ConnectionResetError):
+            self.lost = True
+            return False
+        return True
+
+
+class DaemonChannel(_Socket):
+    """Channel over the daemon's socket."""
+
+    def __init__(self, fd: int) -> None:
+        super().__init__(fd)
+        self._life: list[int] = []
 
     def filenos(self) -> list[int]:
         """Return the socket and the lifeline, which closes when the daemon dies."""
-        life = [] if self._life is None else [self._life]
-        return [self._socket.fileno(), *life]
+        return [self._socket.fileno(), *self._life]
 
     def orders(self) -> tuple[list[Order], list[str]]:
         """Return the orders that have arrived, and a reason for each datagram that is not one."""
-        if self._life is not None and self._dead.poll(0):  # The lifeline carries no data.
-            self.lost = True
+        self._look()
         orders: list[Order] = []
         malformed: list[str] = []
         for _ in range(_MOST_ORDERS_A_ROUND):
             try:
-                data, sent, flags, _ = self._socket.recvmsg(MAX_DATAGRAM, _DESCRIPTOR)
+                data, fds, flags, _ = socket.recv_fds(self._socket, MAX_DATAGRAM, 1)
             except BlockingIOError:
                 break
             except ConnectionResetError:
-                data, sent, flags = b"", [], 0
-            if sent:
-                self._watch(sent)
+                data, fds, flags = b"", [], 0
+            if fds:
+                self._watch(fds[0])
                 continue
             if not data:  # End of stream; no sender uses empty datagrams.
                 self.lost = True
@@ -169,49 +189,31 @@ class DaemonChannel:
 
     def send(self, state: GuardState) -> bool:
         """Send a state, and return whether it fitted into the socket."""
-        try:
-            self._socket.send(encode(state))
-        except BlockingIOError:
-            return False
-        except (BrokenPipeError, ConnectionResetError):
-            self.lost = True
-            return False
-        return True
+        return self._send(encode(state))
 
-    def _watch(self, sent: list[tuple[int, int, bytes]]) -> None:
-        """Adopt the lifeline, whose end closes when the daemon dies."""
-        kind = (socket.SOL_SOCKET, socket.SCM_RIGHTS)
-        for level, number, data in sent:
-            whole = len(data) - len(data) % _FD_BYTES
-            for at in range(0, whole if (level, number) == kind else 0, _FD_BYTES):
-                fd = int.from_bytes(data[at : at + _FD_BYTES], sys.byteorder)
-                if self._life is None:
-                    self._life = fd
-                    self._dead.register(fd, select.POLLIN)
-                else:  # The first is kept; the daemon sends one.
-                    os.close(fd)
+    def _watch(self, fd: int) -> None:
+        """Adopt the lifeline, whose end closes when the daemon dies; it carries no data."""
+        if self._life:  # The first is kept; the daemon sends one.
+            os.close(fd)
+            return
+        self._life = [fd]
+        self._dead.register(fd, select.POLLIN)
 
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
-        if self._life is not None:
-            os.close(self._life)
-            self._life = None
+        while self._life:
+            os.close(self._life.pop())
 
 
-class Heartbeat:
+class Heartbeat(_Socket):
     """Heartbeat to the supervisor, which also detects the supervisor's death."""
 
     def __init__(self, fd: int, period_s: float) -> None:
-        self._socket = socket.socket(fileno=fd)
-        self._socket.setblocking(False)
-        self._socket.set_inheritable(False)
-        self._poll = select.poll()
-        self._poll.register(fd, select.POLLIN)
+        super().__init__(fd)
+        self._dead.register(fd, select.POLLIN)  # The supervisor sends no data.
         self._period_ns = round(period_s * 1e9)
         self._beaten_ns = 0
-        self.lost = False
-        """Whether the supervisor has died."""
 
     def fileno(self) -> int:
         """Return the file descriptor to wait for."""
@@ -219,26 +221,17 @@ class Heartbeat:
 
     def beat(self) -> None:
         """Send a beat if one is due, and notice whether the supervisor is alive."""
-        if self._poll.poll(0):  # The supervisor sends no data, so this is the end of the stream.
-            self.lost = True
+        self._look()
         now_ns = time.monotonic_ns()
-        if self.lost or now_ns - self._beaten_ns < self._period_ns:
-            return
-        self._beaten_ns = now_ns
-        try:
+        if not self.lost and now_ns - self._beaten_ns >= self._period_ns:
+            self._beaten_ns = now_ns
             # A full socket means that the supervisor does not read, which does not stop the robot.
-            with contextlib.suppress(BlockingIOError):
-                self._socket.send(b".")
-        except (BrokenPipeError, ConnectionResetError):
-            self.lost = True
+            self._send(b".")
 
     def leave(self) -> int:
-        """Stop beating, but keep the socket open until the process exits.
+        """Stop beating, but keep the socket open until the process exits; return its descriptor.
 
         The supervisor takes its end as the death of the process: closed too early, it would kill a
         process that is about to exit by itself.
-
-        Returns:
-            The descriptor.
         """
         return self._socket.detach()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.errors import RobotError
@@ -34,7 +34,6 @@ class Switches:
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
-        self._enable: Any = None
         self._button: Any = None
         if plan.stop_pin is not None:
             from gpiozero import InputDevice
@@ -42,8 +41,8 @@ class Switches:
             # Closes to ground; a cut wire is not detected.
             factory = hardware.pin_factory()
             self._button = InputDevice(plan.stop_pin, pull_up=True, pin_factory=factory)
-        if plan.enable_pin is not None:
-            self._enable = enable_device(plan.enable_pin, hardware)
+        pin = plan.enable_pin
+        self._enable = None if pin is None else enable_device(pin, hardware)
 
     @property
     def pressed(self) -> bool:
@@ -69,29 +68,20 @@ class Switches:
 _STEP: Final = 0.06
 
 
-class Applied(NamedTuple):
-    """Applied outputs.
-
-    Attributes:
-        actions: One number for each action.
-        reason: Outputs that differ from the decision, and why; empty if none does.
-    """
-
-    actions: tuple[float, ...]
-    reason: str
-
-
 def estimated(
     plan: GuardPlan, actions: Sequence[float], requested: Sequence[float], has: Sequence[float]
-) -> Applied:
+) -> tuple[tuple[float, ...], str]:
     """Estimate the applied actions of a robot from the values that its outputs have.
 
     An action whose outputs deviate has the value farthest from rest among the outputs of it alone.
+
+    Returns:
+        One number for each action; and which outputs differ from the decision and why, "" if none.
     """
     pairs = zip(plan.outputs, requested, has, strict=True)
     deviating = [output for output, wanted, value in pairs if abs(wanted - value) > _STEP]
     if not deviating:
-        return Applied(tuple(actions), "")
+        return tuple(actions), ""
     rest = output_values(plan, [action.rest for action in plan.actions])
     applied: list[float] = []
     for action, decided in zip(plan.actions, actions, strict=True):
@@ -109,7 +99,7 @@ def estimated(
             ]
             applied.append(max(found, key=lambda v: abs(v - action.rest), default=decided))
     reasons = [f"Output {output.name}: {OUTPUTS[output.driver].differs}." for output in deviating]
-    return Applied(tuple(applied), " ".join(reasons))
+    return tuple(applied), " ".join(reasons)
 
 
 def _propelling_first(plan: GuardPlan) -> GuardPlan:
@@ -138,16 +128,18 @@ class OutputBank:
                 driver = OUTPUTS[output.driver].open(output, hardware)
                 undo.callback(driver.close)
                 self._drivers.append((output, driver))
-            self._devices = _devices(driver for _, driver in self._drivers)
+            # The servo buses, which several drivers share.
+            devices = (getattr(driver, "device", None) for _, driver in self._drivers)
+            self._devices: list[ServoBus] = [*dict.fromkeys(filter(None, devices))]
             for device in self._devices:
                 device.begin()
             undo.pop_all()
 
-    def write(self, actions: Sequence[float], now_ns: int) -> Applied:
+    def write(self, actions: Sequence[float], now_ns: int) -> tuple[tuple[float, ...], str]:
         """Write all outputs, including unchanged ones: some controllers need several writes.
 
         Returns:
-            The applied outputs.
+            The applied actions, and which outputs differ; see `estimated`.
         """
         values = output_values(self._plan, actions)
         for (output, driver), value in zip(self._drivers, values, strict=True):
@@ -158,11 +150,7 @@ class OutputBank:
         return estimated(self._plan, actions, values, tuple(self.values.values()))
 
     def ready(self, alive: Callable[[], object]) -> str:
-        """Reset outputs that had a fault.
-
-        Returns:
-            Why an output cannot be reset; empty if all can move.
-        """
+        """Reset outputs that had a fault; return why one cannot be reset, or ""."""
         try:
             for device in self._devices:
                 device.ready(alive)
@@ -180,11 +168,7 @@ class OutputBank:
         self.released = True
 
     def rest(self, now_ns: int) -> list[str]:
-        """Put every output to rest, even after one of them failed.
-
-        Returns:
-            Description of the failures.
-        """
+        """Put every output to rest, even after one of them failed; return the failures."""
         failures: list[str] = []
         values = output_values(self._plan, self._rest)
         for (output, driver), value in zip(self._drivers, values, strict=True):
@@ -197,11 +181,7 @@ class OutputBank:
         return failures
 
     def close(self, now_ns: int) -> list[str]:
-        """Put every output to rest and close it.
-
-        Returns:
-            Description of the failures.
-        """
+        """Put every output to rest and close it; return the failures."""
         # A released output must not be energised again.
         failures = [] if self.released else self.rest(now_ns)
         for output, driver in self._drivers:
@@ -209,16 +189,6 @@ class OutputBank:
                 driver.close()
         self._drivers.clear()
         return failures
-
-
-def _devices(drivers: Iterable[OutputDriver]) -> list[ServoBus]:
-    """Return the servo buses that the drivers share, to which their attribute `device` refers."""
-    found: list[ServoBus] = []
-    for driver in drivers:
-        device: ServoBus | None = getattr(driver, "device", None)
-        if device is not None and device not in found:
-            found.append(device)
-    return found
 
 
 @contextlib.contextmanager
@@ -237,7 +207,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     No other process may have the outputs open.
 
     Returns:
-        Description of the failures.
+        A description of each failure.
     """
     failures: list[str] = []
     opened: list[tuple[str, OutputDriver]] = []

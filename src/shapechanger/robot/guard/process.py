@@ -22,7 +22,7 @@ import msgspec
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import DaemonChannel, GuardState, Heartbeat
-from shapechanger.robot.guard.outputs import Applied, OutputBank, Switches
+from shapechanger.robot.guard.outputs import OutputBank, Switches
 from shapechanger.robot.guard.rules import OutputDecision, Rules
 from shapechanger.robot.guard.running import (
     AFTER_FAILURE,
@@ -106,6 +106,10 @@ class Guard:
             elif has_something:
                 until_ns = self.round(self._clock.now_ns())
 
+    def end(self, number: int, _: object) -> None:
+        """End because of a signal."""
+        self.ended = self.ended or f"ended by {signal.Signals(number).name}"
+
     def close(self) -> None:
         """Put all outputs to rest and release everything."""
         self._opened.close()
@@ -173,7 +177,7 @@ class Guard:
             self._log.warning("Sensor %s fails: %s", name, sensing.failures[name])
         for name in self._failures.keys() - sensing.failures.keys():
             self._log.info("Sensor %s responds again.", name)
-        self._failures = dict(sensing.failures)
+        self._failures = sensing.failures
 
     def _apply(self, now_ns: int) -> OutputDecision:
         decision = self._rules.tick(now_ns)
@@ -183,9 +187,12 @@ class Guard:
             if decision.release:
                 self._outputs.release()
             else:
-                decision = self._with_applied(
-                    decision, self._outputs.write(decision.actions, now_ns)
-                )
+                actions, words = self._outputs.write(decision.actions, now_ns)
+                self._rules.learn(actions)
+                reason = decision.stop_reason
+                if decision.seq is not None:  # A robot at rest obeys, if slightly later.
+                    reason = f"{reason} {words}".strip()
+                decision = replace(decision, actions=actions, stop_reason=reason)
         except Exception as error:  # Whatever a driver raises, the other outputs must rest.
             self._healthy = False
             self._rules.fail(str(error) or type(error).__name__, now_ns)
@@ -195,19 +202,11 @@ class Guard:
             self._applied_ns = None if decision.seq is None else self._clock.now_ns()
         return decision
 
-    def _with_applied(self, decision: OutputDecision, outputs: Applied) -> OutputDecision:
-        """Return the decision as the outputs applied it."""
-        self._rules.learn(outputs.actions)
-        reason = decision.stop_reason
-        if decision.seq is not None:  # A robot at rest obeys, if slightly later.
-            reason = f"{reason} {outputs.reason}".strip()
-        return replace(decision, actions=outputs.actions, stop_reason=reason)
-
     def _recover(self, decision: OutputDecision, now_ns: int) -> OutputDecision:
         """Put all outputs to rest, retrying until each of them obeys."""
         failures = self._outputs.rest(now_ns)
         self._healthy = not failures
-        if failures and not self._rules.arming.emergency:
+        if failures and not self._rules.emergency:
             self._rules.fail(" ".join(failures), now_ns)
         self._applied, self._applied_ns = (0, None), None
         if decision.seq is not None:
@@ -218,14 +217,13 @@ class Guard:
         return replace(decision, stop_reason=f"NOT at rest: {words} {decision.stop_reason}")
 
     def _report(self, decision: OutputDecision, now_ns: int) -> None:
-        arming, senses = self._rules.arming, self._rules.senses
-        refused, refused_seq = self._refused
-        session, seq = self._applied
+        rules = self._rules
+        (refused, refused_seq), (session, seq) = self._refused, self._applied
         state = GuardState(
             at_ns=now_ns,
-            armed=arming.armed,
-            emergency=arming.emergency,
-            emergencies=arming.emergencies,
+            armed=rules.armed,
+            emergency=rules.emergency,
+            emergencies=rules.emergencies,
             stop_reason=shortened(decision.stop_reason, _MOST_REASON_BYTES),
             applied=decision.actions,
             applied_session=session,
@@ -234,25 +232,23 @@ class Guard:
             refused=shortened(refused, _MOST_REASON_BYTES),
             refused_seq=refused_seq,
             outputs=dict(self._outputs.values),
-            quantities=senses.quantities,
-            sources=senses.sources,
-            bumps=self._rules.bumps,
+            quantities=rules.senses.quantities,
+            sources=rules.senses.sources,
+            bumps=rules.bumps,
         )
-        self._log_change(arming.reason or "Armed.")
+        if (fact := rules.disarmed or "Armed.") != self._logged:
+            self._log.info("%s", fact)
+            self._logged = fact
         sent = self._sent
         # The next tick would be too late for some of them.
-        if sent is not None and now_ns + self._period_ns - sent.at_ns <= _STATE_EVERY_NS:
-            is_news = state != msgspec.structs.replace(sent, at_ns=now_ns)
-        else:
-            is_news = True
+        is_news = (
+            sent is None
+            or now_ns + self._period_ns - sent.at_ns > _STATE_EVERY_NS
+            or state != msgspec.structs.replace(sent, at_ns=now_ns)
+        )
         if is_news and not self._daemon.lost and self._daemon.send(state):
             self._sent = msgspec.structs.replace(state, refused="", refused_seq=None)
             self._refused = ("", None)
-
-    def _log_change(self, fact: str) -> None:
-        if fact != self._logged:
-            self._log.info("%s", fact)
-            self._logged = fact
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -273,16 +269,8 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
     after_failure = list(arguments[:1]) == [AFTER_FAILURE]
     names = ("--plan-fd", "--daemon-fd", "--heartbeat-fd")
     fds = descriptors(arguments[1:] if after_failure else arguments, names)
-    endings: list[str] = []
-    guard: Guard | None = None
-
-    def end(number: int, _: object) -> None:
-        endings.append(f"ended by {signal.Signals(number).name}")
-        if guard is not None:
-            guard.ended = endings[0]
-
-    signal.signal(signal.SIGTERM, end)
-    signal.signal(signal.SIGINT, end)
+    ends = {signal.SIGTERM, signal.SIGINT}
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # Until there is a guard to end.
     with contextlib.ExitStack() as opened:
         daemon = DaemonChannel(fds["--daemon-fd"])
         opened.callback(daemon.close)
@@ -293,8 +281,9 @@ def _guard(arguments: Sequence[str], log: logging.Logger) -> None:
         opened.callback(hardware.close)
         guard = Guard(plan.guard, hardware, daemon, log, after_failure=after_failure)
         opened.callback(guard.close)
-        if endings:  # During set-up.
-            guard.ended = endings[0]
+        for number in ends:
+            signal.signal(number, guard.end)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ends)
         run_promptly(GUARD)
         log.info("guards %s with %d outputs.", plan.guard.name, len(plan.guard.outputs))
         guard.run(heartbeat)

@@ -7,6 +7,7 @@ No pins, sockets or clocks, so that every rule can be tested at any time. The gu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from shapechanger.contract.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import Order
 from shapechanger.robot.guard.running import shortened
-from shapechanger.robot.guard.sensors import Sensing, with_conclusions
+from shapechanger.robot.guard.sensors import Sensing
 
 # Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor
 # starts, must not stop the robot.
@@ -54,26 +55,20 @@ class RobotHealth:
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
         """Update with a new sensing."""
-        failing = [
-            f"Sensor {name} fails, and can protect no longer: {sensing.failures[name]}"
-            for name in self._protecting
-            if name in sensing.failures and name not in sensing.slow
-        ]
-        # Even a sensor without a reflex: a slow one delays every stop.
-        failing += [
-            f"Sensor {name} holds up the robot: {sensing.failures[name]}"
-            for name in sorted(sensing.slow)
-        ]
-        limits, quantities = self._limits, sensing.quantities
-        volts = quantities.get("battery")
-        is_low = limits.low_battery_v > 0.0 and volts is not None and volts < limits.low_battery_v
-        self._is_low = self._low.holds(is_low, now_ns)
+        failing: list[str] = []
+        for name, why in sensing.failures.items():
+            if name in sensing.slow:  # Even one without a reflex delays every stop.
+                failing.append(f"Sensor {name} holds up the robot: {why}")
+            elif name in self._protecting:
+                failing.append(f"Sensor {name} fails, and can protect no longer: {why}")
+        low_v, high_c = self._limits.low_battery_v, self._limits.high_temperature_c
+        volts = sensing.quantities.get("battery", math.inf)
+        self._is_low = self._low.holds(low_v > 0.0 and volts < low_v, now_ns)
         if self._is_low:
-            self._battery = f"The battery has {volts:.2f} V, less than {limits.low_battery_v:g} V."
-        degrees = quantities.get("temperature")
-        limit_c = limits.high_temperature_c
-        if self._hot.holds(limit_c > 0.0 and degrees is not None and degrees > limit_c, now_ns):
-            failing.append(f"The computer has {degrees:.0f} C, more than {limit_c:g} C.")
+            self._battery = f"The battery has {volts:.2f} V, less than {low_v:g} V."
+        degrees = sensing.quantities.get("temperature", -math.inf)
+        if self._hot.holds(high_c > 0.0 and degrees > high_c, now_ns):
+            failing.append(f"The computer has {degrees:.0f} C, more than {high_c:g} C.")
         self._others = tuple(failing)
 
     def rearm(self) -> None:
@@ -95,74 +90,23 @@ FUTURE_NS = 50_000_000
 """Tolerance for times in the future, ns. Both processes read one clock, so this is generous."""
 
 
-class Arming:
-    """Arming state: starts disarmed; an emergency stop latches until a person who saw it arms.
-
-    Attributes:
-        armed: Whether commands move anything.
-        emergency: Whether an emergency stop is in force.
-        emergencies: Number of emergency stops.
-        reason: Why nothing may move; empty while armed.
-    """
-
-    def __init__(self) -> None:
-        self.armed = False
-        self.emergency = False
-        self.emergencies = 0
-        self.reason = "Not armed."
-
-    def arm(self, seen: int, *, person: bool) -> str:
-        """Arm, and end an emergency stop.
-
-        Returns:
-            Why it stays disarmed; empty if it is armed now.
-        """
-        if self.emergency and not person:
-            return "Not armed: only a person ends an emergency stop."
-        if self.emergency and seen != self.emergencies:
-            return (
-                f"Not armed: there were {self.emergencies} emergency stops, and whoever armed "
-                f"has seen {seen}."
-            )
-        self.armed, self.emergency, self.reason = True, False, ""
-        return ""
-
-    def disarm(self, reason: str) -> None:
-        """Disarm; the reason of an emergency stop is kept."""
-        self.armed, reason = False, shortened(reason)
-        if not self.emergency:
-            self.reason = f"Disarmed: {reason}" if reason else "Disarmed."
-
-    def stop(self, reason: str) -> None:
-        """Latch an emergency stop. Each call counts; the first reason is kept."""
-        reason = shortened(reason)
-        if not self.emergency:
-            self.reason = f"Emergency stop: {reason}" if reason else "Emergency stop."
-        self.armed, self.emergency = False, True
-        self.emergencies += 1
-
-
 class Stopping:
     """A stop: propulsion rests at once; other actions hold, ramp to rest and may be released."""
 
     def __init__(
-        self,
-        plan: StopPlan,
-        actions: Sequence[ActionPlan],
-        values: Sequence[float],
-        since_ns: int,
+        self, plan: StopPlan, actions: Sequence[ActionPlan], values: Sequence[float], since_ns: int
     ) -> None:
         self._actions = actions
         self._values = values
         self._then = plan.then
-        self._hold_end_ns = since_ns + plan.hold_ms * _NS_PER_MS
         self._ramp_ns = plan.ramp_ms * _NS_PER_MS
-        self.end_ns = self._hold_end_ns + self._ramp_ns
-        """When all of them rest."""
+        self._hold_end_ns = since_ns + plan.hold_ms * _NS_PER_MS
+        self._end_ns = self._hold_end_ns + self._ramp_ns
 
     def values(self, now_ns: int) -> tuple[float, ...]:
         """Return the value of each action."""
-        left = self._left(now_ns)
+        # Remaining part of the way to rest, 1 to 0.
+        left = min(1.0, max(0, self._end_ns - now_ns) / max(1, self._ramp_ns))
         return tuple(
             action.rest if action.propels else action.rest + left * (value - action.rest)
             for action, value in zip(self._actions, self._values, strict=True)
@@ -170,19 +114,11 @@ class Stopping:
 
     def releases(self, now_ns: int) -> bool:
         """Return whether the outputs are released."""
-        return self._then == "release" and now_ns >= self.end_ns
+        return self._then == "release" and now_ns >= self._end_ns
 
     def next_ns(self, now_ns: int) -> int | None:
         """Return the time of the next change; None if it never or continuously changes."""
-        return next((t for t in (self._hold_end_ns, self.end_ns) if t > now_ns), None)
-
-    def _left(self, now_ns: int) -> float:
-        """Return the remaining part of the way to rest, 1 to 0."""
-        if now_ns < self._hold_end_ns:
-            return 1.0
-        if now_ns >= self.end_ns:
-            return 0.0
-        return (self.end_ns - now_ns) / self._ramp_ns
+        return next((t for t in (self._hold_end_ns, self._end_ns) if t > now_ns), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +143,13 @@ class OutputDecision:
 class Rules:
     """Safety rules of one robot.
 
+    It starts disarmed. An emergency stop latches until a person who saw it arms.
+
     Attributes:
-        arming: Whether commands may move anything.
+        armed: Whether commands move anything.
+        emergency: Whether an emergency stop is in force.
+        emergencies: Number of emergency stops.
+        disarmed: Why nothing may move; empty while armed.
         senses: Newest sensor readings, and what follows from them.
     """
 
@@ -219,11 +160,14 @@ class Rules:
                     f"Action {action.name!r} rests at {action.rest:g}, outside its caps "
                     f"{action.low:g} to {action.high:g}."
                 )
-        self.arming = Arming()
+        self.armed = False
+        self.emergency = False
+        self.emergencies = 0
+        self.disarmed = "Not armed."
         self.senses = Sensing()
         self._plan = plan
         self._period_ns = round(1e9 / plan.tick_hz)
-        self._stale_ns = plan.limits.camera_stale_ms * 1_000_000
+        self._stale_ns = plan.limits.camera_stale_ms * _NS_PER_MS
         self._newest = (-1, -1)  # Session and number of the newest command.
         self._reflexes = MotionReflexes(plan)
         self._health = RobotHealth(plan)
@@ -250,11 +194,7 @@ class Rules:
         return self._reflexes.bump.count
 
     def offer(self, order: Order, now_ns: int) -> str:
-        """Process an order.
-
-        Returns:
-            Why it is refused; empty if it is not.
-        """
+        """Process an order; return why it is refused, or an empty string."""
         self._see_frame(order, now_ns)
         match order.kind:
             case "command":
@@ -276,14 +216,17 @@ class Rules:
         self._command = None
 
     def disarm(self, reason: str) -> None:
-        """Keep everything at rest until armed again."""
-        self._command = None
-        self.arming.disarm(reason)
+        """Keep everything at rest until armed again; the reason of an emergency stop is kept."""
+        self._command, self.armed = None, False
+        if not self.emergency:
+            self.disarmed = _sentence("Disarmed", reason)
 
     def stop(self, reason: str) -> None:
-        """Emergency stop."""
-        self._command = None
-        self.arming.stop(reason)
+        """Latch an emergency stop. Each call counts; the first reason is kept."""
+        if not self.emergency:
+            self.disarmed = _sentence("Emergency stop", reason)
+        self._command, self.armed, self.emergency = None, False, True
+        self.emergencies += 1
 
     def fail(self, reason: str, now_ns: int) -> None:
         """Latch an emergency stop without hold or ramp, after an output failed."""
@@ -298,20 +241,19 @@ class Rules:
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
         """Update with new sensor readings."""
-        silent = bool(sensing.silent)
-        self._reflexes.sense(sensing.quantities, silent, self._done, now_ns)
+        self._reflexes.sense(sensing.quantities, bool(sensing.silent), self._done, now_ns)
         self._health.sense(sensing, now_ns)
         # Faulty servos have released, and an intermittent magnet is loose: a person has to inspect
         # them and arm again.
         for name in self._disarming:
-            if name in sensing.failures and name not in sensing.slow and self.arming.armed:
+            if name in sensing.failures and name not in sensing.slow and self.armed:
                 self.disarm(sensing.failures[name])
         stall = self._reflexes.stall
-        self.senses = with_conclusions(
-            sensing,
+        sensing.conclude(
             speed=self._reflexes.propulsion.speed(self._done),
             stalled=stall.way != 0 if stall.watches else None,
         )
+        self.senses = sensing
 
     def tick(self, now_ns: int) -> OutputDecision:
         """Decide what the outputs do from now on."""
@@ -351,24 +293,13 @@ class Rules:
         return min(time_ns for time_ns in times if time_ns > now_ns)
 
     def _offer_command(self, order: Order, now_ns: int) -> str:
-        if refusal := self._staleness(order, now_ns):
-            return refusal
-        wanted, given = len(self._plan.actions), len(order.values)
-        if given != wanted:
-            self.halt()  # Its sender has superseded the previous command.
-            return f"Command {order.seq} has {given} values; this robot has {wanted} actions."
-        if not self.arming.armed:
-            return f"Command {order.seq} is refused. {self.arming.reason}"
-        self._command = order
-        self._expiry_ns = self._end_ns(order, now_ns)
-        return ""
+        """Accept a command, or return why it is refused.
 
-    def _staleness(self, order: Order, now_ns: int) -> str:
-        """Return why a command is repeated, out of order, too old or from the future, or "".
-
-        A command replaces its predecessors even when it is refused for another reason, because its
-        sender has superseded them.
+        Older ones are refused even after a command that was refused itself, because their sender
+        has superseded them.
         """
+        limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
+        expiry_ns = min(order.issued_ns, now_ns) + limit_ms * _NS_PER_MS
         if (order.session, order.seq) <= self._newest:
             session, seq = self._newest
             return (
@@ -378,25 +309,31 @@ class Rules:
         self._newest = (order.session, order.seq)
         if order.issued_ns > now_ns + FUTURE_NS:
             return f"Command {order.seq} comes from the future."
-        if now_ns >= self._end_ns(order, now_ns):
+        if now_ns >= expiry_ns:
             age_ms = (now_ns - order.issued_ns) / _NS_PER_MS
-            limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
             return f"Command {order.seq} is {age_ms:.0f} ms old; it may act for {limit_ms} ms."
+        wanted, given = len(self._plan.actions), len(order.values)
+        if given != wanted:
+            self.halt()
+            return f"Command {order.seq} has {given} values; this robot has {wanted} actions."
+        if not self.armed:
+            return f"Command {order.seq} is refused. {self.disarmed}"
+        self._command, self._expiry_ns = order, expiry_ns
         return ""
 
-    def _end_ns(self, order: Order, arrived_ns: int) -> int:
-        """Return the time at which a command expires, ns."""
-        limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
-        return min(order.issued_ns, arrived_ns) + limit_ms * _NS_PER_MS
-
     def _arm(self, order: Order, now_ns: int) -> str:
-        if self._is_pressed:
-            return "Not armed: the emergency button is pressed."
         age_ns = now_ns - order.issued_ns
-        if age_ns >= _ARM_WITHIN_NS:
-            return f"Not armed: the order to arm is {age_ns / 1e9:.1f} s old."
-        if refusal := self.arming.arm(order.emergency, person=order.person):
-            return refusal
+        seen = f"there were {self.emergencies} emergency stops, and whoever armed has seen "
+        refusals = (
+            (self._is_pressed, "the emergency button is pressed."),
+            (age_ns >= _ARM_WITHIN_NS, f"the order to arm is {age_ns / 1e9:.1f} s old."),
+            (self.emergency and not order.person, "only a person ends an emergency stop."),
+            (self.emergency and order.emergency != self.emergencies, f"{seen}{order.emergency}."),
+        )
+        for is_refused, why in refusals:
+            if is_refused:
+                return f"Not armed: {why}"
+        self.armed, self.emergency, self.disarmed = True, False, ""
         self._command = None  # Earlier commands must not take effect now.
         self._health.rearm()
         return ""
@@ -408,14 +345,11 @@ class Rules:
 
     def _reason(self, now_ns: int) -> str:
         """Return why the newest command must not act, or an empty string."""
-        if reason := self.arming.reason or self._health.reason:
+        if reason := self.disarmed or self._health.reason:
             return reason
         # Commands carry the time of the newest frame, so without a command its age is unknown.
         if self._command is None or now_ns >= self._expiry_ns:
             return "No fresh command."
-        return self._blindness(now_ns)
-
-    def _blindness(self, now_ns: int) -> str:
         if not self._stale_ns:
             return ""
         if self._frame_ns is None:
@@ -450,3 +384,7 @@ class Rules:
         actions = self._plan.actions
         plan = StopPlan(then=self._plan.stop.then)
         return Stopping(plan, actions, [a.rest for a in actions], now_ns)
+
+
+def _sentence(state: str, reason: str) -> str:
+    return f"{state}: {shortened(reason)}" if reason else f"{state}."

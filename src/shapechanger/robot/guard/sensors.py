@@ -6,7 +6,7 @@ import contextlib
 import math
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 from shapechanger.contract.plan import GuardPlan
@@ -27,19 +27,6 @@ _CAUTION: Final[dict[str, Callable[[float], float]]] = {
 }
 
 
-def merge(
-    quantities: dict[str, float],
-    sources: dict[str, str],
-    measured: Mapping[str, float],
-    sensor: str,
-) -> None:
-    """Merge the readings of one more sensor."""
-    for name, value in measured.items():
-        caution = _CAUTION.get(name)
-        if name not in quantities or not caution or caution(value) > caution(quantities[name]):
-            quantities[name], sources[name] = value, sensor
-
-
 _ESTIMATED = "estimated"
 """Source of a quantity that is estimated from the command."""
 
@@ -58,27 +45,34 @@ class Sensing:
 
     quantities: dict[str, float] = field(default_factory=dict[str, float])
     sources: dict[str, str] = field(default_factory=dict[str, str])
-    failures: Mapping[str, str] = field(default_factory=dict[str, str])
-    slow: frozenset[str] = frozenset()
-    silent: frozenset[str] = frozenset()
+    failures: dict[str, str] = field(default_factory=dict[str, str])
+    slow: set[str] = field(default_factory=set[str])
+    silent: set[str] = field(default_factory=set[str])
 
+    def merge(self, measured: Mapping[str, float], sensor: str) -> None:
+        """Add the readings of one more sensor."""
+        known = self.quantities
+        for name, value in measured.items():
+            caution = _CAUTION.get(name)
+            if name not in known or not caution or caution(value) > caution(known[name]):
+                known[name], self.sources[name] = value, sensor
 
-def with_conclusions(sensing: Sensing, *, speed: float | None, stalled: bool | None) -> Sensing:
-    """Return a sensing with the quantities that follow from it.
+    def conclude(self, *, speed: float | None, stalled: bool | None) -> None:
+        """Add the quantities that follow from the readings.
 
-    `speed` is the estimated speed, m/s, and `stalled` is None where nothing watches for a stall.
-    """
-    quantities, sources = dict(sensing.quantities), dict(sensing.sources)
-    if stalled is not None:
-        quantities["stall"], sources["stall"] = float(stalled), sources["speed"]
-    if "speed" not in quantities and speed is not None:
-        quantities["speed"], sources["speed"] = speed, _ESTIMATED
-    signs = [name for name in ("bump", "stall") if name in quantities]
-    if signs:  # A collision shows in a bumper, or else in a stall.
-        sign = next((name for name in signs if quantities[name] > 0.0), signs[0])
-        quantities["collision"] = float(quantities[sign] > 0.0)
-        sources["collision"] = _ESTIMATED if sign == "stall" else sources[sign]
-    return replace(sensing, quantities=quantities, sources=sources)
+        `speed` is the estimated speed, m/s, and `stalled` is None where nothing watches for a
+        stall.
+        """
+        quantities, sources = self.quantities, self.sources
+        if stalled is not None:
+            quantities["stall"], sources["stall"] = float(stalled), sources["speed"]
+        if "speed" not in quantities and speed is not None:
+            quantities["speed"], sources["speed"] = speed, _ESTIMATED
+        signs = [name for name in ("bump", "stall") if name in quantities]
+        if signs:  # A collision shows in a bumper, or else in a stall.
+            sign = next((name for name in signs if quantities[name] > 0.0), signs[0])
+            quantities["collision"] = float(quantities[sign] > 0.0)
+            sources["collision"] = _ESTIMATED if sign == "stall" else sources[sign]
 
 
 _MOST_READ_NS: Final = 20_000_000
@@ -101,11 +95,7 @@ class Sensors:
 
     def read(self, now_ns: int, direction: float) -> Sensing:
         """Read all sensors."""
-        quantities: dict[str, float] = {}
-        sources: dict[str, str] = {}
-        failures: dict[str, str] = {}
-        slow: set[str] = set()
-        silent: set[str] = set()
+        sensing = Sensing()
         # A twin's clock is paused meanwhile, so that its runs are reproducible on any machine.
         ended_ns = self._clock.now_ns()
         for name, driver in self._drivers:
@@ -114,20 +104,21 @@ class Sensors:
             try:
                 measured = driver.read(now_ns, direction)
             except (RobotError, OSError) as error:
-                failures[name] = str(error)
+                sensing.failures[name] = str(error)
             ended_ns = self._clock.now_ns()
             if ended_ns - began_ns > _MOST_READ_NS:
-                slow.add(name)
+                sensing.slow.add(name)
                 words = f"It took more than {_MOST_READ_NS // 1_000_000} ms to answer."
-                failures[name] = f"{failures.get(name, '')} {words}".lstrip()
+                sensing.failures[name] = f"{sensing.failures.get(name, '')} {words}".lstrip()
             if not all(map(math.isfinite, measured.values())):
-                failures.setdefault(name, "It returned a value that is not finite.")
+                sensing.failures.setdefault(name, "It returned a value that is not finite.")
                 continue
-            if name in self._ranging and name not in failures and "distance" not in measured:
-                silent.add(name)
+            answers = name in self._ranging and name not in sensing.failures
+            if answers and "distance" not in measured:
+                sensing.silent.add(name)
             # A slow reading is still valid.
-            merge(quantities, sources, measured, name)
-        return Sensing(quantities, sources, failures, frozenset(slow), frozenset(silent))
+            sensing.merge(measured, name)
+        return sensing
 
     def close(self) -> None:
         """Release all sensors."""

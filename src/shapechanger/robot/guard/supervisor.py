@@ -21,7 +21,6 @@ import socket
 import subprocess
 import sys
 import time
-from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, Literal
@@ -77,11 +76,6 @@ class Child:
         self._pidfd = os.pidfd_open(self._process.pid)
 
     @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._process.pid
-
-    @property
     def code(self) -> int | None:
         """Exit code, negative for a signal; None while it runs."""
         return self._process.returncode
@@ -92,17 +86,16 @@ class Child:
 
     def is_gone(self, now_ns: int) -> bool:
         """Read its heartbeats and return whether it has exited."""
+        beats: bytes | None = None
         try:
-            while beats := self._heart.recv(4096):
-                self.has_beaten, self.beaten_ns = True, now_ns
-                if len(beats) < 4096:
-                    break
-            is_closed = not beats
+            beats = self._heart.recv(1 << 16)
         except BlockingIOError:
-            is_closed = False
+            pass  # There was none since the last look.
         except ConnectionResetError:
-            is_closed = True
-        return self._process.poll() is not None or is_closed
+            beats = b""
+        if beats:
+            self.has_beaten, self.beaten_ns = True, now_ns
+        return self.has_ended() or beats == b""
 
     def has_ended(self) -> bool:
         """Return whether the process has exited."""
@@ -115,9 +108,8 @@ class Child:
         self._wait(at_most_s)
 
     def terminate(self) -> None:
-        """Send SIGTERM."""
-        if not self.has_ended():
-            self._process.terminate()
+        """Send SIGTERM, unless the process has exited."""
+        self._process.terminate()
 
     def end(self, at_most_s: float, reap_s: float) -> None:
         """Send SIGTERM, then SIGKILL if it has not exited in time."""
@@ -145,7 +137,7 @@ class Restarts:
     def __init__(self, most: int = 5, within_s: float = 60.0) -> None:
         self._most = most
         self._within_ns = round(within_s * 1e9)
-        self._times_ns: deque[int] = deque()
+        self._times_ns: list[int] = []
 
     @property
     def pause_s(self) -> float:
@@ -154,12 +146,11 @@ class Restarts:
 
     def may_restart(self, now_ns: int) -> bool:
         """Return whether another restart is permitted now, and count it."""
-        while self._times_ns and now_ns - self._times_ns[0] >= self._within_ns:
-            self._times_ns.popleft()
-        if len(self._times_ns) >= self._most:
-            return False
-        self._times_ns.append(now_ns)
-        return True
+        self._times_ns = [t for t in self._times_ns if now_ns - t < self._within_ns]
+        may = len(self._times_ns) < self._most
+        if may:
+            self._times_ns.append(now_ns)
+        return may
 
 
 _ENDED: Final = 0
@@ -196,11 +187,7 @@ class Supervisor:
             end.setblocking(False)
 
     def run(self) -> int:
-        """Run the processes until asked to end.
-
-        Returns:
-            The exit code.
-        """
+        """Run the processes until asked to end, and return the exit code."""
         preload(self._plan.guard, self._plan.hardware[0])
         signal.set_wakeup_fd(self._waker.fileno(), warn_on_full_buffer=False)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -215,20 +202,18 @@ class Supervisor:
                 why = self._supervise(guard, daemon)
             finally:
                 self._stop(guard, daemon)
+            if not self._end_reason:
+                if not self._is_safe:
+                    self._log.critical("gives up: %s, and not all outputs are at rest.", why)
+                    return _NOT_SAFE
+                if not self._restarts.may_restart(time.monotonic_ns()):
+                    self._log.critical("gives up: %s, once too often.", why)
+                    return _FAILED_TOO_OFTEN
+                self._log.warning("%s; both start afresh, and the robot is not armed.", why)
+                self._pause(self._restarts.pause_s)
             if self._end_reason:
                 self._log.info("ends: %s.", self._end_reason)
                 return _ENDED if self._is_safe else _NOT_SAFE
-            if not self._is_safe:
-                self._log.critical("gives up: %s, and not all outputs are at rest.", why)
-                return _NOT_SAFE
-            if not self._restarts.may_restart(time.monotonic_ns()):
-                self._log.critical("gives up: %s, once too often.", why)
-                return _FAILED_TOO_OFTEN
-            self._log.warning("%s; both start afresh, and the robot is not armed.", why)
-            self._pause(self._restarts.pause_s)
-            if self._end_reason:
-                self._log.info("ends: %s.", self._end_reason)
-                return _ENDED
             after_failure = (AFTER_FAILURE,)
 
     def _end(self, number: int, _: object) -> None:

@@ -75,7 +75,7 @@ def profile_text(path: str | os.PathLike[str]) -> str:
     except FileNotFoundError as error:
         raise ProfileError(f"There is no file {path}{_instead_of(path)}.") from error
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
+        line = error.object.count(b"\n", 0, error.start) + 1
         raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from error
     except (OSError, ValueError) as error:  # ValueError: NUL in the path.
         words = getattr(error, "strerror", None) or error
