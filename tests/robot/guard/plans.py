@@ -46,6 +46,7 @@ def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardP
             SensorPlan("wheel", "encoder", "speed"),
             SensorPlan("eye", "hcsr04", "distance"),
             SensorPlan("meter", "ina219", "battery"),
+            SensorPlan("chip", "cpu_temperature", "temperature"),
         ),
         limits=limits or LimitPlan(),
         stop=stop or StopPlan(),

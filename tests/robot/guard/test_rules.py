@@ -49,19 +49,6 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
     assert rules.tick(end).stop_reason == "No fresh command."
 
 
-def test_a_ttl_can_shorten_but_not_extend_the_deadline() -> None:
-    rules = _armed(quick_car())
-    assert not rules.offer(command(1, _T0, ttl_ms=20), _T0)
-    assert rules.tick(_T0 + 20 * MS - 1).seq == 1
-    assert rules.tick(_T0 + 20 * MS).seq is None
-
-
-def test_a_command_slightly_in_the_future_counts_from_now() -> None:
-    rules = _armed(quick_car())
-    assert not rules.offer(command(1, _T0 + 50 * MS), _T0)
-    assert rules.tick(_T0 + 250 * MS).seq is None
-
-
 @pytest.mark.parametrize(
     ("order", "words"),
     [
@@ -81,56 +68,6 @@ def test_stale_commands_are_refused(order: Order, words: str) -> None:
     assert rules.tick(_T0).seq == 5
 
 
-def test_an_invalid_command_ends_the_previous_one() -> None:
-    rules = _driving(quick_car())
-    assert "1 values" in rules.offer(command(5, _T0, (0.1,)), _T0)
-    assert rules.tick(_T0).stop_reason == "No fresh command."
-    assert not rules.offer(command(6, _T0), _T0)
-    assert "not newer" in rules.offer(command(4, _T0, (0.1,)), _T0)
-    assert rules.tick(_T0).seq == 6
-
-
-def test_a_refused_command_supersedes_older_ones() -> None:
-    rules = _armed(quick_car())
-    assert rules.offer(command(7, _T0 - 300 * MS), _T0)
-    assert "not newer" in rules.offer(command(6, _T0), _T0)
-
-
-def test_stale_orders_have_no_effect() -> None:
-    rules = Rules(quick_car(), _T0)
-    late = _T0 + 5_000 * MS
-    orders = [arm(_T0), *(command(i, _T0 + i * 20 * MS) for i in range(1, 100))]
-    assert all(rules.offer(order, late) for order in orders)
-    assert not rules.armed
-    assert not rules.offer(arm(late), late)
-    assert rules.tick(late).actions == (0.0, 0.0)
-
-
-def test_commands_before_arming_have_no_effect() -> None:
-    rules = _driving(quick_car())
-    assert not rules.offer(Order("disarm", reason="the lease was lost."), _T0 + 1)
-    stopped = rules.tick(_T0 + 1)
-    assert stopped.actions == (0.0, 0.0)
-    assert stopped.stop_reason == "Disarmed: the lease was lost."
-    assert not rules.offer(arm(_T0 + 2), _T0 + 2)
-    assert rules.tick(_T0 + 2).actions == (0.0, 0.0)
-    rules.disarm("")
-    assert rules.tick(_T0 + 3).stop_reason == "Disarmed."
-
-
-def test_ending_disarms() -> None:
-    rules = _driving(quick_car())
-    assert not rules.offer(Order("end"), _T0)
-    assert rules.tick(_T0).seq is None
-
-
-def test_a_halt_ends_the_newest_command_and_leaves_the_robot_armed() -> None:
-    rules = _driving(quick_car())
-    assert not rules.offer(Order("halt"), _T0)
-    assert rules.tick(_T0).seq is None
-    assert rules.armed
-
-
 def test_an_emergency_stop_latches_until_acknowledged() -> None:
     rules = _driving(quick_car())
     rules.offer(Order("emergency", reason="a child."), _T0)
@@ -141,22 +78,18 @@ def test_an_emergency_stop_latches_until_acknowledged() -> None:
     assert rules.tick(_T0).stop_reason == "Emergency stop: a child."
     for seen in (0, 1, 3):
         assert "2 emergency stops" in rules.offer(arm(_T0, seen), _T0)
-    assert "refused" in rules.offer(command(2, _T0), _T0)
+    refusal = rules.offer(arm(_T0, 2, person=False), _T0)
+    assert refusal == "Not armed: only a person ends an emergency stop."
+    refusal = rules.offer(command(2, _T0), _T0)
+    assert refusal == "Command 2 is refused. Emergency stop: a child."
     assert not rules.offer(arm(_T0, 2), _T0)
+    assert rules.tick(_T0).seq is None
     assert not rules.offer(command(3, _T0), _T0)
     assert rules.tick(_T0).seq == 3
+    rules.offer(Order("disarm", reason="the lease was lost."), _T0)
+    assert rules.tick(_T0).stop_reason == "Disarmed: the lease was lost."
     rules.stop("")
     assert rules.tick(_T0).stop_reason == "Emergency stop."
-
-
-def test_only_a_person_ends_an_emergency_stop() -> None:
-    rules = Rules(quick_car(), _T0)
-    assert not rules.offer(arm(_T0, person=False), _T0)
-    rules.stop("a child.")
-    refusal = rules.offer(arm(_T0, 1, person=False), _T0)
-    assert refusal == "Not armed: only a person ends an emergency stop."
-    assert not rules.armed
-    assert not rules.offer(arm(_T0, 1), _T0)
 
 
 def test_reasons_are_truncated() -> None:
@@ -296,13 +229,6 @@ def test_without_a_command_no_stale_frame_is_reported() -> None:
     assert rules.tick(_T0 + 300 * MS).stop_reason == "No fresh command."
 
 
-def test_a_frame_slightly_in_the_future_counts_from_now() -> None:
-    rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
-    rules.offer(command(1, _T0, frame_ns=_T0 + 50 * MS), _T0)
-    assert rules.tick(_T0 + 100 * MS - 1).seq == 1
-    assert rules.tick(_T0 + 100 * MS).seq is None
-
-
 def _sense(rules: Rules, now_ns: int, **quantities: float) -> None:
     names = {"bump": "bumper", "speed": "wheel", "distance": "eye", "battery": "meter"}
     sources = {name: names.get(name, "else") for name in quantities}
@@ -407,36 +333,12 @@ def test_no_stall_while_moving_or_at_low_throttle() -> None:
     for ms in range(0, 4_000, 100):
         _sense(rules, _T0 + ms * MS, speed=0.2 if ms % 300 == 0 else 0.0)
     assert rules.senses.quantities["stall"] == 0.0
+    _sense(rules, _T0)
+    assert rules.senses.quantities == {}
     _ask(rules, 2, _T0, 0.2)
     for ms in range(0, 4_000, 100):
         _sense(rules, _T0 + ms * MS, speed=0.0)
     assert rules.senses.quantities["stall"] == 0.0
-
-
-def test_no_stall_without_a_speed_or_limit() -> None:
-    rules = _driving(quick_car())
-    _sense(rules, _T0)
-    assert rules.senses.quantities == {}
-    rules = _driving(quick_car(LimitPlan(stall_s=0.0)))
-    _sense(rules, _T0, speed=0.0)
-    assert rules.senses.quantities == {"speed": 0.0}
-
-
-def test_a_low_battery_is_debounced_and_latched() -> None:
-    rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
-    _sense(rules, _T0, battery=6.0)
-    _sense(rules, _T0 + 400 * MS, battery=6.5)
-    _sense(rules, _T0 + 500 * MS, battery=6.0)
-    _sense(rules, _T0 + 999 * MS, battery=6.0)  # 499 ms: not counted yet.
-    assert _ask(rules, 2, _T0 + 999 * MS, 0.5) == (0.5, "")
-    _sense(rules, _T0 + 1_000 * MS, battery=6.05)
-    words = "The battery has 6.05 V, less than 6.4 V."
-    assert rules.tick(_T0 + 1_000 * MS).stop_reason == words
-    later = _T0 + 1_010 * MS
-    _sense(rules, later, battery=7.0)
-    assert rules.tick(later).stop_reason == words
-    assert not rules.offer(arm(later), later)
-    assert _ask(rules, 3, later, 0.5) == (0.5, "")
 
 
 @pytest.mark.parametrize(("name", "bad"), [("battery", 6.3), ("temperature", 80.5)])
@@ -451,34 +353,30 @@ def test_a_low_battery_and_a_hot_computer_count_after_half_a_second(name: str, b
         assert bool(rules.tick(_T0 + after_ns).stop_reason) is stops
 
 
-def test_a_battery_exactly_at_its_limit_is_not_low() -> None:
+def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
-    for ms in range(0, 1200, 100):
-        _sense(rules, _T0 + ms * MS, battery=6.4 if ms < 700 else 6.39)
-    assert _ask(rules, 2, _T0 + 1_199 * MS, 0.5) == (0.5, "")
-    _sense(rules, _T0 + 1_200 * MS, battery=6.39)
-    assert "battery" in rules.tick(_T0 + 1_200 * MS).stop_reason
-
-
-def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
-    rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
-    for ms in range(0, 600, 100):
-        _sense(rules, _T0 + ms * MS, battery=6.0)
-    later = _T0 + 600 * MS
+    for ms in (0, 400, 500, 999, 1_000):  # It is believed after 500 ms without interruption.
+        assert rules.tick(_T0 + ms * MS).stop_reason in ("", "No fresh command.")
+        _sense(rules, _T0 + ms * MS, battery=6.4 if ms == 400 else 6.05)
+    words = "The battery has 6.05 V, less than 6.4 V."
+    later = _T0 + 1_010 * MS
+    assert rules.tick(later).stop_reason == words
     rules.offer(arm(later), later)
-    rules.offer(command(2, later), later)
-    assert "battery" in rules.tick(later).stop_reason
+    assert rules.tick(later).stop_reason == words
+    _sense(rules, later, battery=6.4)
+    assert rules.tick(later).stop_reason == words
+    rules.offer(arm(later), later)
+    assert _ask(rules, 2, later, 0.5) == (0.5, "")
 
 
 def test_a_hot_computer_rests_until_it_has_cooled() -> None:
     rules = _driving(quick_car(LimitPlan(high_temperature_c=80.0)))
     _sense(rules, _T0, temperature=81.0)
-    _sense(rules, _T0 + 500 * MS, temperature=82.0)
     later = _T0 + 500 * MS
-    rules.offer(command(2, later), later)
+    _sense(rules, later, temperature=82.0)
     assert rules.tick(later).stop_reason == "The computer has 82 C, more than 80 C."
     _sense(rules, later, temperature=80.0)
-    assert rules.tick(later).seq == 2
+    assert _ask(rules, 2, later, 0.5) == (0.5, "")
 
 
 @pytest.mark.parametrize(
@@ -490,6 +388,8 @@ def test_a_hot_computer_rests_until_it_has_cooled() -> None:
         ("eye", LimitPlan(stop_distance_m=0.2), True),
         ("meter", LimitPlan(), False),
         ("meter", LimitPlan(low_battery_v=6.0), True),
+        ("chip", LimitPlan(), False),
+        ("chip", LimitPlan(high_temperature_c=80.0), True),
     ],
 )
 def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
@@ -548,16 +448,6 @@ def test_the_direction_is_that_of_the_propulsion() -> None:
     assert turning.tick(_T0).actions == (0.5,)
     turning.disarm("")
     assert turning.tick(_T0).actions == (0.0,)
-
-
-def test_a_failed_thermometer_stops() -> None:
-    plan = replace(
-        quick_car(LimitPlan(high_temperature_c=80.0)),
-        sensors=(SensorPlan("chip", "cpu_temperature", "temperature"),),
-    )
-    rules = _driving(plan)
-    rules.sense(Sensing(failures={"chip": "No file."}), _T0)
-    assert "Sensor chip" in rules.tick(_T0).stop_reason
 
 
 @pytest.mark.parametrize(("slow", "armed"), [(False, False), (True, True)])

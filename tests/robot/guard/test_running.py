@@ -1,6 +1,5 @@
 """The plan, commands, log and priority of processes, and the modules that the guard imports."""
 
-import contextlib
 import fcntl
 import json
 import logging
@@ -9,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -164,10 +162,7 @@ class _Unprintable:
     ("words", "args", "error"),
     [
         ("%s", (_Unprintable(RuntimeError()),), "RuntimeError"),
-        ("%s", (_Unprintable(MemoryError()),), "MemoryError"),
-        ("%d", ("three",), "TypeError"),
         ("%s %s", ("one",), "TypeError"),
-        ("%q", (1,), "ValueError"),
     ],
 )
 def test_a_line_that_cannot_be_formatted_is_replaced(
@@ -179,48 +174,21 @@ def test_a_line_that_cannot_be_formatted_is_replaced(
     assert os.read(read, 1 << 16) == f"A line of rules.py:7 fails: {error}.\n".encode()
 
 
-@contextlib.contextmanager
-def _broken(kind: str, folder: Path) -> Iterator[int]:
-    """Yield a descriptor that cannot be written to."""
-    read, write = os.pipe()
-    match kind:
-        case "no reader":
-            os.close(read)
-            read = os.open(os.devnull, os.O_RDONLY)
-        case "closed":
-            os.close(write)
-            # Not reused by another file during the test.
-            write = os.open(os.devnull, os.O_RDONLY)
-        case "read-only":
-            (folder / "log").touch()
-            os.close(write)
-            write = os.open(folder / "log", os.O_RDONLY)
-        case _:
-            os.close(write)
-            write = os.open("/dev/full", os.O_WRONLY)
-    try:
-        yield write
-    finally:
-        os.close(read)
-        os.close(write)
-
-
 @pytest.mark.parametrize("kind", ["no reader", "closed", "read-only", "full disk"])
-def test_a_log_that_cannot_be_written_raises_nothing(kind: str, tmp_path: Path) -> None:
-    with _broken(kind, tmp_path) as fd:
-        lines = _Lines(fd)
-        for words in ("Hello.", "\ud800", "\0", "a\nb", "x" * 100_000):
-            _emit(lines, words)
-        assert lines._lost == 5
-
-
-def test_a_descriptor_that_closes_later_raises_nothing() -> None:
+def test_a_log_that_cannot_be_written_raises_nothing(kind: str) -> None:
     read, write = os.pipe()
-    lines = _Lines(write)
-    os.close(write)
     os.close(read)
-    _emit(lines, "Hello.")
-    assert lines._lost == 1
+    if kind != "no reader":
+        os.close(write)
+        write = os.open("/dev/full", os.O_RDONLY if kind == "read-only" else os.O_WRONLY)
+    lines = _Lines(write)
+    if kind == "closed":
+        os.close(write)
+    for words in ("Hello.", "\ud800", "\0", "a\nb", "x" * 100_000):
+        _emit(lines, words)
+    assert lines._lost == 5
+    if kind != "closed":
+        os.close(write)
 
 
 @pytest.mark.parametrize(("before", "after"), [(-10, [0]), (0, []), (10, [])])

@@ -95,22 +95,16 @@ def test_stopped_daemon(tmp_path: Path) -> None:
         assert "the daemon was silent, and was killed" in _log(tmp_path)
 
 
-def test_killed_guard(tmp_path: Path) -> None:
-    with running(tmp_path) as robot:
-        robot.drive()
-        killed_ns = robot.kill("hardware", signal.SIGKILL)
-        assert robot.rested_ns(killed_ns, robot.process.pid) - killed_ns < 1_000 * MS
-        until(lambda: len(robot.pids("hardware")) == 2)
-        assert robot.record.is_at_rest()
-
-
-def test_stopped_guard(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "most_ms"), [(signal.SIGKILL, 1_000), (signal.SIGSTOP, 3_500)])
+def test_killed_or_stopped_guard(tmp_path: Path, number: signal.Signals, most_ms: int) -> None:
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
-        stopped_ns = robot.kill("hardware", signal.SIGSTOP)
-        assert robot.rested_ns(stopped_ns, robot.process.pid) - stopped_ns < 3_500 * MS
+        gone_ns = robot.kill("hardware", number)
+        assert robot.rested_ns(gone_ns, robot.process.pid) - gone_ns < most_ms * MS
         assert _is_gone(guard)
+        until(lambda: len(robot.pids("hardware")) == 2)
+        assert robot.record.is_at_rest()
 
 
 def test_killed_supervisor(tmp_path: Path) -> None:
@@ -279,15 +273,6 @@ def test_the_ready_file_goes_with_its_daemon(
     assert one._is_safe
     assert (tmp_path / "ready.json").exists() == (ready_file == "folder")
     assert ("cannot be removed" in caplog.text) == (ready_file == "folder")
-
-
-def test_garbage_is_counted_and_refused(tmp_path: Path) -> None:
-    garbage = ["{", "[]", '{"kind": "command", "values": [1e999]}', "x" * 20_000]
-    with running(tmp_path, garbage=garbage) as robot:
-        robot.drive()
-        assert any("larger than 16384" in words for words in robot.notes("refused"))
-        assert len(robot.pids("hardware")) == 1
-    assert "4 datagrams were no orders" in _log(tmp_path)
 
 
 def test_an_unknown_driver_ends_the_supervisor(tmp_path: Path) -> None:
