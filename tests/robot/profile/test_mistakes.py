@@ -26,52 +26,35 @@ enable = 26 -> channel = 3 -> belongs to over = 'pca9685' or 'sysfs'
 trigger = 23 -> a = 5\ntrigger = 23 -> 'a' belongs to driver = 'encoder'
 flip = true -> path = "x" -> belongs to driver = 'file' or 'pipe', not to [camera]
 body = "car" -> body = { a = 1 } -> can be printed, not {'a': 1}
-name = "rover" -> name = 5 -> name of [robot] must be a text of 1 to 64 characters that
 name = "rover" -> name = " " -> must be a text of 1 to 64 characters that can be printed
 name = "rover" -> name = "a\u0007" -> can be printed, not 'a\x07'
 name = "rover"\n ->  -> [robot] lacks the key 'name', a text of 1 to 64 characters -> [robot]
 control_hz = 25 -> control_hz = "25 Hz" -> a number from 1 to 100, not '25 Hz'
 control_hz = 25 -> control_hz = nan -> from 1 to 100, not nan
-control_hz = 25 -> control_hz = 0.5 -> from 1 to 100, not 0.5
 control_hz = 25 -> control_hz = 2026-11-03 -> not 2026-11-03
-control_hz = 25 -> control_hz = 12:00:00 -> not 12:00:00
 2026-11-03 -> 2026-11-03T12:00:00 -> must be a date, such as 2026-11-03, not
 propels = true -> propels = "yes" -> propels of [action.throttle] must be true or false
 levels = "three" -> levels = "thre" -> one of 'any', 'three', not 'thre' (did you mean 'three'?)
-levels = "three" -> levels = 3 -> must be one of 'any', 'three', not 3
 seconds = 0.5 -> seconds = true -> seconds of [[reset]] number 2 must be a number above
 size = [128, 128] -> size = [128] -> [width, height] in pixels, each an even number from
 size = [128, 128] -> size = [128, 127] -> even number from 16 to 1920, not [128, 127]
-size = [128, 128] -> size = [128, 4000] -> each an even number from 16 to 1920
-size = [128, 128] -> size = 128 -> size of [camera] must be [width, height] in pixels
 mix.throttle = 0.5 -> mix = "throttle" -> must be a table of numbers from -10 to 10 by
 mix = { arm = 1.0 } -> mix = { arm = true } -> by name of action, not {'arm': True}
-mix = { arm = 1.0 } -> mix = { arm = nan } -> by name of action, not {'arm': nan}
 [stop] -> [[stop]] -> [stop] must be a table, not [{
 [sensor.chip]\n -> [sensor]\nchip = 5\n[sensor.chop]\n -> [sensor.chip] must be a table -> chip = 5
 stop_distance_m -> stop_distance -> (did you mean 'stop_distance_m'?)
-stop_distance_m -> stop_distance_cm -> (did you mean 'stop_distance_m'?)
 slew_per_s -> slew -> no key 'slew' (did you mean 'slew_per_s'?)
-left_us -> left -> (did you mean 'left_us'?)
-wheel_m -> wheel -> (did you mean 'wheel_m'?)
-control_hz -> control -> (did you mean 'control_hz'?)
 enable = 26 -> enable = 28 -> a BCM pin from 0 to 27, such as 22, "GPIO22" or "BOARD15"
 enable = 26 -> enable = -2 -> , or -1 for none, not -2
 enable = 26 -> enable = true -> enable of [output.drive] must be a BCM pin
 enable = 26 -> enable = "BOARD6" -> or -1 for none, and BOARD6 is ground
-enable = 26 -> enable = "BOARD17" -> and BOARD17 is 3.3 V
 enable = 26 -> enable = "BOARD41" -> the header has the places 1 to 40
-enable = 26 -> enable = "GPIO28" -> a BCM pin from 0 to 27
-enable = 26 -> enable = "P1" -> a BCM pin from 0 to 27
 a = 16 -> a = -1 -> a of [sensor.wheel] must be a BCM pin from 0 to 27
 12,  # Left. -> 99, -> or "BOARD15", not 99 -> pins = [
 pins = [\n    12,  # Left.\n    "GPIO13",\n] -> pins = [] -> or "BOARD15", not []
 enable = 26 -> enable = 22 -> twice: by forward of [output.drive] (line 24) and by
-echo = 24 -> echo = "BOARD13" -> by backward of [output.drive] (line 25) and by
 "GPIO13" -> 12 -> by pins of [sensor.bumper] (line 67) and by pins of [sensor.bumper] -> pins = [
-pin = 19 -> pin = 5 -> by phase of [output.brush] (line 53) and by pin of [enable]
 pin = 21 -> pin = 19 -> by pin of [enable] (line 116) and by pin of [emergency_button]
-pin = 21 -> pin = 25 -> GPIO25 is used twice: by output_enable of [output.arm] (line 42)
 pin = 21 -> pin = 3 -> GPIO3 is used twice: by bus of [output.steer] (line 29) and by
 phase = 5 -> phase = 2 -> GPIO2 is used twice: by bus of [output.steer] (line 29) and
 channel = 1\n -> channel = 0\n -> channel 0 of the PCA9685 at 0x40 of I2C bus 1 is used
@@ -79,35 +62,26 @@ address = 0x41 ->  -> address 0x40 of I2C bus 1 is used -> [sensor.pack]
 channel = 1\n -> channel = 1\nhz = 60\n -> has one hz for all its channels, 50 or 60 -> hz = 60
 "hbridge" -> "hbrigde" -> not 'hbrigde' (did you mean 'hbridge'?)
 driver = "hbridge"\n ->  -> lacks the key 'driver', one of -> [output.drive]
-"encoder" -> "coder" -> not 'coder' (did you mean 'encoder'?)
-"v4l2" -> "v4l" -> 'pattern', not 'v4l' (did you mean 'v4l2'?)
 over = "sysfs"\n ->  -> lacks the key 'over', one of 'pca9685', 'lgpio', 'sysfs' -> [output.pump]
 over = "sysfs"\nchannel = 0 -> over = "lgpio" -> lacks the key 'pin', a BCM pin -> [output.pump]
 low = -0.5 -> low = 0.5\nhigh = 0.5 -> must be above low, which is 0.5 -> high = 0.5
 low = -0.5 -> one_sided = true\nlow = -0.5 -> must be 0 to 1, because it is one-sided -> low = -0.5
-low = -0.5 -> low = -1.5 -> low of [action.throttle] must be a number from -1 to 1
 rest = 0.25 -> rest = 0.25\nhigh = 0.2 -> rest of [action.arm] must lie between low and
 low = -0.5 -> rest = 0.1 -> rest of [action.throttle] must be 0, because it propels
 slew_per_s = 2 -> slew_down_per_s = 2 -> must be left out, because it propels: a stop is immediate
 slew_per_s = 2 -> slew_per_s = 0 -> must be a number above 0, not 0
-slew_per_s = 2 -> slew_per_s = nan -> must be a number above 0, not nan
 levels = "three" -> threshold = 0 -> must be a number above 0 and up to 1, not 0
 unit = "deg"\n ->  -> gain of [action.arm] needs a unit, such as unit = 'deg' -> gain = 90
 [action.arm] -> [action."left arm"] -> the name 'left arm' must begin with a letter
-[action.arm] -> [action.7] -> the name '7' must begin with a letter and have at most 32
 mix = { arm = 1.0 } -> mix = {} -> is empty, so nothing moves it; there are: steering, th
 mix = { arm = 1.0 }\n ->  -> is empty, so nothing moves it -> [output.arm]
 mix = { arm = 1.0 } -> mix = { amr = 1.0 } -> no action: 'amr' (did you mean 'arm'?)
 mix = { arm = 1.0 } -> mix = { arm = 0.0 } -> has the weight 0 for 'arm': leave it out
 [output.drive] -> [action.wave]\n[output.drive] -> [action.wave] moves nothing: no mix names it
-part = "wheels" -> part = "wheel" -> not 'wheel' (did you mean 'wheels'?)
 mix = { throttle = 1 } -> mix = { arm = 1 } -> propels = true, because it moves the wheels
 enable = 26 -> offset = -0.1 -> is at -0.1 when its actions rest, and must be at 0 then
-enable = 26 -> offset = 0.1 -> is at 0.1 when its actions rest, and must be at 0 then
 mix.throttle = 0.5 -> mix.arm = 0.5 -> is at 0.125 when its actions rest -> [output.pump]
 right_us = 1000 -> right_us = 1500 -> must lie between left_us -> [output.steer]
-right_us = 1000 -> right_us = 400 -> must be a whole number from 500 to 2500
-right_us = 1000 -> right_us = 1e3 -> whole number from 500 to 2500, not 1000.0
 over = "sysfs" -> over = "sysfs"\nhz = 400\nforward_us = 2500 -> no time for a pulse of -> hz = 400
 start = 0.1 -> start = 0.5\nfull = 0.5 -> start of [output.brush] must be below full
 deadline_ms = 200 -> deadline_ms = 1001 -> from 20 to 1000, not 1001
@@ -116,7 +90,6 @@ deadline_ms = 200 -> deadline_ms = 39 -> must be at least 40 ms, the time from o
 deadline_ms = 200 -> camera_stale_ms = 99 -> must be at least 100 ms
 deadline_ms = 200 -> camera_stale_ms = 0 -> must be at least 100 ms
 flip = true -> fps = 3 -> camera_stale_ms of [limits] must be at least 667 ms -> [limits]
-velocity = 2 -> collision = 10 -> collision of [reward] must be a number from -1000000 to 0
 throttle = -0.4 -> throttle = -0.6 -> must have -0.5 to 1 for throttle
 throttle = -0.4 -> thrott = -0.4 -> no action: 'thrott' (did you mean
 arm = 0.5\n -> arm = 2\n -> [[reset]] number 2 must be a table of numbers -> [reset.values]
@@ -148,12 +121,6 @@ MISTAKES = [
         "channel = 0",
     ),
     (
-        "mix = { throttle = 1 }",
-        "mix = { throttle = 1, arm = 1 }",
-        "is at 0.25 when its actions rest",
-        "[output.drive]",
-    ),
-    (
         '[camera]\ndriver = "v4l2"\nsize = [128, 128]\nflip = true\n\n[limits]',
         "[limits]\ncamera_stale_ms = 500",
         "needs a [camera]",
@@ -166,9 +133,7 @@ MISTAKES = [
         "low_battery_v = 6.6",
     ),
     ('name = "rover"', f'name = "{"r" * 65}"', "not 'rrrrrrrrrrrr...", "rrrrr"),
-    ("control_hz = 25", f"control_hz = {'9' * 400}", "not 99999", "control_hz = 9"),
     ("control_hz = 25", f"control_hz = 0x{'9' * 9999}", "too large to write", "control_hz = 0x"),
-    ("slew_per_s = 2", f"slew_per_s = 1{'0' * 400}", "must be a number above 0, not 1000", "slew"),
 ]
 
 

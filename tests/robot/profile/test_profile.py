@@ -120,13 +120,6 @@ def test_a_speed_may_come_from_the_profile() -> None:
     assert profile.action_layout()["throttle"].gain_unit == "m/s"
 
 
-def test_tendon_layouts_start_at_0() -> None:
-    """Tendons cannot push, so actions and states have a lower bound of 0."""
-    finger = load_profile(shipped_profiles()["finger-pwm"])
-    assert set(finger.action_layout().low) == {0.0}
-    assert set(finger.state_layout().low) == {0.0}
-
-
 def test_a_minimal_profile() -> None:
     text = EVERYTHING.split("[action.steering]", maxsplit=1)[0]
     profile = read(

@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.contract.plan import GuardPlan, output_values
-from shapechanger.errors import ProfileError
 from shapechanger.robot.profile import load_profile, shipped_profiles
-from tests.robot.profile.texts import HOVERCRAFT, changed, read
+from tests.robot.profile.texts import HOVERCRAFT, read
 
 NAMES = (
     *("boat", "boat-twin", "car", "car-esc", "cat", "finger", "finger-pwm"),
@@ -111,17 +110,6 @@ def test_a_vehicle_defined_by_its_profile_alone() -> None:
         "right_rudder": -0.4,
     }
     assert set(values(plan, [0.0, 0.0, 0.0]).values()) == {0.0}
-
-
-def test_swapped_pins_change_the_plan() -> None:
-    text = shipped_profiles()["car"].read_text()
-    swapped = changed("forward = 22", "forward = 27", text)
-    with pytest.raises(ProfileError, match="GPIO27 is used twice"):
-        read(swapped)
-    swapped = changed("backward = 27", "backward = 22", swapped)
-    drive, before = read(swapped).guard_plan().outputs[0], PLANS["car"].outputs[0]
-    assert (drive.settings["forward"], drive.settings["backward"]) == (27, 22)
-    assert (before.settings["forward"], before.settings["backward"]) == (22, 27)
 
 
 def test_commented_sensors_of_the_car_work() -> None:
