@@ -332,8 +332,7 @@ def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sensor = _Sensor()
-    _open_by(monkeypatch, lambda plan, hardware: sensor)
-    bench = make(_plan(sensors=(SensorPlan("bumper", "switch", "bump"),)))
+    bench = _with(make, monkeypatch, {"bumper": sensor}, "bump")
     _drives(bench)
     readings: list[dict[str, float] | Exception] = [
         {"bump": 1.0},
@@ -377,10 +376,15 @@ class _SlowSensor(_Sensor):
 
 
 def _with(
-    make: _Make, monkeypatch: pytest.MonkeyPatch, drivers: dict[str, _Sensor], measures: str
+    make: _Make,
+    monkeypatch: pytest.MonkeyPatch,
+    drivers: dict[str, _Sensor],
+    measures: str,
+    **changes: object,
 ) -> _Bench:
     _open_by(monkeypatch, lambda plan, hardware: drivers[plan.name])
-    return make(_plan(sensors=tuple(SensorPlan(name, "any", measures) for name in drivers)))
+    plans = tuple(SensorPlan(name, "any", measures) for name in drivers)
+    return make(_plan(sensors=plans, **changes))
 
 
 def test_no_stop_waits_for_a_sensor(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -418,9 +422,8 @@ def test_all_distance_sensors_must_report(make: _Make, monkeypatch: pytest.Monke
     left, right = _Sensor(), _Sensor()
     left.reading, right.reading = {"distance": 2.0}, {}
     eyes = {"left": left, "right": right}
-    _open_by(monkeypatch, lambda plan, hardware: eyes[plan.name])
-    plans = tuple(SensorPlan(name, "hcsr04", "distance") for name in eyes)
-    bench = make(_plan(sensors=plans, limits=LimitPlan(stop_distance_m=0.5)))
+    limits = LimitPlan(stop_distance_m=0.5)
+    bench = _with(make, monkeypatch, eyes, "distance", limits=limits)
     _drives(bench)
     bench.clock.at(55, lambda: setattr(right, "reading", {"distance": 1.0}))
     state = bench.run(100)
@@ -444,31 +447,22 @@ def test_the_outputs_rest_before_anything_is_closed(
 
 
 def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
-    monkeypatch: pytest.MonkeyPatch,
+    make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened = [_Sensor()]
+    good, hardware = _Sensor(), make(_plan())
+    hardware.guard.close()
 
     def open_sensor(plan: SensorPlan, hardware: object) -> _Sensor:
         if plan.name == "bad":
             raise RobotError("No answer.")
-        return opened[0]
+        return good
 
     _open_by(monkeypatch, open_sensor)
-    plans = (SensorPlan("good", "switch", "bump"), SensorPlan("bad", "switch", "bump"))
-    daemon, guards_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with daemon, guards_end:
-        factory = MockFactory(pin_class=MockPWMPin)
-
-        class _Hardware:
-            clock = _Clock()
-
-            def pin_factory(self) -> MockFactory:
-                return factory
-
-        with pytest.raises(RobotError, match="No answer"):
-            Guard(_plan(sensors=plans), _Hardware(), None, logging.getLogger("test"))
-    assert opened[0].reading == {}
-    OutputDevice(22, pin_factory=factory).close()  # The pin is free.
+    plans = tuple(SensorPlan(name, "switch", "bump") for name in ("good", "bad"))
+    with pytest.raises(RobotError, match="No answer"):
+        Guard(_plan(sensors=plans), hardware, None, logging.getLogger("test"))
+    assert good.reading == {}
+    OutputDevice(22, pin_factory=hardware.factory).close()  # The pin is free.
 
 
 def test_wrong_arguments_exit_with_one_line(capfd: pytest.CaptureFixture[str]) -> None:

@@ -49,6 +49,15 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
     assert rules.tick(end).stop_reason == "No fresh command."
 
 
+def test_times_slightly_in_the_future_count_from_now() -> None:
+    rules = _armed(quick_car())
+    assert not rules.offer(command(1, _T0 + 50 * MS), _T0)
+    assert [rules.tick(_T0 + 250 * MS - left).seq for left in (1, 0)] == [1, None]
+    rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
+    rules.offer(command(1, _T0, frame_ns=_T0 + 50 * MS), _T0)
+    assert [rules.tick(_T0 + 100 * MS - left).seq for left in (1, 0)] == [1, None]
+
+
 @pytest.mark.parametrize(
     ("order", "words"),
     [

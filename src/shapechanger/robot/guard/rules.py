@@ -100,8 +100,10 @@ class Stopping:
         self._values = values
         self._then = plan.then
         self._ramp_ns = plan.ramp_ms * _NS_PER_MS
-        self._hold_end_ns = since_ns + plan.hold_ms * _NS_PER_MS
-        self._end_ns = self._hold_end_ns + self._ramp_ns
+        hold_end_ns = since_ns + plan.hold_ms * _NS_PER_MS
+        self._end_ns = hold_end_ns + self._ramp_ns
+        self.changes_ns = (hold_end_ns, self._end_ns)
+        """When the values begin to change, and when they are at rest, ns."""
 
     def values(self, now_ns: int) -> tuple[float, ...]:
         """Return the value of each action."""
@@ -115,10 +117,6 @@ class Stopping:
     def releases(self, now_ns: int) -> bool:
         """Return whether the outputs are released."""
         return self._then == "release" and now_ns >= self._end_ns
-
-    def next_ns(self, now_ns: int) -> int | None:
-        """Return the time of the next change; None if it never or continuously changes."""
-        return next((t for t in (self._hold_end_ns, self._end_ns) if t > now_ns), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +193,8 @@ class Rules:
 
     def offer(self, order: Order, now_ns: int) -> str:
         """Process an order; return why it is refused, or an empty string."""
-        self._see_frame(order, now_ns)
+        if order.frame_ns is not None and order.frame_ns <= now_ns + FUTURE_NS:
+            self._frame_ns = max(min(order.frame_ns, now_ns), self._frame_ns or 0)
         match order.kind:
             case "command":
                 return self._offer_command(order, now_ns)
@@ -288,8 +287,8 @@ class Rules:
             times.append(self._frame_ns + self._stale_ns)
         if self._reflexes.bump.until_ns is not None:
             times.append(self._reflexes.bump.until_ns)
-        if self._stopping is not None and (end_ns := self._stopping.next_ns(now_ns)) is not None:
-            times.append(end_ns)
+        if self._stopping is not None:
+            times += self._stopping.changes_ns
         return min(time_ns for time_ns in times if time_ns > now_ns)
 
     def _offer_command(self, order: Order, now_ns: int) -> str:
@@ -337,11 +336,6 @@ class Rules:
         self._command = None  # Earlier commands must not take effect now.
         self._health.rearm()
         return ""
-
-    def _see_frame(self, order: Order, now_ns: int) -> None:
-        frame_ns = order.frame_ns
-        if frame_ns is not None and frame_ns <= now_ns + FUTURE_NS:
-            self._frame_ns = max(min(frame_ns, now_ns), self._frame_ns or 0)
 
     def _reason(self, now_ns: int) -> str:
         """Return why the newest command must not act, or an empty string."""

@@ -138,10 +138,7 @@ class _Lines(logging.Handler):
             text = f"A line of {record.filename}:{record.lineno} fails: {type(error).__name__}."
         if self._lost:
             text = f"{text} ({self._lost} lines before it were lost.)"
-        if self._write(text):
-            self._lost = 0
-        else:
-            self._lost += 1
+        self._lost = 0 if self._write(text) else self._lost + 1
 
     def _write(self, text: str) -> bool:
         line = text.encode(errors="backslashreplace")[: select.PIPE_BUF - 1] + b"\n"
@@ -156,10 +153,7 @@ class _Lines(logging.Handler):
 
 
 def log_to_stderr(program: str, name: str | None = None) -> logging.Logger:
-    """Return the log of a program, which prefixes each line with the program's name.
-
-    `name` is the name of the logger, if it is not the program's own.
-    """
+    """Return the log `name`, or of the program, whose name begins each line."""
     logging.raiseExceptions = False  # An unprintable message must not stop the guard.
     # Without standard error, its number may belong to any file.
     handler = logging.NullHandler() if sys.__stderr__ is None else _Lines(_STDERR)

@@ -287,18 +287,14 @@ class Supervisor:
         else:
             self._secure(guard)
         daemon.end(_END_S, _END_S)
-        self._remove_ready_file()
+        try:  # So that no client connects to the old port.
+            if ready_file := self._plan.daemon.get("ready_file"):
+                Path(ready_file).unlink(missing_ok=True)
+        except OSError as error:
+            self._log.warning("the ready file cannot be removed: %s", error)
         for child in (guard, daemon):
             self._log.info("%s %s.", child.name, _exit_words(child.code))
             child.close()
-
-    def _remove_ready_file(self) -> None:
-        """Remove the ready file, so that no client connects to the old port."""
-        if ready_file := self._plan.daemon.get("ready_file"):
-            try:
-                Path(ready_file).unlink(missing_ok=True)
-            except OSError as error:
-                self._log.warning("the ready file cannot be removed: %s", error)
 
     def _secure(self, guard: Child) -> None:
         """Put the outputs to rest, retrying until they obey and the guard has exited.
