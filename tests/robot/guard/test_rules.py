@@ -337,6 +337,17 @@ def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
     assert _ask(rules, 7, later + MS, throttle) == (throttle, "")
 
 
+def test_a_stall_ends_while_the_robot_stands() -> None:
+    rules = _driving(quick_car())
+    for ms in (0, 400):
+        _sense(rules, _T0 + ms * MS, speed=0.0)
+    later = _T0 + 400 * MS
+    assert _ask(rules, 2, later, 0.5)[0] == 0.0
+    rules.halt()
+    rules.tick(later)
+    assert _ask(rules, 3, later, 0.5) == (0.5, "")
+
+
 def test_no_stall_while_moving_or_at_low_throttle() -> None:
     rules = _driving(quick_car())
     for ms in range(0, 4_000, 100):
@@ -467,3 +478,6 @@ def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool
     rules.sense(Sensing(failures={"spools": "Overload."}, slow=late), _T0)
     assert rules.armed is armed
     assert rules.tick(_T0).actions == (0.0, 0.0)
+    rules.offer(arm(_T0), _T0)
+    rules.offer(command(2, _T0), _T0)
+    assert rules.tick(_T0).stop_reason.endswith(": Overload.")
