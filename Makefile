@@ -49,7 +49,7 @@ INSTALL = $(RUN) -m pip install --quiet -c constraints.txt uv && \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot test-robots check bench docs gallery clean
+.PHONY: help setup demo test test-system test-all mutants test-matrix release test-lerobot test-robots check bench docs gallery clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -71,6 +71,9 @@ test-system: $(INSTALLED_DEV)  ## run the tests of whole programs: processes, br
 
 test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
 	$(PYTEST) --cov
+
+mutants: $(INSTALLED_DEV)  ## change code in small ways that its tests must notice; hours
+	$(RUN) -m benchmarks.run mutants
 
 test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and installations
 	$(RUN) scripts/test_matrix.py

@@ -69,6 +69,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "gpu": _suite("gpu", "gpu"),
     "gpu-on-cpu": _suite("gpu", "on_cpu"),
     "gpu-generalist": _suite("gpu", "generalist"),
+    "mutants": _suite("mutants", "mutants"),
     "references": _suite("references", "references"),
     "generalist": _suite("generalist", "generalist"),
     "generalist-gpu": _suite("generalist", "of_gpu"),

@@ -1,0 +1,156 @@
+"""Mutation tests of the files that a robot's safety and a study's numbers depend on.
+
+mutmut changes one operator, number or name of a function at a time, and runs the tests that call
+the function; a mutant is killed if one of them fails. `make mutants` runs all of them, some hours
+on two cores; `ONLY="guard metrics" make mutants` runs some. Results are kept in `mutants/`, and
+only mutants of files that have changed run again.
+
+Mutants are not counted if they change only the text of an error, of which tests match some words,
+a type for checkers, or `strict` of `zip`. Nor are those in `equivalent_mutants.toml`, which no test
+could notice, each with its reason.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final, cast
+
+from benchmarks.row import Row, asked
+
+MODULES: Final = {
+    "guard": "robot/guard",
+    "link": "robot/link",
+    "body_map": "transfer/body_map",
+    "transplant": "transfer/transplant",
+    "metrics": "transfer/metrics",
+    "episodes": "demos/episodes",
+    "vector": "envs/vector",
+    "edits": "morphology/edits",
+    "certificate": "morphology/certificate",
+}
+_SRC: Final = Path("mutants", "src", "shapechanger")
+_EQUIVALENT: Final = Path(__file__).with_name("equivalent_mutants.toml")
+_PAGE: Final = Path("docs", "mutants.md")
+_ALIVE: Final = (0, 5, 33)  # Exit codes: no test failed, or none calls the function.
+_TARGET: Final = 0.95
+_INTRODUCTION: Final = """# Mutants
+
+[Mutation tests](https://en.wikipedia.org/wiki/Mutation_testing) of the files that a robot's safety
+and a study's numbers depend on: `make mutants` changes one place of a function at a time, and a
+mutant is killed if a test fails. Changes of only the text of an error, of types for checkers and of
+`strict` of `zip` are not counted, and
+[equivalent mutants](../benchmarks/equivalent_mutants.toml), which no test could notice, are listed
+with their reasons. The survivors follow the table, each with the line that it changed.
+"""
+
+
+def mutants() -> Iterator[Row]:
+    """Yield the share of killed mutants of each module, and write the page of the survivors."""
+    chosen = asked("module", MODULES)
+    patterns = [f"shapechanger.{MODULES[name].replace('/', '.')}*" for name in chosen]
+    children = str(os.cpu_count() or 1)
+    command = [sys.executable, "-m", "mutmut", "run", "--max-children", children, *patterns]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    equivalent = {
+        (one["function"], one["line"]) for one in tomllib.loads(_EQUIVALENT.read_text())["mutant"]
+    }
+    page = [_INTRODUCTION, "| module | killed | survived | equivalent |\n| --- | --- | --- | --- |"]
+    survivors: list[str] = []
+    for name in MODULES:
+        counts: Counter[str] = Counter()
+        for path in sorted((_SRC / MODULES[name]).rglob("*.py.meta")):
+            for function, line, status in _judged(path, equivalent):
+                counts[status] += 1
+                if status == "survived":
+                    survivors.append(f"- `{function}`: `{line}`")
+        killed, alive = counts["killed"], counts["survived"]
+        if not killed + alive:
+            continue
+        share = killed / (killed + alive)
+        page.append(
+            f"| {name} | {killed} of {killed + alive} ({share:.1%}) | {alive} | "
+            f"{counts['equivalent']} |"
+        )
+        if name in chosen:
+            yield Row(
+                f"mutants of {name}: killed",
+                f"{share:.1%}",
+                f"{killed} of {killed + alive}; {counts['equivalent']} equivalent, "
+                f"{counts['not counted']} not counted",
+                f">= {_TARGET:.0%}",
+                share >= _TARGET,
+            )
+    page += ["\n## Survivors\n", *survivors] if survivors else []
+    _PAGE.write_text("\n".join(page) + "\n", encoding="utf-8")
+
+
+def _judged(path: Path, equivalent: set[tuple[str, str]]) -> Iterator[tuple[str, str, str]]:
+    """Yield function, changed line and status of each mutant of a file that has run."""
+    source = ast.parse(path.with_suffix("").read_text(encoding="utf-8"))
+    functions = {n.name: n for n in ast.walk(source) if isinstance(n, ast.FunctionDef)}
+    for key, code in json.loads(path.read_text())["exit_code_by_key"].items():
+        if code is None:
+            continue
+        mangled = key.rpartition(".")[2]
+        original = functions[mangled.rpartition("__mutmut_")[0] + "__mutmut_orig"]
+        mutant = functions[mangled]
+        module = path.relative_to(_SRC).with_suffix("").with_suffix("").as_posix()
+        function = f"{module}:{_plain(mangled)}"
+        line = _changed(original, mutant)
+        if code not in _ALIVE:
+            status = "killed"
+        elif (function, line) in equivalent:
+            status = "equivalent"
+        else:
+            status = "survived"
+        if _noticeable(original) == _noticeable(mutant):
+            status = "not counted"
+        yield function, line, status
+
+
+def _plain(mangled: str) -> str:
+    """Return the name of a function as in its source, such as `Rules.tick`."""
+    name = mangled.rpartition("__mutmut_")[0].removeprefix("x")
+    return name.removeprefix("ǁ").replace("ǁ", ".") if name.startswith("ǁ") else name[1:]
+
+
+def _changed(original: ast.FunctionDef, mutant: ast.FunctionDef) -> str:
+    """Return the first line of a mutant that differs from the original's."""
+    before = ast.unparse(original).splitlines()[1:]
+    after = ast.unparse(mutant).splitlines()[1:]
+    lines = (new.strip() for old, new in zip(before, after, strict=False) if old != new)
+    return next(lines, "")
+
+
+def _noticeable(function: ast.FunctionDef) -> str:
+    """Return the body of a function without what no test looks at."""
+    body = ast.parse("\n".join(ast.unparse(one) for one in function.body))
+    return ast.dump(_Noticeable().visit(body))
+
+
+class _Noticeable(ast.NodeTransformer):
+    """Remove the texts of errors, types for checkers, and refusals of a caller's own mistakes."""
+
+    def visit_Raise(self, node: ast.Raise) -> ast.Raise:
+        for text in (one for one in ast.walk(node) if isinstance(one, ast.Constant)):
+            if isinstance(text.value, str):
+                text.value = ""
+        return node
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AnnAssign:
+        node.annotation = ast.Constant("")
+        return cast("ast.AnnAssign", self.generic_visit(node))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        if ast.unparse(node.func) == "cast":
+            return self.visit(node.args[-1])
+        node.keywords = [one for one in node.keywords if one.arg != "strict"]  # Of `zip`.
+        return self.generic_visit(node)
