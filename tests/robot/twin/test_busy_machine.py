@@ -17,7 +17,7 @@ from shapechanger.robot.twin.robot import run_robot
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 _BUSY = "while True: sum(range(10**5))"
-_SHORT_S = 0.15  # Shorter than the board needs to lay out a course.
+_SHORT_S = 0.05  # Shorter than the board needs to lay out a course.
 
 
 def test_a_busy_machine_does_not_cost_the_guard(tmp_path: Path) -> None:
