@@ -223,7 +223,9 @@ _Error = TypeVar("_Error", bound=Exception)
 
 
 @contextmanager
-def translate_errors(*kinds: type[_Error], to: Callable[[_Error], Exception]) -> Generator[None]:
+def translate_errors(
+    *kinds: type[_Error], to: Callable[[_Error], BaseException]
+) -> Generator[None]:
     """Raise another error, with its own sentence, for each error of these kinds.
 
     ```python

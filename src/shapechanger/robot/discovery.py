@@ -10,12 +10,12 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, translate_errors
 from shapechanger.robot.link.address import SERVICE, Address
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import VERSION
 
-try:
+with translate_errors(ImportError, to=lambda _: MissingExtra("zeroconf", "remote")):
     from zeroconf import (
         Error,
         ServiceBrowser,
@@ -25,8 +25,6 @@ try:
         get_all_addresses,  # pyright: ignore[reportPrivateImportUsage]  # Documented.
     )
     from zeroconf.asyncio import AsyncZeroconf
-except ImportError as error:
-    raise MissingExtra("zeroconf", "remote") from error
 
 _log = logging.getLogger(__name__)
 

@@ -15,16 +15,20 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from shapechanger.errors import LinkError, MissingExtra, RobotRefused, StaleObservation
+from shapechanger.errors import (
+    LinkError,
+    MissingExtra,
+    RobotRefused,
+    StaleObservation,
+    translate_errors,
+)
 from shapechanger.robot.client.known_robots import KnownRobot, parse_trust
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import Address, parse_address
 from shapechanger.robot.link.authentication import make_proof, parse_key
 
-try:
+with translate_errors(ImportError, to=lambda _: MissingExtra("aiohttp", "remote")):
     import aiohttp
-except ImportError as error:
-    raise MissingExtra("aiohttp", "remote") from error
 
 CLOSE_S: Final = 0.5
 """Time limit of the closing handshake, s."""

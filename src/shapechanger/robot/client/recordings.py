@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections import Counter
@@ -129,14 +130,12 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
     if len(piece.frames) != len(lines):
         raise DemosError(f"The robot sent {len(piece.frames)} images for {len(lines)} lines.")
     for number, (line, jpeg) in enumerate(zip(lines, piece.frames, strict=True), piece.first + 1):
-        try:
+        damaged = f"Line {number} of {piece.episode} is damaged on the robot, because "
+        with translate_errors(
+            ValueError, to=lambda error, why=damaged: DemosError(f"{why}{error}; repair it there.")
+        ):
             fields = decode_line(line)
             step = Step.from_json(fields) if fields.get("kind") == "step" else None
-        except ValueError as error:
-            raise DemosError(
-                f"Line {number} of {piece.episode} is damaged on the robot, because {error}; "
-                "repair it there."
-            ) from error
         if step is None or (picture := step.picture) is None:
             continue
         # A robot's data must not escape the folder.
@@ -192,15 +191,18 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
         if keys != ["e"]:
             say("cancelled; nothing was played")
             return
-        try:
+        with contextlib.ExitStack() as leaving:
+            leaving.callback(_give_back, robot)
             robot.take()
             robot.arm()
             ended = _play(robot, terminal, episode)
-        finally:
-            if robot.alive:
-                robot.disarm()
-                robot.release()
         say(ended)
+
+
+def _give_back(robot: RobotClient) -> None:
+    if robot.alive:
+        robot.disarm()
+        robot.release()
 
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:

@@ -305,10 +305,9 @@ class Server:
         self._listener.stop_timer(request.protocol)
         forget = partial(self._listener.remove, request.protocol)
         session = Session(next(self._numbers), self._hub, self._authenticator)
-        try:
+        with contextlib.ExitStack() as leaving:
+            leaving.callback(forget)
             return await session.run(request, forget)
-        finally:
-            forget()
 
 
 async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:

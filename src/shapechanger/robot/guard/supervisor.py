@@ -197,11 +197,9 @@ class Supervisor:
         after_failure: tuple[str, ...] = ()
         while True:
             guard, daemon = self._start(after_failure)
-            why = ""
-            try:
+            with contextlib.ExitStack() as stopping:
+                stopping.callback(self._stop, guard, daemon)
                 why = self._supervise(guard, daemon)
-            finally:
-                self._stop(guard, daemon)
             if not self._end_reason:
                 if not self._is_safe:
                     self._log.critical("gives up: %s, and not all outputs are at rest.", why)

@@ -14,7 +14,7 @@ from typing import Annotated, Final, Literal, TypeVar, Union
 import msgspec
 from msgspec import Meta
 
-from shapechanger.errors import LinkError
+from shapechanger.errors import LinkError, translate_errors
 from shapechanger.robot.link.card import RobotCard
 
 VERSION: Final = 1
@@ -479,10 +479,11 @@ encode: Final = msgspec.msgpack.Encoder().encode
 def _decoded(decoder: msgspec.msgpack.Decoder[_M], limit: int, data: bytes) -> _M:
     if len(data) > limit:
         raise LinkError(f"A message of {len(data)} bytes is larger than the {limit} allowed.")
-    try:
+    with translate_errors(
+        *(msgspec.MsgspecError, UnicodeDecodeError, RecursionError),
+        to=lambda error: LinkError(f"Not a valid message: {error}."),
+    ):
         return decoder.decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise LinkError(f"Not a valid message: {error}.") from error
 
 
 _OF_A_CLIENT: Final = msgspec.msgpack.Decoder(Union[*ClientMessage.__subclasses__()])

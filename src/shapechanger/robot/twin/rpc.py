@@ -129,11 +129,13 @@ class BoardClient:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ExitStack() as undo:
             undo.callback(self._socket.close)
-            try:
+            with translate_errors(
+                OSError,
+                to=lambda error: RobotError(
+                    f"No twin's board answers at {path}: {error.strerror}."
+                ),
+            ):
                 self._socket.connect(path)
-            except OSError as error:
-                words = f"No twin's board answers at {path}: {error.strerror}."
-                raise RobotError(words) from error
             self._socket.settimeout(_HELD_UP_S)
             self.clock, self.now_ns = self.ask(Greeting, "greet", role, os.getpid())
             undo.pop_all()

@@ -18,7 +18,7 @@ from typing import Final
 
 import msgspec
 
-from shapechanger.errors import LinkError, RobotError
+from shapechanger.errors import LinkError, RobotError, translate_errors
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot
@@ -102,7 +102,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with translate_errors(LinkError, to=lambda error: SystemExit(str(error))):
         main()
-    except LinkError as error:
-        sys.exit(str(error))

@@ -48,6 +48,7 @@ class BadNetwork:
         self.silent = False
         self._robot_port = port
         self._ends: list[asyncio.StreamWriter] = []  # The driver's and the robot's in turn.
+        self._ended: set[asyncio.StreamWriter] = set()  # To which data are discarded.
         listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = listener.getsockname()[1]
         self._closed = asyncio.Event()
@@ -69,10 +70,11 @@ class BadNetwork:
             self._loop.call_soon_threadsafe(end.transport.abort)
 
     def half_close(self) -> None:
-        """End the direction towards the robot of all connections."""
+        """End the direction towards the robot of all connections; the other one goes on."""
         for robot in self._ends[1::2]:
             if not robot.is_closing():
-                robot.get_extra_info("socket").shutdown(socket.SHUT_WR)
+                self._ended.add(robot)
+                self._loop.call_soon_threadsafe(robot.write_eof)
 
     def close(self) -> None:
         """End all connections and the thread."""
@@ -102,7 +104,9 @@ class BadNetwork:
                 while self.silent:
                     await asyncio.sleep(_POLL_S)
                 for at in range(0, len(data), self.slice_bytes):
-                    sink.write(data[at : at + self.slice_bytes])
+                    # asyncio logs each write to a lost connection.
+                    if not sink.is_closing() and sink not in self._ended:
+                        sink.write(data[at : at + self.slice_bytes])
                 await sink.drain()
 
 
