@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -15,8 +16,10 @@ from hypothesis import strategies as st
 
 from shapechanger.robot.guard.channel import (
     MAX_DATAGRAM,
+    NO_STATE,
     DaemonChannel,
     GuardState,
+    Heartbeat,
     Order,
     decode_order,
     decode_state,
@@ -68,6 +71,53 @@ def test_a_closed_life_pipe_means_a_lost_daemon(ends: tuple[DaemonChannel, socke
     os.close(held)
     assert channel.orders() == ([], [])
     assert channel.lost
+
+
+def test_data_in_a_life_pipe_do_not_wait_for_writing(
+    ends: tuple[DaemonChannel, socket.socket],
+) -> None:
+    """A lifeline that could be written to is no dead daemon."""
+    channel, daemon = ends
+    ours, theirs = socket.socketpair()
+    with theirs:
+        socket.send_fds(daemon, [b"life"], [ours.detach()])
+        channel.orders()
+        channel.orders()
+        assert not channel.lost
+
+
+def test_a_state_fits_or_not_and_a_lost_daemon_is_noticed(
+    ends: tuple[DaemonChannel, socket.socket],
+) -> None:
+    channel, daemon = ends
+    assert channel.send(NO_STATE)
+    assert decode_state(daemon.recv(MAX_DATAGRAM)) == NO_STATE
+    while channel.send(NO_STATE):
+        pass
+    assert not channel.lost
+    daemon.close()
+    assert not channel.send(NO_STATE)
+    assert channel.lost
+
+
+def test_a_heart_beats_once_a_period_until_the_supervisor_is_gone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ours, supervisor = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
+    with supervisor, socket.socket(fileno=ours.detach()) as kept:
+        heart = Heartbeat(kept.fileno(), period_s=0.5)
+        beats: list[bytes] = []
+        supervisor.setblocking(False)
+        for at_ns in (1_000_000_000, 1_499_999_999, 1_500_000_000, 1_500_000_001):
+            monkeypatch.setattr("time.monotonic_ns", lambda at_ns=at_ns: at_ns)
+            heart.beat()
+            with contextlib.suppress(BlockingIOError):
+                beats.append(supervisor.recv(8))
+        assert beats == [b".", b"."]
+        supervisor.close()
+        heart.beat()
+        assert heart.lost
+        assert heart.leave() == kept.detach()
 
 
 def test_a_second_life_pipe_is_closed(ends: tuple[DaemonChannel, socket.socket]) -> None:

@@ -49,6 +49,13 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
     assert rules.tick(end).stop_reason == "No fresh command."
 
 
+def test_a_robot_stands_unless_a_command_may_act() -> None:
+    rules = Rules(quick_car(), _T0)
+    assert rules.stands(_T0)
+    rules = _driving(quick_car())
+    assert [rules.stands(_T0 + 250 * MS - left) for left in (1, 0)] == [False, True]
+
+
 def test_times_slightly_in_the_future_count_from_now() -> None:
     rules = _armed(quick_car())
     assert not rules.offer(command(1, _T0 + 50 * MS), _T0)

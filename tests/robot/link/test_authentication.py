@@ -41,6 +41,10 @@ def test_random_bytes_do_not_verify(proof: bytes) -> None:
     assert not is_proof(proof, b"k" * 16, b"n" * 32, b"", "program")
 
 
+def test_a_nonce_has_32_bytes() -> None:
+    assert len(new_nonce()) == 32
+
+
 def test_keys_and_nonces_are_unique() -> None:
     assert len({new_key() for _ in range(100)}) == 100
     assert len({new_nonce() for _ in range(100)}) == 100
