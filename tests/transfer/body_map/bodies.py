@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.body_map import BodyMap
 
 DEGREE = math.pi / 180.0
 
@@ -67,3 +69,11 @@ def pendulum_observation(hinge: str = "hinge", unit: str = "rad") -> Layout:
 def pendulum_action(gain: float = 100.0, unit: str = "N", name: str = "slide") -> Layout:
     """Return the action of a cart with a pole."""
     return Layout((motor(name, gain, unit),))
+
+
+def grown(**options: Any) -> BodyMap:
+    """Return the map from the ant to the ant with feet."""
+    return BodyMap.between(*GROWN, **options)
+
+
+GROWN = ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)

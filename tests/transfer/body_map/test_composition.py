@@ -8,23 +8,11 @@ from shapechanger.errors import MapError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Zero
 from tests.transfer.body_map.bodies import (
-    ant_action,
-    ant_observation,
+    grown,
     motor,
     pendulum_action,
     pendulum_observation,
 )
-
-
-def grown(**options: object) -> BodyMap:
-    """Return the map from the ant to the ant with feet."""
-    return BodyMap.between(
-        ant_observation(),
-        ant_observation(feet=True),
-        ant_action(),
-        ant_action(feet=True),
-        **options,  # type: ignore[arg-type]
-    )
 
 
 def copied() -> BodyMap:
@@ -40,17 +28,6 @@ def copied() -> BodyMap:
             "toe/motor": Copy("ankle/motor", -0.5),
         },
     )
-
-
-def test_back_and_there_keeps_shared_features() -> None:
-    """Features that the middle body lacks are zero in the composition."""
-    there = grown(rules={"foot_*": "learn"})
-    round_trip = there.inverse("hold").then(there)
-    observation = {entry.feature: entry for entry in round_trip.observation}
-    assert observation["hip_1/angle"].rule == Copy("hip_1/angle")
-    assert isinstance(observation["foot_1/angle"].rule, Hold)
-    action = {entry.feature: entry for entry in round_trip.action}
-    assert (action["foot_1/motor"].rule, action["foot_1/motor"].why) == (Learn(), "rule 'foot_*'")
 
 
 def test_composition_multiplies_scales_and_joins_reasons() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Zero, mirror
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Zero
 
 
 def _layout(*names: str) -> Layout:
@@ -48,10 +48,10 @@ def test_an_exact_copied_name_is_not_a_template() -> None:
 def test_a_mirror_prefers_exact_names_to_globs() -> None:
     """`leg?` and `arm*` are elements; `legs` and `arms` stay in place."""
     layout = _layout("leg?/angle", "legs/angle", "arm*/angle", "arms/angle")
-    found = mirror(layout, MOTOR, swap={"leg?": "arm*"}, flip=["leg?", "arm*"])
-    assert found.observation == (
+    found = BodyMap.mirror(layout, MOTOR, swap={"leg?": "arm*"}, flip=["leg?", "arm*"])
+    assert [entry.rule for entry in found.observation] == [
         Copy("arm*/angle", -1.0),
         Copy("legs/angle"),
         Copy("leg?/angle", -1.0),
         Copy("arms/angle"),
-    )
+    ]

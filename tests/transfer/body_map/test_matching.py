@@ -8,37 +8,17 @@ import pytest
 
 from shapechanger.errors import MapError, UnknownName
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, RuleLike, Zero
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Rule, RuleLike, Zero
 from tests.transfer.body_map.bodies import (
     DEGREE,
+    GROWN,
     ant_action,
     ant_observation,
+    grown,
     motor,
     pendulum_action,
     pendulum_observation,
 )
-
-
-def grown(**options: object) -> BodyMap:
-    """Return the map from the ant to the ant with feet."""
-    return BodyMap.between(
-        ant_observation(),
-        ant_observation(feet=True),
-        ant_action(),
-        ant_action(feet=True),
-        **options,  # type: ignore[arg-type]
-    )
-
-
-def shrunk(**options: object) -> BodyMap:
-    """Return the map from the ant with feet to the ant."""
-    return BodyMap.between(
-        ant_observation(feet=True),
-        ant_observation(),
-        ant_action(feet=True),
-        ant_action(),
-        **options,  # type: ignore[arg-type]
-    )
 
 
 def rules_of(built: BodyMap) -> dict[str, object]:
@@ -72,32 +52,64 @@ def test_rules_have_a_short_form(like: RuleLike, rule: object) -> None:
 
 
 def test_hold_is_the_middle_of_the_range() -> None:
-    held = rules_of(shrunk(rules={"foot_*/angle": "hold"}))["foot_1/angle"]
+    sees, seen, acts, acted = GROWN
+    built = BodyMap.between(seen, sees, acted, acts, rules={"foot_*/angle": "hold"})
+    held = rules_of(built)["foot_1/angle"]
     assert isinstance(held, Hold)
     assert held.value == pytest.approx(65 * DEGREE)
 
 
-def test_the_first_glob_that_fits_counts() -> None:
-    rules = rules_of(grown(rules={"foot_[12]/*": "learn", "foot_*": "hold"}))
-    assert [rules[f"foot_{leg}/motor"] for leg in (1, 2, 3)] == [Learn(), Learn(), Hold(0.0)]
+@pytest.mark.parametrize(
+    ("rules", "expected"),
+    [
+        # The first glob that fits.
+        (
+            {"foot_[12]/*": "learn", "foot_*": "hold"},
+            {"foot_1/motor": Learn(), "foot_2/motor": Learn(), "foot_3/motor": Hold(0.0)},
+        ),
+        ({"foot_*": "learn", "foot_3/motor": "zero"}, {"foot_3/motor": Zero()}),
+        # Only an exact name overrides a partner of the same name.
+        (
+            {"*/motor": "learn", "hip_1/motor": "zero"},
+            {
+                "hip_1/motor": Zero(),
+                "hip_2/motor": Copy("hip_2/motor"),
+                "foot_2/motor": Learn(),
+            },
+        ),
+        ({"foot_*/motor": "copy ankle_*/motor"}, {"foot_3/motor": Copy("ankle_3/motor")}),
+    ],
+)
+def test_exact_names_come_before_partners_and_these_before_globs(
+    rules: dict[str, RuleLike], expected: dict[str, Rule]
+) -> None:
+    assert rules_of(grown(rules=rules)).items() >= expected.items()
 
 
-def test_an_exact_name_comes_before_a_glob() -> None:
-    rules = rules_of(grown(rules={"foot_*": "learn", "foot_3/motor": "zero"}))
-    assert rules["foot_3/motor"] == Zero()
-
-
-def test_only_an_exact_name_overrides_an_equal_name() -> None:
-    rules = rules_of(grown(rules={"*/motor": "learn", "hip_1/motor": "zero"}))
-    assert rules["hip_1/motor"] == Zero()
-    assert rules["hip_2/motor"] == Copy("hip_2/motor")
-    assert rules["foot_2/motor"] == Learn()
-
-
-def test_stars_are_substituted() -> None:
-    """Each foot copies the ankle of its own leg."""
-    rules = rules_of(grown(rules={"foot_*/motor": "copy ankle_*/motor"}))
-    assert rules["foot_3/motor"] == Copy("ankle_3/motor")
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"rules": {"foot_*": Hold(3.0)}}, MapError, "'foot_4/motor' cannot hold 3: .* -1 to 1"),
+        ({"otherwise": Hold(3.0)}, MapError, "cannot hold 3"),
+        ({"rules": {"fot_1/motor": "learn"}}, UnknownName, "Did you mean 'foot_1/motor'"),
+        ({"rules": {"hip_*": "learn"}}, MapError, r"The rule 'hip_\*' changes nothing"),
+        ({"rules": {"foot_*": "lern"}}, MapError, "No rule matches 'lern'. Did you mean 'learn'"),
+        (
+            {"rules": {"foot_1/motor": "copy ankle_1/moter"}},
+            UnknownName,
+            "No source action feature .* Did you mean 'ankle_1/mot",
+        ),
+        *(
+            ({"rules": {"foot_1/motor": rule}}, MapError, "The rule 'foot_1/motor' is .*: give 'z")
+            for rule in ({"hold": 1.0}, {"take": "ankle_1/motor"}, 0.5, None)
+        ),
+    ],
+)
+def test_rules_that_do_not_fit_are_refused(
+    options: dict[str, Any], kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=message):
+        grown(**options)
 
 
 def test_rules_can_be_for_one_side_only() -> None:
@@ -124,33 +136,6 @@ def test_unmatched_features_get_otherwise() -> None:
     assert rules_of(grown(otherwise=Hold(0.5)))["foot_2/motor"] == Hold(0.5)
     with pytest.raises(MapError, match=r"'zero', 'hold' or 'learn', not 'copy hip_1/motor'"):
         grown(otherwise="copy hip_1/motor")
-
-
-def test_a_constant_outside_the_range_is_refused() -> None:
-    with pytest.raises(MapError, match=r"'foot_4/motor' cannot hold 3: it reaches from -1 to 1"):
-        grown(rules={"foot_*": Hold(3.0)})
-    with pytest.raises(MapError, match="cannot hold 3"):
-        grown(otherwise=Hold(3.0))
-
-
-def test_a_pattern_without_matches_is_refused() -> None:
-    with pytest.raises(UnknownName, match=r"matches 'fot_1/motor'\. Did you mean 'foot_1/motor'"):
-        grown(rules={"fot_1/motor": "learn"})
-
-
-def test_a_pattern_that_changes_nothing_is_refused() -> None:
-    with pytest.raises(MapError, match=r"The rule 'hip_\*' changes nothing"):
-        grown(rules={"hip_*": "learn"})
-
-
-def test_an_unknown_rule_is_refused() -> None:
-    with pytest.raises(MapError, match=r"No rule matches 'lern'. Did you mean 'learn'"):
-        grown(rules={"foot_*": "lern"})
-
-
-def test_an_unknown_partner_is_refused() -> None:
-    with pytest.raises(UnknownName, match=r"No source action feature .* Did you mean 'ankle_1/mot"):
-        grown(rules={"foot_1/motor": "copy ankle_1/moter"})
 
 
 def test_units_are_not_mixed() -> None:
@@ -230,15 +215,3 @@ def test_unknown_gains_are_not_scaled() -> None:
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.between(*sides, silent, silent, units="torque")
     assert built.action[0].rule == Copy("slide/motor")
-
-
-@pytest.mark.parametrize("rule", [{"hold": 1.0}, {"take": "ankle_1/motor"}, 0.5, None])
-def test_a_rule_of_another_type_is_refused(rule: Any) -> None:
-    with pytest.raises(MapError, match=r"The rule 'foot_1/motor' is .*: give 'zero', 'hold'"):
-        BodyMap.between(
-            ant_observation(),
-            ant_observation(feet=True),
-            ant_action(),
-            ant_action(feet=True),
-            rules={"foot_1/motor": rule},
-        )

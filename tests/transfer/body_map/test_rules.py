@@ -10,11 +10,6 @@ from shapechanger.errors import MapError
 from shapechanger.transfer.body_map.rules import (
     Copy,
     Hold,
-    Learn,
-    Rule,
-    Zero,
-    compose_rules,
-    describe_rule,
     expand_template,
 )
 
@@ -28,33 +23,6 @@ def test_an_invalid_scale_is_refused(scale: float) -> None:
 def test_a_non_finite_constant_is_refused() -> None:
     with pytest.raises(MapError, match="must be finite, got nan"):
         Hold(math.nan)
-
-
-@pytest.mark.parametrize(
-    ("rule", "words"),
-    [
-        (Copy("hip/angle"), "hip/angle"),
-        (Copy("hip/angle", -1.0), "hip/angle times -1"),
-        (Zero(), "zero"),
-        (Hold(0.25), "hold 0.25"),
-        (Learn(), "learn"),
-    ],
-)
-def test_each_rule_has_a_description(rule: Rule, words: str) -> None:
-    assert describe_rule(rule) == words
-
-
-@pytest.mark.parametrize(
-    ("inner", "result"),
-    [
-        (Copy("shank", 3.0), Copy("shank", -6.0)),
-        (Hold(0.5), Hold(-1.0)),
-        (Zero(), Zero()),
-        (Learn(), Learn()),
-    ],
-)
-def test_rules_compose(inner: Rule, result: Rule) -> None:
-    assert compose_rules(Copy("shin", -2.0), inner) == result
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,6 @@ from shapechanger.transfer.body_map.envs import MappedEnv, body_map
 from shapechanger.transfer.body_map.map import BodyMap, MapRow
 from shapechanger.transfer.body_map.matching import Units
 from shapechanger.transfer.body_map.rules import Copy, Hold, Learn, MapEntry, Rule, RuleLike, Zero
-from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
 __all__ = [
     "BodyMap",
@@ -31,9 +30,7 @@ __all__ = [
     "MappedEnv",
     "Rule",
     "RuleLike",
-    "Symmetry",
     "Units",
     "Zero",
     "body_map",
-    "mirror",
 ]

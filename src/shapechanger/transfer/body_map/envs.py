@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, SupportsFloat, cast
 
 import gymnasium as gym
@@ -14,51 +13,27 @@ from shapechanger.contract.env_ref import layouts_of
 from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Layout
 from shapechanger.transfer.body_map.map import BodyMap
-from shapechanger.transfer.body_map.matching import Units
-from shapechanger.transfer.body_map.rules import RuleLike, Zero
 
 Array = NDArray[Any]
 
 
 def body_map(
-    source_env: gym.Env[Any, Any],
-    target_env: gym.Env[Any, Any],
-    *,
-    rules: Mapping[str, RuleLike] | None = None,
-    observation_rules: Mapping[str, RuleLike] | None = None,
-    action_rules: Mapping[str, RuleLike] | None = None,
-    otherwise: RuleLike = Zero(),  # noqa: B008 - frozen, so sharing it is safe.
-    units: Units = "same",
+    source_env: gym.Env[Any, Any], target_env: gym.Env[Any, Any], **options: Any
 ) -> BodyMap:
-    """Match the features of two envs by name; see `BodyMap.between`.
+    """Match the features of two envs by name.
 
     Args:
         source_env: The env that a policy was trained in.
         target_env: The env that it acts in.
-        rules: Rules keyed by a feature's name or a glob.
-        observation_rules: Rules of source observation features only.
-        action_rules: Rules of target action features only.
-        otherwise: The rule of features that nothing matches.
-        units: Treatment of scales and constants, see `BodyMap.between`.
+        **options: Rules, `otherwise` and `units`, see `BodyMap.between`.
 
     Raises:
         LayoutError: If an env publishes no layouts.
         MapError: If the two cannot be mapped.
         UnknownName: If a rule matches no feature, or copies one that does not exist.
     """
-    source_observation, source_action = layouts_of(source_env)
-    target_observation, target_action = layouts_of(target_env)
-    return BodyMap.between(
-        source_observation,
-        target_observation,
-        source_action,
-        target_action,
-        rules=rules,
-        observation_rules=observation_rules,
-        action_rules=action_rules,
-        otherwise=otherwise,
-        units=units,
-    )
+    ours, theirs = layouts_of(source_env), layouts_of(target_env)
+    return BodyMap.between(ours[0], theirs[0], ours[1], theirs[1], **options)
 
 
 class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
@@ -103,11 +78,10 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
         self._target_dtype = check_size(
             "target action", env.action_space, built.target_action
         ).dtype
-        source = built.source_observation
-        self.observation_space = observation_space or Box(source.low, source.high, dtype=np.float64)
-        source = built.source_action
+        sensed, moved = built.source_observation, built.source_action
+        self.observation_space = observation_space or Box(sensed.low, sensed.high, dtype=np.float64)
         self.action_space = action_space or Box(
-            source.low.astype(np.float32), source.high.astype(np.float32), dtype=np.float32
+            moved.low.astype(np.float32), moved.high.astype(np.float32), dtype=np.float32
         )
         check_size("source observation", self.observation_space, built.source_observation)
         check_size("source action", self.action_space, built.source_action)

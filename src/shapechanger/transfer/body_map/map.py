@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import MapError
-from shapechanger.layout import Feature, Layout
+from shapechanger.layout import Layout
 from shapechanger.transfer.body_map.matching import (
     Units,
     check_patterns,
@@ -21,22 +21,21 @@ from shapechanger.transfer.body_map.matching import (
     resolve,
     write_toml,
 )
+from shapechanger.transfer.body_map.mirror import mirrored_entries
 from shapechanger.transfer.body_map.rules import (
     BY_DEFAULT,
     SAME_NAME,
     Copy,
-    Gather,
+    Half,
     MapEntry,
     RuleLike,
     Side,
     SideName,
     Zero,
-    check_entries,
     compose_rules,
     describe_rule,
-    same_meaning,
+    difference_in_meaning,
 )
-from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
 
 def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
@@ -54,34 +53,28 @@ def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tu
     return tuple(result)
 
 
-def _invert_entries(
-    side: Side, entries: Sequence[MapEntry], otherwise: RuleLike
-) -> tuple[MapEntry, ...]:
-    """Return for each feature of `side.over` a rule over `side.into`."""
-    copies: dict[str, list[tuple[MapEntry, float]]] = {}
-    for entry in entries:
+def _invert_entries(half: Half, otherwise: RuleLike) -> tuple[MapEntry, ...]:
+    """Return for each feature of `over` a rule over `into`, which recovers it from its copies."""
+    copies: dict[str, dict[str, tuple[float, str]]] = {}
+    for entry in half.entries:
         if isinstance(entry.rule, Copy):
-            copies.setdefault(entry.rule.feature, []).append((entry, entry.rule.scale))
-    return tuple(
-        _backwards(feature, copies.get(feature.name, []), otherwise) for feature in side.over
-    )
-
-
-def _backwards(
-    feature: Feature, copies: list[tuple[MapEntry, float]], otherwise: RuleLike
-) -> MapEntry:
-    """Recover `feature` from its copies."""
-    if not copies:
-        return MapEntry(feature.name, constant_rule(otherwise, feature), BY_DEFAULT)
-    namesakes = [taker for taker in copies if taker[0].feature == feature.name]
-    if len(copies) > 1 and not namesakes:
-        names = " and ".join(repr(entry.feature) for entry, _ in copies)
-        raise MapError(
-            f"{feature.name!r} is copied to {names}, none of which has its name: "
-            "the inverse is not unique."
-        )
-    entry, scale = (namesakes or copies)[0]
-    return MapEntry(feature.name, Copy(entry.feature, 1.0 / scale), entry.why)
+            of_one = copies.setdefault(entry.rule.feature, {})
+            of_one[entry.feature] = entry.rule.scale, entry.why
+    result: list[MapEntry] = []
+    for feature in half.side.over:
+        name, takers = feature.name, copies.get(feature.name)
+        if takers is None:
+            result.append(MapEntry(name, constant_rule(otherwise, feature), BY_DEFAULT))
+            continue
+        if len(takers) > 1 and name not in takers:
+            raise MapError(
+                f"{name!r} is copied to {' and '.join(map(repr, takers))}, none of which has its "
+                "name: the inverse is not unique."
+            )
+        taker = name if name in takers else next(iter(takers))
+        scale, why = takers[taker]
+        result.append(MapEntry(name, Copy(taker, 1.0 / scale), why))
+    return tuple(result)
 
 
 class MapRow(NamedTuple):
@@ -122,8 +115,17 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
     action: tuple[MapEntry, ...]
 
     def __post_init__(self) -> None:
-        check_entries(self._observation_side, self.observation)
-        check_entries(self._action_side, self.action)
+        _ = self._halves
+
+    @property
+    def layouts(self) -> tuple[Layout, Layout, Layout, Layout]:
+        """Its layouts, in the order of `between`."""
+        return (
+            self.source_observation,
+            self.target_observation,
+            self.source_action,
+            self.target_action,
+        )
 
     @classmethod
     def between(
@@ -175,14 +177,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         check_patterns(shared, [(sensed, observation), (moved, action)])
         check_patterns(on_observation, [(sensed, observation)])
         check_patterns(on_action, [(moved, action)])
-        return cls(
-            source_observation=source_observation,
-            target_observation=target_observation,
-            source_action=source_action,
-            target_action=target_action,
-            observation=observation,
-            action=action,
-        )
+        layouts = source_observation, target_observation, source_action, target_action
+        return cls(*layouts, observation, action)
 
     @classmethod
     def identity(cls, observation: Layout, action: Layout) -> BodyMap:
@@ -192,14 +188,45 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             observation: Layout of its observations.
             action: Layout of its actions.
         """
-        return cls(
-            source_observation=observation,
-            target_observation=observation,
-            source_action=action,
-            target_action=action,
-            observation=tuple(MapEntry(name, Copy(name), SAME_NAME) for name in observation.names),
-            action=tuple(MapEntry(name, Copy(name), SAME_NAME) for name in action.names),
+        entries = (
+            tuple(MapEntry(name, Copy(name), SAME_NAME) for name in layout.names)
+            for layout in (observation, action)
         )
+        return cls(observation, observation, action, action, *entries)
+
+    @classmethod
+    def mirror(
+        cls,
+        observation: Layout,
+        action: Layout,
+        *,
+        swap: Mapping[str, str] | None = None,
+        flip: Iterable[str] = (),
+    ) -> BodyMap:
+        """Return the map of a body to its mirror image, which swaps left and right.
+
+        It is its own inverse. Before or after another map, `mirror.then(map)`, a policy of the
+        source acts as its mirror image. The element of a feature is the part of its name before the
+        first "/".
+
+        Args:
+            observation: Layout of its observations.
+            action: Layout of its actions.
+            swap: Partner of each element on the other side, such as `{"hip_1": "hip_4"}`, or of a
+                glob, such as `{"*_1": "*_4"}`; each pair appears once or both ways. Other elements
+                stay in place.
+            flip: Globs of elements whose coordinate changes sign, such as the hinges about a
+                vertical axis; both elements of a pair or neither. Components along axes of the
+                world, such as `torso/vy`, are recognised by their names.
+
+        Raises:
+            MapError: If the pairs contradict each other, one element of a pair flips and the other
+                does not, a feature is a block, two features that swap differ in unit, shape or
+                gain, or their ranges are no mirror images.
+            UnknownName: If an element or the partner of a feature does not exist.
+        """
+        entries = mirrored_entries(observation, action, swap or {}, flip)
+        return cls(observation, observation, action, action, *entries)
 
     def adapt_observation(self, target_observation: ArrayLike) -> NDArray[Any]:
         """Return the observation of the source body.
@@ -213,7 +240,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         Raises:
             SpaceMismatch: If the last axis has another length.
         """
-        return self._observation_gather(target_observation)
+        return self._halves[0](target_observation)
 
     def adapt_action(self, source_action: ArrayLike) -> NDArray[Any]:
         """Return the action of the target body, clipped to its bounds.
@@ -227,29 +254,29 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         Raises:
             SpaceMismatch: If the last axis has another length.
         """
-        action = self._action_gather(source_action)
+        action = self._halves[1](source_action)
         low, high = self._action_bounds
         return np.clip(action, low.astype(action.dtype), high.astype(action.dtype))
 
-    @cached_property
+    @property
     def observation_matrix(self) -> NDArray[np.float64]:
         """M, shape (source_observation.size, target_observation.size); read-only."""
-        return self._observation_gather.matrix()
+        return self._halves[0].matrix
 
     @property
     def observation_offset(self) -> NDArray[np.float64]:
         """c, shape (source_observation.size,); read-only."""
-        return self._observation_gather.offset
+        return self._halves[0].offset
 
-    @cached_property
+    @property
     def action_matrix(self) -> NDArray[np.float64]:
         """N, shape (target_action.size, source_action.size); read-only."""
-        return self._action_gather.matrix()
+        return self._halves[1].matrix
 
     @property
     def action_offset(self) -> NDArray[np.float64]:
         """d, shape (target_action.size,); read-only."""
-        return self._action_gather.offset
+        return self._halves[1].offset
 
     def then(self, following: BodyMap) -> BodyMap:
         """Compose: the map from this source to the target of `following`.
@@ -262,15 +289,22 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         Raises:
             MapError: If the target of this map and the source of `following` mean different things.
         """
-        self._check_meeting("observation", self.target_observation, following.source_observation)
-        self._check_meeting("action", self.target_action, following.source_action)
+        for name, first, second in (
+            ("observation", self.target_observation, following.source_observation),
+            ("action", self.target_action, following.source_action),
+        ):
+            if where := difference_in_meaning(first, second):
+                raise MapError(
+                    f"These maps cannot be composed: between the target {name} of the first and "
+                    f"the source {name} of the second, {where}."
+                )
         return BodyMap(
-            source_observation=self.source_observation,
-            target_observation=following.target_observation,
-            source_action=self.source_action,
-            target_action=following.target_action,
-            observation=_compose_entries(self.observation, following.observation),
-            action=_compose_entries(following.action, self.action),
+            self.source_observation,
+            following.target_observation,
+            self.source_action,
+            following.target_action,
+            _compose_entries(self.observation, following.observation),
+            _compose_entries(following.action, self.action),
         )
 
     def inverse(self, otherwise: RuleLike = Zero()) -> BodyMap:  # noqa: B008 - frozen.
@@ -284,49 +318,16 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         Raises:
             MapError: If a feature was copied several times, but not under its own name.
         """
-        return BodyMap(
-            source_observation=self.target_observation,
-            target_observation=self.source_observation,
-            source_action=self.target_action,
-            target_action=self.source_action,
-            observation=_invert_entries(self._observation_side, self.observation, otherwise),
-            action=_invert_entries(self._action_side, self.action, otherwise),
-        )
-
-    def with_symmetry(self, symmetry: Symmetry) -> BodyMap:
-        """Return the map through a symmetry of the source or the target, such as its mirror image.
-
-        A policy of the source then acts as its mirror image. A symmetry that fits both bodies is
-        applied to the source.
-
-        Args:
-            symmetry: The symmetry.
-
-        Raises:
-            MapError: If the symmetry belongs to neither body.
-        """
-        if symmetry.fits(self.source_observation, self.source_action):
-            return _symmetry_map(symmetry, self.source_observation, self.source_action).then(self)
-        if symmetry.fits(self.target_observation, self.target_action):
-            return self.then(_symmetry_map(symmetry, self.target_observation, self.target_action))
-        where = same_meaning(symmetry.observation_layout, self.source_observation) or same_meaning(
-            symmetry.action_layout, self.source_action
-        )
-        raise MapError(
-            "The symmetry belongs neither to the source nor to the target: "
-            f"between it and the source {where}."
-        )
+        seen, sees, acted, acts = self.layouts
+        entries = (_invert_entries(half, otherwise) for half in self._halves)
+        return BodyMap(sees, seen, acts, acted, *entries)
 
     def table(self) -> tuple[MapRow, ...]:
         """List each feature that is filled, its rule as text, and the origin of the rule."""
-        sides: tuple[tuple[SideName, tuple[MapEntry, ...]], ...] = (
-            ("observation", self.observation),
-            ("action", self.action),
-        )
         return tuple(
-            MapRow(name, entry.feature, describe_rule(entry.rule), entry.why)
-            for name, entries in sides
-            for entry in entries
+            MapRow(half.side.name, entry.feature, describe_rule(entry.rule), entry.why)
+            for half in self._halves
+            for entry in half.entries
         )
 
     def __str__(self) -> str:
@@ -362,26 +363,15 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
     def to_toml(self) -> str:
         """Write the rules as TOML, without the layouts, for editing by hand."""
-        halves = (self._observation_side, self.observation), (self._action_side, self.action)
-        return write_toml(halves)
+        return write_toml(self._halves)
 
     @classmethod
-    def from_toml(
-        cls,
-        text: str,
-        source_observation: Layout,
-        target_observation: Layout,
-        source_action: Layout,
-        target_action: Layout,
-    ) -> BodyMap:
+    def from_toml(cls, text: str, *layouts: Layout) -> BodyMap:
         """Build a map from rules in TOML; see `shapechanger.transfer.body_map.matching`.
 
         Args:
             text: The rules.
-            source_observation: Layout of the source's observations.
-            target_observation: Layout of the target's observations.
-            source_action: Layout of the source's actions.
-            target_action: Layout of the target's actions.
+            *layouts: The four layouts of `between`, in its order.
 
         Raises:
             MapError: If the text is not TOML, or a rule does not fit.
@@ -389,64 +379,29 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
         """
         wanted = read_toml(text)
         built = cls.between(
-            source_observation,
-            target_observation,
-            source_action,
-            target_action,
+            *layouts,
             observation_rules=wanted.observation,
             action_rules=wanted.action,
             otherwise=wanted.otherwise,
-            units=wanted.units,
+            units=cast("Units", wanted.units),
         )
         if wanted.symmetry is None:
             return built
         of_source = wanted.symmetry.of == "source"
-        observation = source_observation if of_source else target_observation
-        action = source_action if of_source else target_action
-        symmetry = mirror(observation, action, swap=wanted.symmetry.swap, flip=wanted.symmetry.flip)
-        turned = _symmetry_map(symmetry, observation, action)
-        return turned.then(built) if of_source else built.then(turned)
-
-    @property
-    def _observation_side(self) -> Side:
-        return Side("observation", self.source_observation, self.target_observation)
-
-    @property
-    def _action_side(self) -> Side:
-        return Side("action", self.target_action, self.source_action)
+        observation, action = layouts[::2] if of_source else layouts[1::2]
+        swap, flip = wanted.symmetry.swap, wanted.symmetry.flip
+        image = cls.mirror(observation, action, swap=swap, flip=flip)
+        return image.then(built) if of_source else built.then(image)
 
     @cached_property
-    def _observation_gather(self) -> Gather:
-        return Gather.of(self._observation_side, self.observation)
-
-    @cached_property
-    def _action_gather(self) -> Gather:
-        return Gather.of(self._action_side, self.action)
+    def _halves(self) -> tuple[Half, Half]:
+        sensed = Side("observation", self.source_observation, self.target_observation)
+        moved = Side("action", self.target_action, self.source_action)
+        return Half(sensed, self.observation), Half(moved, self.action)
 
     @cached_property
     def _action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self.target_action.low, self.target_action.high
-
-    @staticmethod
-    def _check_meeting(name: SideName, first: Layout, second: Layout) -> None:
-        where = same_meaning(first, second)
-        if where:
-            raise MapError(
-                f"These maps cannot be composed: between the target {name} of the first and the "
-                f"source {name} of the second, {where}."
-            )
-
-
-def _symmetry_map(symmetry: Symmetry, observation: Layout, action: Layout) -> BodyMap:
-    """Return a symmetry g as a map from a body to itself: the policy p acts as g⁻¹ p(g o)."""
-    return BodyMap(
-        source_observation=observation,
-        target_observation=observation,
-        source_action=action,
-        target_action=action,
-        observation=symmetry.observation_entries,
-        action=symmetry.inverse().action_entries,
-    )
 
 
 def _counted(entries: tuple[MapEntry, ...]) -> str:

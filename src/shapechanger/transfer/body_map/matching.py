@@ -27,7 +27,7 @@ import fnmatch
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
+from typing import Any, Final, Literal, TypeVar, get_args
 
 import msgspec
 
@@ -37,6 +37,7 @@ from shapechanger.transfer.body_map.rules import (
     BY_DEFAULT,
     SAME_NAME,
     Copy,
+    Half,
     Hold,
     Learn,
     MapEntry,
@@ -51,6 +52,7 @@ Units = Literal["same", "torque", "exact"]
 """Treatment of scales and constants, see `BodyMap.between`."""
 
 _COPY: Final = "copy "
+_WORDS: Final = ("zero", "hold", "learn", "copy NAME")
 _MOST_NAMES_LISTED: Final = 8
 _SPELLED: Final[dict[str, Rule]] = {"zero": Zero(), "learn": Learn()}
 
@@ -61,21 +63,16 @@ def resolve(
     """Resolve the rule of each feature of `side.into`."""
     entries: list[MapEntry] = []
     for feature in side.into:
-        matching = (pattern for pattern in rules if _matches(pattern, feature.name, side))
-        if feature.name in rules:
-            pattern = feature.name
-        elif feature.name in side.over:
-            rule = _suited(Copy(feature.name), feature, side, units)
-            entries.append(MapEntry(feature.name, rule, SAME_NAME))
-            continue
+        name = feature.name
+        fitting = [name] if name in rules else [p for p in rules if _matches(p, name, side)]
+        if name in side.over and name not in rules:
+            rule, why = Copy(name), SAME_NAME
+        elif fitting:
+            rule = _read(rules[fitting[0]], fitting[0], feature, side, units)
+            why = _by_rule(fitting[0])
         else:
-            pattern = next(matching, None)
-        if pattern is None:
-            entries.append(MapEntry(feature.name, constant_rule(otherwise, feature), BY_DEFAULT))
-            continue
-        rule = _read(rules[pattern], pattern, feature, side, units)
-        rule = _suited(rule, feature, side, units)
-        entries.append(MapEntry(feature.name, rule, _by_rule(pattern)))
+            rule, why = constant_rule(otherwise, feature), BY_DEFAULT
+        entries.append(MapEntry(name, _suited(rule, feature, side, units), why))
     _require_match(side, entries)
     return tuple(entries)
 
@@ -140,8 +137,7 @@ def _read(like: RuleLike, pattern: str, feature: Feature, side: Side, units: Uni
         case str() if like.startswith(_COPY):
             name, scale = like.removeprefix(_COPY).strip(), 1.0
         case str():
-            known = ("zero", "hold", "learn", "copy NAME")
-            raise MapError(f"{feature.name}: {UnknownName('rule', like, known)}")
+            raise MapError(f"{feature.name}: {UnknownName('rule', like, _WORDS)}")
         case _:
             raise MapError(
                 f"The rule {pattern!r} is {like!r}: give 'zero', 'hold', 'learn', 'copy NAME', "
@@ -154,14 +150,7 @@ def _suited(rule: Rule, feature: Feature, side: Side, units: Units) -> Rule:
     """Return the rule with its scale in the requested units, if it fits the feature."""
     if not isinstance(rule, Copy):
         return rule
-    conversion = _conversion(rule.scale, side.copied(rule.feature), feature, side, units)
-    return Copy(rule.feature, rule.scale * conversion)
-
-
-def _conversion(scale: float, copied: Feature, feature: Feature, side: Side, units: Units) -> float:
-    """Factor, besides the scale, that converts a number of `copied` to one of `feature`."""
-    if units == "exact":
-        return 1.0
+    copied, factor = side.copied(rule.feature), 1.0
     if units == "torque" and side.name == "action":
         if copied.gain_unit != feature.gain_unit:
             raise MapError(
@@ -171,22 +160,19 @@ def _conversion(scale: float, copied: Feature, feature: Feature, side: Side, uni
                 "use units='same'."
             )
         if copied.gain_unit:
-            return copied.gain / feature.gain
-    if copied.unit != feature.unit and abs(scale) == 1.0:
+            factor, units = copied.gain / feature.gain, "exact"
+    if units != "exact" and copied.unit != feature.unit and abs(rule.scale) == 1.0:
         raise MapError(
             f"The {side.into_kind} {feature} cannot copy the {side.over_kind} {copied}, because "
             f"the units differ: give {feature.name!r} a rule with the scale that converts them."
         )
-    return 1.0
+    return Copy(rule.feature, rule.scale * factor)
 
 
-def _require_match(side: Side, entries: Iterable[MapEntry]) -> None:
+def _require_match(side: Side, entries: Sequence[MapEntry]) -> None:
     """Refuse a side on which nothing matches and not every feature has an explicit rule."""
-    entries = tuple(entries)
-    if any(isinstance(entry.rule, Copy) for entry in entries):
+    if any(isinstance(e.rule, Copy) for e in entries) or all(e.why != BY_DEFAULT for e in entries):
         return
-    if all(entry.why != BY_DEFAULT for entry in entries):
-        return  # Each feature has an explicit rule.
     into, over = side.into.names, side.over.names
     example = f"copy {over[0]}" if over else "hold"
     raise MapError(
@@ -203,27 +189,25 @@ def _listed(names: tuple[str, ...]) -> str:
     return f"{shown} and {more} more" if more > 0 else shown
 
 
-_WORDS: Final = ("zero", "hold", "learn")
-
 _Read = TypeVar("_Read")
 
 
-class MirrorText(NamedTuple):
-    """The symmetry of a map in TOML."""
+class MirrorText(msgspec.Struct):
+    """The mirror image of a map in TOML."""
 
-    of: Literal["source", "target"]
-    swap: dict[str, str]
-    flip: tuple[str, ...]
+    of: str = "source"
+    swap: dict[str, str] = {}
+    flip: tuple[str, ...] = ()
 
 
-class MapText(NamedTuple):
+class MapText(msgspec.Struct):
     """A map in TOML, before it is resolved for two bodies."""
 
-    units: Units
-    otherwise: RuleLike
-    observation: dict[str, RuleLike]
-    action: dict[str, RuleLike]
-    symmetry: MirrorText | None
+    units: str = "same"
+    otherwise: Any = "zero"
+    observation: dict[str, Any] = {}
+    action: dict[str, Any] = {}
+    symmetry: MirrorText | None = None
 
 
 def read_toml(text: str) -> MapText:
@@ -232,27 +216,27 @@ def read_toml(text: str) -> MapText:
         table = tomllib.loads(text.removeprefix("\ufeff"))  # Windows editors prepend a mark.
     except tomllib.TOMLDecodeError as error:
         raise MapError(f"This is not TOML: {error}.") from error
-    _check_keys("key", table, MapText._fields)
-    observation = _as("observation", table.get("observation", {}), dict[str, Any])
-    action = _as("action", table.get("action", {}), dict[str, Any])
-    units = _as("units", table.get("units", "same"), str)
-    return MapText(
-        units=_one_of("units", units, get_args(Units)),
-        otherwise=_rule("otherwise", table.get("otherwise", "zero")),
-        observation={name: _rule(name, value) for name, value in observation.items()},
-        action={name: _rule(name, value) for name, value in action.items()},
-        symmetry=_mirror(table["symmetry"]) if "symmetry" in table else None,
-    )
+    _check_keys("key", table, MapText.__struct_fields__)
+    found = _as("map", table, MapText)
+    _one_of("units", found.units, get_args(Units))
+    if found.symmetry is not None:
+        _check_keys("key of 'symmetry'", table["symmetry"], MirrorText.__struct_fields__)
+        _one_of("of", found.symmetry.of, ("source", "target"))
+    found.otherwise = _rule("otherwise", found.otherwise)
+    for rules in (found.observation, found.action):
+        rules |= {name: _rule(name, value) for name, value in rules.items()}
+    return found
 
 
-def write_toml(halves: Sequence[tuple[Side, tuple[MapEntry, ...]]]) -> str:
+def write_toml(halves: Sequence[Half]) -> str:
     """Write rules as TOML; a partner of the same name has no line."""
-    units = "same" if all(_is_plain(e, side) for side, each in halves for e in each) else "exact"
+    plain = all(_is_plain(entry, half.side) for half in halves for entry in half.entries)
+    units = "same" if plain else "exact"
     lines = [f'units = "{units}"', 'otherwise = "zero"']
-    for side, entries in halves:
-        explicit = [entry for entry in entries if entry.rule != Copy(entry.feature)]
+    for half in halves:
+        explicit = [entry for entry in half.entries if entry.rule != Copy(entry.feature)]
         if explicit:
-            lines += ["", f"[{side.name}]"]
+            lines += ["", f"[{half.side.name}]"]
             lines += [f"{_quoted(entry.feature)} = {_value(entry.rule)}" for entry in explicit]
     return "\n".join(lines) + "\n"
 
@@ -290,8 +274,8 @@ def _quoted(name: str) -> str:
 def _rule(name: str, value: object) -> RuleLike:
     """Parse the value of a rule."""
     if isinstance(value, str):
-        if not value.startswith("copy "):
-            _one_of(name, value, (*_WORDS, "copy NAME"))
+        if not value.startswith(_COPY):
+            _one_of(name, value, _WORDS)
         return value
     table = _as(name, value, dict[str, Any])
     _check_keys(f"key of {name!r}", table, ("take", "scale", "hold"))
@@ -305,17 +289,6 @@ def _rule(name: str, value: object) -> RuleLike:
     )
 
 
-def _mirror(value: object) -> MirrorText:
-    table = _as("symmetry", value, dict[str, Any])
-    _check_keys("key of 'symmetry'", table, MirrorText._fields)
-    of = _as("of", table.get("of", "source"), str)
-    return MirrorText(
-        of=_one_of("of", of, ("source", "target")),
-        swap=_as("swap", table.get("swap", {}), dict[str, str]),
-        flip=tuple(_as("flip", table.get("flip", []), list[str])),
-    )
-
-
 def _as(name: str, value: object, kind: type[_Read]) -> _Read:
     """Convert a value to its type."""
     try:
@@ -324,11 +297,9 @@ def _as(name: str, value: object, kind: type[_Read]) -> _Read:
         raise MapError(f"{name!r} is wrong: {error}.") from error
 
 
-def _one_of(name: str, word: str, known: Sequence[str]) -> Any:
-    """Return the word if it is known."""
+def _one_of(name: str, word: str, known: Sequence[str]) -> None:
     if word not in known:
         raise MapError(f"{name}: {UnknownName('word', word, known)}")
-    return word
 
 
 def _check_keys(kind: str, table: Mapping[str, object], known: Sequence[str]) -> None:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Final, Literal, NamedTuple
 
 import msgspec
@@ -186,25 +186,7 @@ class Side(NamedTuple):
         return self.over[name]
 
 
-def check_entries(side: Side, entries: tuple[MapEntry, ...]) -> None:
-    """Check that each feature has one rule, in order, and that copied features exist and fit."""
-    filled = tuple(entry.feature for entry in entries)
-    if filled != side.into.names:
-        raise MapError(
-            f"Each {side.into_kind} needs one rule, in the order of the layout: "
-            f"{', '.join(side.into.names)}; the rules given are for {', '.join(filled) or 'none'}."
-        )
-    for feature, entry in zip(side.into, entries, strict=True):
-        if isinstance(entry.rule, Copy):
-            copied = side.copied(entry.rule.feature)
-            if copied.shape != feature.shape:
-                raise MapError(
-                    f"{feature.name!r} has the shape {feature.shape} and cannot copy "
-                    f"{copied.name!r}, which has the shape {copied.shape}."
-                )
-
-
-def same_meaning(left: Layout, right: Layout) -> str:
+def difference_in_meaning(left: Layout, right: Layout) -> str:
     """Return where the meaning of two layouts first differs; empty if nowhere.
 
     Ranges may differ, because a longer leg only widens them; names, order, units, shapes and gains
@@ -220,55 +202,56 @@ def same_meaning(left: Layout, right: Layout) -> str:
     return ""
 
 
-@dataclass(frozen=True, slots=True)
-class Gather:
-    """Vectorised form of one half of a map.
+class Half:
+    """One half of a map: a rule for each feature of a side, in vectorised form.
 
     A number that is copied with scale 1 is bitwise equal.
 
     Attributes:
-        rows: Output indices that are copied, shape (n_copied,).
-        columns: Their input indices, shape (n_copied,).
-        scale: Their factors, shape (n_copied,).
+        side: The layouts.
+        entries: One for each feature of `side.into`, in order.
         offset: Constant of each output, 0 for copied ones, shape (n_into,); read-only.
+
+    Raises:
+        MapError: If a feature has no rule, or copies a block of another shape.
+        UnknownName: If a rule copies a feature that does not exist.
     """
 
-    kind: str
-    n_over: int
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    scale: NDArray[np.float64]
-    offset: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, side: Side, entries: Sequence[MapEntry]) -> Gather:
-        """Compile one half of a map."""
+    def __init__(self, side: Side, entries: tuple[MapEntry, ...]) -> None:
+        self.side, self.entries = side, entries
+        names = tuple(entry.feature for entry in entries)
+        if names != side.into.names:
+            raise MapError(
+                f"Each {side.into_kind} needs one rule, in the order of the layout: "
+                f"{', '.join(side.into.names)}; the rules given are for "
+                f"{', '.join(names) or 'none'}."
+            )
+        self.offset, self._n_over = np.zeros(side.into.size), side.over.size
         into, over = side.into.slices, side.over.slices
         rows: list[int] = []
         columns: list[int] = []
         scale: list[float] = []
-        offset = np.zeros(side.into.size)
         for entry in entries:
             place = into[entry.feature]
             match entry.rule:
                 case Copy(feature, factor):
-                    copied = over[feature]
+                    filled, copied = side.into[entry.feature], side.copied(feature)
+                    if copied.shape != filled.shape:
+                        raise MapError(
+                            f"{filled.name!r} has the shape {filled.shape} and cannot copy "
+                            f"{copied.name!r}, which has the shape {copied.shape}."
+                        )
                     rows += range(place.start, place.stop)
-                    columns += range(copied.start, copied.stop)
+                    columns += range(over[feature].start, over[feature].stop)
                     scale += [factor] * (place.stop - place.start)
                 case Hold(value):
-                    offset[place] = value
+                    self.offset[place] = value
                 case Zero() | Learn():
                     pass
-        offset.setflags(write=False)
-        return cls(
-            kind=side.over_kind,
-            n_over=side.over.size,
-            rows=np.asarray(rows, dtype=np.intp),
-            columns=np.asarray(columns, dtype=np.intp),
-            scale=np.asarray(scale, dtype=np.float64),
-            offset=offset,
-        )
+        self.offset.setflags(write=False)
+        # Output indices that are copied, their input indices and their factors.
+        self._rows, self._columns = np.array(rows, np.intp), np.array(columns, np.intp)
+        self._scale = np.array(scale, np.float64)
 
     def __call__(self, values: ArrayLike) -> NDArray[Any]:
         """Apply the map to each input vector.
@@ -281,20 +264,21 @@ class Gather:
             integers that float32 cannot hold.
         """
         given = np.asarray(values)
-        if given.shape[-1:] != (self.n_over,):
+        if given.shape[-1:] != (self._n_over,):
             raise SpaceMismatch(
-                f"The layout of {self.kind}s has {self.n_over} numbers, so the last axis must have "
-                f"that length, and the shape is {given.shape}."
+                f"The layout of {self.side.over_kind}s has {self._n_over} numbers, so the last "
+                f"axis must have that length, and the shape is {given.shape}."
             )
         dtype = np.result_type(given.dtype, np.float32)
         filled = np.empty((*given.shape[:-1], self.offset.size), dtype)
         filled[...] = self.offset
-        filled[..., self.rows] = given[..., self.columns] * self.scale
+        filled[..., self._rows] = given[..., self._columns] * self._scale
         return filled
 
+    @cached_property
     def matrix(self) -> NDArray[np.float64]:
         """The linear part, shape (n_into, n_over); read-only."""
-        dense = np.zeros((self.offset.size, self.n_over))
-        dense[self.rows, self.columns] = self.scale
+        dense = np.zeros((self.offset.size, self._n_over))
+        dense[self._rows, self._columns] = self._scale
         dense.setflags(write=False)
         return dense
