@@ -21,7 +21,7 @@ from torch import nn
 
 from shapechanger.errors import MissingExtra, SpaceMismatch, TransplantError
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, Hold, mirror
+from shapechanger.transfer.body_map import BodyMap, Copy, Hold
 from shapechanger.transfer.transplant import transplant, transplant_normalisation
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
@@ -77,17 +77,11 @@ def ant_map(source_feet: bool, target_feet: bool, **options: Any) -> BodyMap:
     )
 
 
-def mirrored() -> BodyMap:
-    """Return the map from an ant to its mirror image."""
-    symmetry = mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
-    return BodyMap.identity(ant_observation(), ant_action()).with_symmetry(symmetry)
-
-
 MAPS: dict[str, BodyMap] = {
     "identity": BodyMap.identity(ant_observation(), ant_action()),
     "growth": ant_map(False, True, rules={"foot_[12]/motor": "zero", "foot_*": Hold(0.25)}),
     "shrink": ant_map(True, False, rules={"foot_*/angle": "hold"}),
-    "mirror": mirrored(),
+    "mirror": BodyMap.mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP),
     "copies": ant_map(
         False,
         True,
@@ -354,13 +348,9 @@ def test_constant_actions_are_explored() -> None:
     theirs = computed(sac, body_map.adapt_observation(observation), np.zeros((4, 8)))["log_std"]
     np.testing.assert_allclose(ours["log_std"][:, held], theirs.mean(axis=1), atol=1e-6)
 
-
-def test_a_constant_at_the_bound_is_finite() -> None:
-    body_map = ant_map(False, True, rules={"foot_*": Hold(1.0)})
-    env = envs(body_map.target_observation, body_map.target_action)
-    target = transplant(trained(SAC, body_map), body_map, env)
-    action, _ = target.predict(np.zeros(body_map.target_observation.size), deterministic=True)
-    np.testing.assert_allclose(action[8:], 1.0, atol=1e-5)
+    at_bound = ant_map(False, True, rules={"foot_*": Hold(1.0)})
+    action, _ = transplant(sac, at_bound, env).predict(observation, deterministic=True)
+    np.testing.assert_allclose(action[:, 8:], 1.0, atol=1e-5)
 
 
 def test_ppo_scales_its_actions_and_their_spread() -> None:
@@ -627,64 +617,47 @@ def test_a_plain_env_is_accepted() -> None:
     assert transplant(trained(PPO, body_map), body_map, env, device="cpu").n_envs == 1
 
 
-def test_activations_with_parameters_are_copied() -> None:
-    body_map = MAPS["growth"]
-    source = trained(PPO, body_map, policy={"activation_fn": nn.PReLU})
-    source.policy.double()
-    env = envs(body_map.target_observation, body_map.target_action)
-    check_same_function(source, transplant(source, body_map, env), body_map, 1e-12)
-
-
-def test_feature_extractors_need_not_be_shared() -> None:
-    body_map = MAPS["growth"]
-    env = envs(body_map.target_observation, body_map.target_action)
-    for kind, share in ((PPO, False), (SAC, True)):
-        source = trained(kind, body_map, policy={"share_features_extractor": share})
-        check_same_function(source, transplant(source, body_map, env), body_map, 1e-4)
-
-
-class Extra(nn.Module):
-    """A policy with another layer that depends on the body."""
-
-    def __init__(self, n: int) -> None:
-        super().__init__()
-        self.weight = nn.Parameter(torch.zeros(n))
-
-
-def _gsde(body_map: BodyMap) -> Any:
-    return trained(PPO, body_map, use_sde=True)
-
-
-def _sac_gsde(body_map: BodyMap) -> Any:
-    return trained(SAC, body_map, use_sde=True)
-
-
 def _custom_mlp(body_map: BodyMap) -> Any:
     source = trained(PPO, body_map)
     source.policy.mlp_extractor = nn.Sequential()  # type: ignore[assignment]
     return source
 
 
-def _own_extractor(body_map: BodyMap) -> Any:
-    class Own(FlattenExtractor):
-        """An unsupported layer."""
+@pytest.mark.parametrize(
+    ("kind", "policy"),
+    [
+        (PPO, {"activation_fn": nn.PReLU}),
+        (PPO, {"share_features_extractor": False}),
+        (SAC, {"share_features_extractor": True}),
+    ],
+)
+def test_other_settings_of_a_policy_are_moved(kind: type[Model], policy: dict[str, Any]) -> None:
+    """Activations with parameters are copied, and extractors need not be shared."""
+    body_map = MAPS["growth"]
+    source = trained(kind, body_map, policy=policy)
+    source.policy.double()
+    env = envs(body_map.target_observation, body_map.target_action)
+    check_same_function(source, transplant(source, body_map, env), body_map, 1e-12)
 
-    return trained(SAC, body_map, policy={"features_extractor_class": Own})
 
-
-def _discrete(body_map: BodyMap) -> Any:
-    env = gym.make("CartPole-v1")
-    return PPO("MlpPolicy", env, n_steps=32, batch_size=16)
+class Own(FlattenExtractor):
+    """An unsupported layer."""
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (_gsde, "explores with gSDE"),
-        (_sac_gsde, "explores with gSDE"),
+        (lambda ants: trained(PPO, ants, use_sde=True), "explores with gSDE"),
+        (lambda ants: trained(SAC, ants, use_sde=True), "explores with gSDE"),
         (_custom_mlp, "has a Sequential instead of a MlpExtractor"),
-        (_own_extractor, "extracts features with Own"),
-        (_discrete, "has a CategoricalDistribution instead"),
+        (
+            lambda ants: trained(SAC, ants, policy={"features_extractor_class": Own}),
+            "extracts features with Own",
+        ),
+        (
+            lambda _: PPO("MlpPolicy", gym.make("CartPole-v1"), n_steps=32, batch_size=16),
+            "has a CategoricalDistribution instead",
+        ),
         (lambda body_map: nn.Linear(1, 1), "This model is Linear"),
     ],
 )
@@ -699,7 +672,7 @@ def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str
 def test_unknown_parameters_are_refused() -> None:
     body_map = MAPS["identity"]
     source = trained(PPO, body_map)
-    source.policy.extra = Extra(3)
+    source.policy.extra = nn.PReLU()
     with pytest.raises(TransplantError, match=r"parameters extra\.weight of this policy"):
         transplant(source, body_map, envs(ant_observation(), ant_action()))
 

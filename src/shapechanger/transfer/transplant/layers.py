@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import nn
 
 from shapechanger.errors import TransplantError
-from shapechanger.layout import Feature, Layout
+from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap, Copy, Learn
 
@@ -39,8 +38,7 @@ class Affine(NamedTuple):
     offset: Array
 
 
-@dataclass(frozen=True, slots=True)
-class Scaling:
+class Scaling(NamedTuple):
     """Normalisation of observations as in SB3's `VecNormalize`: z = clip((o - mean) / sigma).
 
     Attributes:
@@ -112,14 +110,10 @@ def transplant_normalisation(source: RunningMeanStd, body_map: BodyMap) -> Runni
             carried.mean[place] = source.mean[ours[name]] / scale
             carried.var[place] = source.var[ours[name]] / scale**2
         else:
-            carried.mean[place], carried.var[place] = feature.middle, _guessed_variance(feature)
+            width = feature.high - feature.low
+            carried.mean[place] = feature.middle
+            carried.var[place] = width**2 / 12.0 if 0.0 < width < math.inf else 1.0
     return carried
-
-
-def _guessed_variance(feature: Feature) -> float:
-    """Variance of a uniform distribution over the range, or 1 without a range."""
-    width = feature.high - feature.low
-    return width**2 / 12.0 if 0.0 < width < math.inf else 1.0
 
 
 # tanh reaches 1 only at infinity; a constant at a bound is placed a millionth inside.
@@ -143,8 +137,7 @@ class OutputMap(NamedTuple):
     fresh: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class PolicyOutputs:
+class PolicyOutputs(NamedTuple):
     """The output layers of a Gaussian policy."""
 
     mean: OutputMap
@@ -248,12 +241,11 @@ def _spread(matrix: Array) -> Array:
     return np.where(taken.any(axis=1, keepdims=True), taken.astype(np.float64), mean)
 
 
-@dataclass(frozen=True, slots=True)
-class BoundaryLayers:
+class BoundaryLayers(NamedTuple):
     """The layers of a network that depend on the body."""
 
-    inputs: dict[str, Affine] = field(default_factory=dict[str, Affine])
-    outputs: dict[str, OutputMap] = field(default_factory=dict[str, OutputMap])
+    inputs: dict[str, Affine]
+    outputs: dict[str, OutputMap]
 
 
 def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -> list[str]:
@@ -293,20 +285,6 @@ def move_parameters(
             bias = _biases(bias, output, new, at_bias)
         replace(at_weight, weight)
         replace(at_bias, bias)
-    _check_shapes(moved, new)
-    return moved
-
-
-def _biases(trained: Array, output: OutputMap, new: Mapping[str, torch.Tensor], name: str) -> Array:
-    """N b + d, or the biases of a new network."""
-    return np.where(output.fresh, _array(new, name), output.matrix @ trained + output.offset)
-
-
-def _array(parameters: Mapping[str, torch.Tensor], name: str) -> Array:
-    return parameters[name].detach().cpu().double().numpy()
-
-
-def _check_shapes(moved: Mapping[str, torch.Tensor], new: Mapping[str, torch.Tensor]) -> None:
     differing = [
         name
         for name in dict.fromkeys((*moved, *new))
@@ -317,3 +295,13 @@ def _check_shapes(moved: Mapping[str, torch.Tensor], new: Mapping[str, torch.Ten
             f"The parameters {', '.join(differing)} of this policy cannot be moved: "
             "only the first and the last layer of an MlpPolicy may depend on the body."
         )
+    return moved
+
+
+def _biases(trained: Array, output: OutputMap, new: Mapping[str, torch.Tensor], name: str) -> Array:
+    """N b + d, or the biases of a new network."""
+    return np.where(output.fresh, _array(new, name), output.matrix @ trained + output.offset)
+
+
+def _array(parameters: Mapping[str, torch.Tensor], name: str) -> Array:
+    return parameters[name].detach().cpu().double().numpy()

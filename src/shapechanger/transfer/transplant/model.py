@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 import torch
 from sb3_contrib.tqc import policies as tqc
+from scipy.linalg import block_diag
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import NStepReplayBuffer
 from stable_baselines3.common.distributions import DiagGaussianDistribution
@@ -70,7 +71,15 @@ def _new_model(
         )
     kept["policy_kwargs"] = copy.deepcopy(source.policy_kwargs)
     if _is_squashed(source):
-        _undo_set_up(source, kept)
+        # "auto" settings are resolved again, because they depend on the body.
+        squashed = cast("Any", source)
+        if squashed.target_entropy == -float(squashed.action_space.shape[0]):
+            kept["target_entropy"] = "auto"
+        if squashed.replay_buffer_class is NStepReplayBuffer:
+            kept["replay_buffer_class"] = None
+            buffer = squashed.replay_buffer_kwargs.items()
+            own = {"n_steps", "gamma"}
+            kept["replay_buffer_kwargs"] = {k: v for k, v in buffer if k not in own}
     kept |= {"policy": source.policy_class, "env": env, "seed": seed, "device": device}
     return type(source)(**(kept | changes))
 
@@ -78,18 +87,6 @@ def _new_model(
 def _is_squashed(model: BaseAlgorithm) -> bool:
     """Whether a model has a policy as SAC's, which squashes its actions to the bounds."""
     return isinstance(model.policy, SACPolicy | tqc.TQCPolicy)
-
-
-def _undo_set_up(model: BaseAlgorithm, kept: dict[str, Any]) -> None:
-    """Turn resolved "auto" settings back into "auto", because they depend on the body."""
-    source = cast("Any", model)
-    if source.target_entropy == -float(source.action_space.shape[0]):
-        kept["target_entropy"] = "auto"
-    if source.replay_buffer_class is NStepReplayBuffer:
-        kept["replay_buffer_class"] = None
-        own = {"n_steps", "gamma"}
-        buffer = source.replay_buffer_kwargs
-        kept["replay_buffer_kwargs"] = {k: v for k, v in buffer.items() if k not in own}
 
 
 def check_supported(model: object) -> None:
@@ -185,30 +182,28 @@ def transplant(
     check_size("target observation", target.observation_space, body_map.target_observation)
     source_space = check_size("source action", source.action_space, body_map.source_action)
     target_space = check_size("target action", target.action_space, body_map.target_action)
-    if _is_squashed(source_model):
-        outputs = squashed_outputs(body_map, source_space, target_space)
-    else:
-        outputs = gaussian_outputs(body_map, source_space, target_space)
+    squashed = _is_squashed(source_model)
+    outputs_of = squashed_outputs if squashed else gaussian_outputs
+    outputs = outputs_of(body_map, source_space, target_space)
     model = _new_model(source_model, target_env, seed, device or source_model.device, settings)
     sensed = _sensed(
         body_map,
         normalisation or source_model.get_vec_normalize_env(),
         model.get_vec_normalize_env(),
     )
-    if _is_squashed(source_model):
+    if squashed:
         judged = critic_actions(body_map, outputs, source_space)
-        boundary = _squashed_boundary(
-            cast("SACPolicy", source_model.policy), sensed, outputs, judged
-        )
+        boundary = _squashed_boundary(source.policy, sensed, outputs, judged)
     else:
-        boundary = _gaussian_boundary(
-            cast("ActorCriticPolicy", source_model.policy), sensed, outputs
-        )
+        boundary = _gaussian_boundary(source.policy, sensed, outputs)
     parameters = move_parameters(source_model.policy, model.policy, boundary)
     model.policy.to(dtype=next(source_model.policy.parameters()).dtype)
     model.policy.load_state_dict(parameters)
-    if _is_squashed(source_model):
-        _move_entropy_coefficient(source, model)
+    learned: Any = getattr(model, "log_ent_coef", None)
+    # A constant entropy coefficient is a setting.
+    if learned is not None and source.log_ent_coef is not None:
+        with torch.no_grad():
+            learned.copy_(source.log_ent_coef)
     return model
 
 
@@ -258,13 +253,12 @@ def _gaussian_boundary(
 ) -> BoundaryLayers:
     """Layers of PPO's policy and value network that depend on the body."""
     extractor = policy.mlp_extractor
-    boundary = BoundaryLayers(outputs={"action_net": outputs.mean, "log_std": outputs.log_std})
-    for layer in (
+    layers = (
         *first_linear(extractor.policy_net, "mlp_extractor.policy_net", ["action_net"]),
         *first_linear(extractor.value_net, "mlp_extractor.value_net", ["value_net"]),
-    ):
-        boundary.inputs[layer] = sensed
-    return boundary
+    )
+    heads = {"action_net": outputs.mean, "log_std": outputs.log_std}
+    return BoundaryLayers(dict.fromkeys(layers, sensed), heads)
 
 
 def _squashed_boundary(
@@ -272,27 +266,11 @@ def _squashed_boundary(
 ) -> BoundaryLayers:
     """Layers of the actor and the critics of SAC and TQC that depend on the body."""
     heads = {"actor.mu": outputs.mean, "actor.log_std": outputs.log_std}
-    boundary = BoundaryLayers(outputs=dict(heads))
-    for layer in first_linear(policy.actor.latent_pi, "actor.latent_pi", heads):
-        boundary.inputs[layer] = sensed
-    both = Affine(
-        np.block(
-            [
-                [sensed.matrix, np.zeros((len(sensed.matrix), judged.matrix.shape[1]))],
-                [np.zeros((len(judged.matrix), sensed.matrix.shape[1])), judged.matrix],
-            ]
-        ),
-        np.concatenate([sensed.offset, judged.offset]),
-    )
+    layers = first_linear(policy.actor.latent_pi, "actor.latent_pi", heads)
+    inputs = dict.fromkeys(layers, sensed)
+    matrix: Any = block_diag(sensed.matrix, judged.matrix)
+    both = Affine(matrix, np.concatenate([sensed.offset, judged.offset]))
     for index, network in enumerate(policy.critic.q_networks):
         for name in ("critic", "critic_target"):
-            for layer in first_linear(network, f"{name}.qf{index}"):
-                boundary.inputs[layer] = both
-    return boundary
-
-
-def _move_entropy_coefficient(source: Any, target: Any) -> None:
-    """Copy a learned entropy coefficient; a constant one is a setting."""
-    if source.log_ent_coef is not None and target.log_ent_coef is not None:
-        with torch.no_grad():
-            target.log_ent_coef.copy_(source.log_ent_coef)
+            inputs |= dict.fromkeys(first_linear(network, f"{name}.qf{index}"), both)
+    return BoundaryLayers(inputs, heads)
