@@ -40,14 +40,7 @@ class LastLayer(Method):
 
     def learn(self, run: MethodRun):
         """Train on the target, from the source's weights."""
-        return run.train(
-            run.target,
-            run.steps,
-            start=run.source_policy(),
-            body_map=run.body_map,
-            callback=OnlyLastLayer(),
-            on_evaluation=run.report,
-        )
+        return run.fine_tune(callback=OnlyLastLayer())
 
 
 def main(steps: int = 24_576, seeds: int = 3, out: Path = Path("results/last-layer")) -> None:

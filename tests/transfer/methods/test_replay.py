@@ -26,16 +26,7 @@ from shapechanger.transfer.methods.replay import (
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import SMALL, TINY, tiny_plan
-
-SHORT: dict[str, Any] = {
-    "net_arch": [8],
-    "steps": 96,
-    "eval_every": 32,
-    "eval_episodes": 2,
-    "batch_size": 8,
-    "learning_starts": 16,
-    "buffer_size": 96,
-}
+from tests.transfer.test_learners import SHORT
 
 
 def short(**more: Any) -> OffPolicySettings:

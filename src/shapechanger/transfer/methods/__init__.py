@@ -113,6 +113,23 @@ class MethodRun:
         self._done += steps
         return policy
 
+    def fine_tune(self, *, start: Any = None, body_map: BodyMap | None = None, **more: Any) -> Any:
+        """Train on the target from a policy of the source, whose weights are transplanted.
+
+        Args:
+            start: The policy; None for the source policy of this run's seed.
+            body_map: Map from its body to the target's; None for the study's.
+            **more: As of `train`.
+        """
+        return self.train(
+            self.target,
+            self.steps,
+            start=self.source_policy() if start is None else start,
+            body_map=body_map or self.body_map,
+            on_evaluation=self.report,
+            **more,
+        )
+
     def saved_policy(self) -> Any:
         """Load the policy that an earlier attempt of this run has saved; None without one."""
         return self.learner.load(self.policy_file) if self.policy_file.exists() else None
@@ -148,6 +165,7 @@ class Method:
         trains: Whether it trains a policy, which `learn` returns.
         learns_on_target: Whether it learns on the target, so that it has a learning curve there.
         needs: What the learner must take, with words for learners that do.
+        one_family: Whether source and target must be bodies of one family.
     """
 
     name: ClassVar[str] = ""
@@ -157,9 +175,10 @@ class Method:
     trains: ClassVar[bool] = True
     learns_on_target: ClassVar[bool] = True
     needs: ClassVar[tuple[tuple[Takes, str], ...]] = ()
+    one_family: ClassVar[bool] = False
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse a study that the method cannot be an arm of; here, one without what it `needs`.
+        """Refuse a study that the method cannot be an arm of.
 
         Args:
             source: Traits of the source.
@@ -172,6 +191,8 @@ class Method:
         for takes, words in self.needs:
             if takes not in settings.takes:
                 raise self._lacks(words)
+        if self.one_family and not (source.family and source.family == target.family):
+            raise self._lacks("two bodies of one family, such as two ants")
 
     def _lacks(self, needed: str) -> StudyError:
         """Return the error for a study without what the method needs."""

@@ -39,10 +39,4 @@ class FineTune(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target, starting from the source policy."""
-        return run.train(
-            run.target,
-            run.steps,
-            start=run.source_policy(),
-            body_map=run.body_map,
-            on_evaluation=run.report,
-        )
+        return run.fine_tune()

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import closing
 from typing import Any, Final
 
 import msgspec
 
-from shapechanger.contract.env_ref import EnvRef, EnvTraits, HasBodyFamily, layouts_of
+from shapechanger.contract.env_ref import EnvRef, HasBodyFamily, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.methods import Method, MethodRun
 
@@ -30,12 +28,7 @@ class Evolution(Method):
     name = "evolution"
     needs = (("trial", "a learner of Stable-Baselines3"),)
     paper = "X. Liu, D. Pathak and K. M. Kitani, REvolveR, ICML 2022"
-
-    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Refuse bodies of two families, and learners without what it needs."""
-        super().require(source, target, settings)
-        if not source.family or source.family != target.family:
-            raise self._lacks("two bodies of one family, such as two ants")
+    one_family = True
 
     def learn(self, run: MethodRun) -> Any:
         """Train along the path, and then on the target."""
@@ -49,12 +42,14 @@ class Evolution(Method):
             env, onward = body, _map_between(body, run.target, run)
             evaluation = run.evaluate(policy, onward)
             run.report(msgspec.structs.replace(evaluation, steps=done * stage))
+        before = len(path) * stage
+
+        def later(evaluation: Evaluation) -> None:
+            if evaluation.steps > 0:
+                run.report(msgspec.structs.replace(evaluation, steps=evaluation.steps + before))
+
         return run.train(
-            run.target,
-            run.steps - len(path) * stage,
-            start=policy,
-            body_map=onward,
-            on_evaluation=_later(run.report, len(path) * stage),
+            run.target, run.steps - before, start=policy, body_map=onward, on_evaluation=later
         )
 
 
@@ -68,34 +63,16 @@ def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
             and start.family_name == end.family_name
         ):
             raise StudyError(f"{source} and {target} are not of one family of bodies.")
-        return [
-            target.having(start.arguments_towards(end, k / (count + 1)))
-            for k in range(1, count + 1)
-        ]
+        shares = (k / (count + 1) for k in range(1, count + 1))
+        return [target.having(start.arguments_towards(end, share)) for share in shares]
 
 
 def _map_between(one: EnvRef, other: EnvRef, run: MethodRun) -> BodyMap:
     """The study's map if the layouts change as from source to target, else a map by names."""
     with closing(one.make()) as before, closing(other.make()) as after:
         (seen, acted), (sees, acts) = layouts_of(before), layouts_of(after)
-    planned = run.body_map
     if (seen, acted) == (sees, acts):
         return BodyMap.identity(seen, acted)
-    if (seen, sees, acted, acts) == (
-        planned.source_observation,
-        planned.target_observation,
-        planned.source_action,
-        planned.target_action,
-    ):
-        return planned
+    if (seen, sees, acted, acts) == run.body_map.layouts:
+        return run.body_map
     return BodyMap.between(seen, sees, acted, acts)
-
-
-def _later(report: Callable[[Evaluation], None], steps: int) -> Callable[[Evaluation], None]:
-    """Report evaluations after the first as so many steps later."""
-
-    def report_later(evaluation: Evaluation) -> None:
-        if evaluation.steps > 0:
-            report(msgspec.structs.replace(evaluation, steps=evaluation.steps + steps))
-
-    return report_later

@@ -34,14 +34,7 @@ class FrozenTrunk(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target, starting from the source policy."""
-        return run.train(
-            run.target,
-            run.steps,
-            start=run.source_policy(),
-            body_map=run.body_map,
-            callback=_Freeze(),
-            on_evaluation=run.report,
-        )
+        return run.fine_tune(callback=_Freeze())
 
 
 class _Freeze(BaseCallback):

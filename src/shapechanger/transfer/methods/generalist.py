@@ -6,8 +6,7 @@ from typing import Any, Final
 
 import msgspec
 
-from shapechanger.contract.env_ref import BodyDraw, EnvTraits
-from shapechanger.transfer.learners import LearnerSettings
+from shapechanger.contract.env_ref import BodyDraw
 from shapechanger.transfer.methods import Method, MethodRun
 
 BODIES: Final = 32
@@ -25,21 +24,9 @@ class Generalist(Method):
     needs = (("many bodies", "a policy that fits many bodies: give --learner limbs or rsl-limbs"),)
     paper = "A. Gupta and others, MetaMorph: Learning Universal Controllers, ICLR 2022"
     uses_source_policy = False
-
-    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Require a policy that fits many bodies, and a family to draw them from."""
-        super().require(source, target, settings)
-        if not source.family or source.family != target.family:
-            raise self._lacks("two bodies of one family")
+    one_family = True
 
     def learn(self, run: MethodRun) -> Any:
         """Train on many bodies, then on the target."""
         many = run.source.having({"bodies": msgspec.to_builtins(BodyDraw(count=BODIES))})
-        policy = run.train(many, run.source_steps)
-        return run.train(
-            run.target,
-            run.steps,
-            start=policy,
-            body_map=run.body_map,
-            on_evaluation=run.report,
-        )
+        return run.fine_tune(start=run.train(many, run.source_steps))

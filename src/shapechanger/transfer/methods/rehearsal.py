@@ -21,11 +21,5 @@ class Rehearsal(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Train on both, starting from the source policy."""
-        return run.train(
-            run.target,
-            run.steps,
-            start=run.source_policy(),
-            body_map=run.body_map,
-            rehearsed=(run.source, run.source_steps, run.shared("source")),
-            on_evaluation=run.report,
-        )
+        rehearsed = (run.source, run.source_steps, run.shared("source"))
+        return run.fine_tune(rehearsed=rehearsed)

@@ -132,12 +132,8 @@ def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transi
 
 def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
     """Transitions of the source as the target's, by the names of the two bodies."""
-    onto_target = BodyMap.between(
-        body_map.target_observation,
-        body_map.source_observation,
-        body_map.target_action,
-        body_map.source_action,
-    )
+    observation, sees, action, acts = body_map.layouts
+    onto_target = BodyMap.between(sees, observation, acts, action)
     return seen._replace(
         observations=onto_target.adapt_observation(seen.observations),
         actions=body_map.adapt_action(seen.actions).astype(np.float32),
@@ -178,8 +174,10 @@ class DomainClassifiers(nn.Module):
     def __init__(self, n_observations: int, n_actions: int, learning_rate: float = 3e-4) -> None:
         super().__init__()  # pyright: ignore[reportUnknownMemberType]
         both = n_observations + n_actions
-        self._of_step = _classifier(both + n_observations)
-        self._of_action = _classifier(both)
+        self._of_step, self._of_action = (
+            nn.Sequential(nn.Linear(inputs, _WIDTH), nn.ReLU(), nn.Linear(_WIDTH, 1))
+            for inputs in (both + n_observations, both)
+        )
         self._optimiser = torch.optim.Adam(self.parameters(), lr=learning_rate)
 
     def forward(self, seen: Tensor, acted: Tensor, then: Tensor) -> tuple[Tensor, Tensor]:
@@ -195,13 +193,7 @@ class DomainClassifiers(nn.Module):
         return self._of_step(of_step).squeeze(1), self._of_action(of_action).squeeze(1)
 
     def correction(self, seen: Tensor, acted: Tensor, then: Tensor) -> Tensor:
-        """Estimate log p_target(s' | s, a) - log p_source(s' | s, a), shape (n,).
-
-        Args:
-            seen: Observations, shape (n, k).
-            acted: Actions, shape (n, m).
-            then: Next observations, shape (n, k).
-        """
+        """Estimate log p_target(s' | s, a) - log p_source(s' | s, a), shape (n,); see `forward`."""
         with torch.no_grad():
             of_step, of_action = self(seen, acted, then)
         return (of_step - of_action).clamp(-_LARGEST_CORRECTION, _LARGEST_CORRECTION)
@@ -226,20 +218,14 @@ class DomainClassifiers(nn.Module):
         return loss.item()
 
 
-def _classifier(inputs: int) -> nn.Sequential:
-    return nn.Sequential(nn.Linear(inputs, _WIDTH), nn.ReLU(), nn.Linear(_WIDTH, 1))
-
-
 class _CorrectedReplay(ReplayBuffer):
     """A replay buffer that adds the present correction to the rewards that it returns."""
 
-    classifiers: DomainClassifiers | None = None
+    classifiers: DomainClassifiers
 
     def sample(self, batch_size: int, env: Any = None) -> ReplayBufferSamples:
         """Sample transitions with corrected rewards."""
         batch = super().sample(batch_size, env)
-        if self.classifiers is None:
-            return batch
         extra = self.classifiers.correction(
             batch.observations, batch.actions, batch.next_observations
         )
@@ -284,10 +270,14 @@ class _Correction(BaseCallback):
             self._act()
         if self.n_calls % _CLASSIFY_EVERY == 0 and self._of_target.size() >= _BATCH:
             model = cast("Any", self.model)
-            self._classifiers.fit(
-                _steps_of(ReplayBuffer.sample(model.replay_buffer, _BATCH)),
-                _steps_of(self._of_target.sample(_BATCH)),
+            batches = (
+                ReplayBuffer.sample(model.replay_buffer, _BATCH),
+                self._of_target.sample(_BATCH),
             )
+            source, target = (
+                (batch.observations, batch.actions, batch.next_observations) for batch in batches
+            )
+            self._classifiers.fit(source, target)
         return True
 
     def _on_training_end(self) -> None:
@@ -299,15 +289,9 @@ class _Correction(BaseCallback):
         action, _ = model.predict(self._seen)
         scale = ActionScale.between(model.action_space, self._action)
         then, reward, terminated, truncated, _ = self._env.step(scale.to_env(action))
+        ends = np.array([reward]), np.array([terminated])
         scaled = model.policy.scale_action(action)
-        self._of_target.add(
-            np.asarray(self._seen),
-            np.asarray(then),
-            scaled,
-            np.array([reward]),
-            np.array([terminated]),
-            [{}],
-        )
+        self._of_target.add(np.asarray(self._seen), np.asarray(then), scaled, *ends, [{}])
         self._steps += 1
         self._seen = self._env.reset()[0] if terminated or truncated else then
 
@@ -324,7 +308,3 @@ class _Correction(BaseCallback):
             episodes=run.settings.eval_episodes,
         )
         run.report(msgspec.structs.replace(found, steps=run.steps if last else self._steps))
-
-
-def _steps_of(batch: ReplayBufferSamples) -> tuple[Tensor, ...]:
-    return batch.observations, batch.actions, batch.next_observations

@@ -26,13 +26,7 @@ class ShuffledMap(Method):
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target, starting from the source policy."""
-        return run.train(
-            run.target,
-            run.steps,
-            start=run.source_policy(),
-            body_map=shuffle(run.body_map, np.random.default_rng(run.seed)),
-            on_evaluation=run.report,
-        )
+        return run.fine_tune(body_map=shuffle(run.body_map, np.random.default_rng(run.seed)))
 
 
 def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
