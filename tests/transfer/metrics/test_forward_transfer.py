@@ -57,11 +57,6 @@ def test_forward_transfer_in_total_steps() -> None:
     assert transfer(in_total_steps(ARM, 10, 0.0), SCRATCH).value == pytest.approx(-0.0625)
 
 
-def test_perfect_from_the_start_is_1() -> None:
-    """An arm whose scores are all 1 has a forward transfer of 1."""
-    assert transfer(curves((1.0, 1.0, 1.0)), SCRATCH).value == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize(
     ("height", "is_defined"), [(1.0, False), (0.995, False), (0.98, True), (0.0, True)]
 )
@@ -79,9 +74,3 @@ def test_scores_must_be_clipped(outside: float) -> None:
     for arm, scratch in ((wild, SCRATCH), (ARM, wild), (in_total_steps(ARM, 5, outside), SCRATCH)):
         with pytest.raises(StudyError, match="clip=True"):
             transfer(arm, scratch)
-
-
-def test_zero_shot_has_no_forward_transfer() -> None:
-    estimate = transfer(LearningCurves(np.array([0.0]), np.array([[0.5]])), SCRATCH)
-    assert estimate.value is None
-    assert "one evaluation only" in estimate.note

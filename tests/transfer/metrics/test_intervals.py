@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import msgspec
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -24,8 +23,6 @@ def ratio(
     arm: NDArray[np.float64],
     scratch: NDArray[np.float64],
     *,
-    seed: int = 0,
-    confidence: float = 0.95,
     n_resamples: int = 2000,
 ) -> Estimate:
     """Return `estimate_ratio` with few resamples and a least mean of 0.01."""
@@ -34,17 +31,15 @@ def ratio(
         scratch,
         least=0.01,
         too_small="Undefined: too small.",
-        rng=np.random.default_rng(seed),
-        confidence=confidence,
+        rng=np.random.default_rng(0),
         n_resamples=n_resamples,
     )
 
 
-@pytest.mark.parametrize("confidence", [0.8, 0.95, 0.99])
-def test_welch_agrees_with_scipy(confidence: float) -> None:
+def test_welch_agrees_with_scipy() -> None:
     """Ours equals scipy's interval; scipy's test also warns about samples without spread."""
-    ours = estimate_difference(ARM, SCRATCH, confidence=confidence)
-    theirs = stats.ttest_ind(ARM, SCRATCH, equal_var=False).confidence_interval(confidence)
+    ours = estimate_difference(ARM, SCRATCH)
+    theirs = stats.ttest_ind(ARM, SCRATCH, equal_var=False).confidence_interval(0.95)
     assert ours.method == "Welch's t"
     np.testing.assert_allclose([ours.value], [ARM.mean() - SCRATCH.mean()])
     np.testing.assert_allclose([ours.low, ours.high], [theirs.low, theirs.high], rtol=1e-12)
@@ -66,8 +61,7 @@ def test_welch_takes_one_arm_without_spread() -> None:
 
 
 @pytest.mark.parametrize("scratch", [SCRATCH, SCRATCH[:3]], ids=["5 and 4 seeds", "3 and 3"])
-@pytest.mark.parametrize("confidence", [0.8, 0.95])
-def test_studentised_bootstrap_by_the_book(confidence: float, scratch: NDArray[np.float64]) -> None:
+def test_studentised_bootstrap_by_the_book(scratch: NDArray[np.float64]) -> None:
     """Efron & Tibshirani's algorithm, one resample after the other.
 
     Of three seeds in each arm one resample in 81 has no error: far out in both tails.
@@ -92,11 +86,11 @@ def test_studentised_bootstrap_by_the_book(confidence: float, scratch: NDArray[n
             silent += 1
         else:
             ts.append((a.mean() / b.mean() - value) / error(a, b))
-    outside = (1.0 - confidence) / 2.0
+    outside = 0.025
     high = np.sort([*ts, *[np.inf] * silent])[int(np.ceil((1.0 - outside) * 1999))]
     low = np.sort([*ts, *[-np.inf] * silent])[int(outside * 1999)]
 
-    ours = ratio(arm, scratch, confidence=confidence)
+    ours = ratio(arm, scratch)
     assert ours.method == "studentised bootstrap"
     assert ours.value == pytest.approx(value)
     np.testing.assert_allclose(
@@ -115,11 +109,6 @@ def test_many_seeds_make_the_ratio_normal() -> None:
     np.testing.assert_allclose(
         [estimate.low, estimate.high], [estimate.value - half, estimate.value + half], atol=0.006
     )
-
-
-def test_same_generator_same_interval() -> None:
-    assert ratio(ARM, SCRATCH, seed=3) == ratio(ARM, SCRATCH, seed=3)
-    assert ratio(ARM, SCRATCH, seed=3) != ratio(ARM, SCRATCH, seed=4)
 
 
 @pytest.mark.parametrize(
@@ -142,6 +131,12 @@ def test_unreliable_intervals_are_omitted(
         assert estimate.value is not None
         assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
         assert why in estimate.note
+
+
+def test_each_tail_needs_a_resample() -> None:
+    assert ratio(ARM, SCRATCH, n_resamples=40).value is not None
+    with pytest.raises(StudyError, match="at least 40 resamples, got 39"):
+        ratio(ARM, SCRATCH, n_resamples=39)
 
 
 def test_ratio_over_too_little_is_undefined() -> None:
@@ -175,24 +170,3 @@ def test_unusable_resamples_are_not_dropped(
     assert estimate.value == pytest.approx(arm.mean() / scratch.mean())
     assert (estimate.low, estimate.high, estimate.method) == (None, None, "none")
     assert "resamples" in estimate.note
-
-
-@pytest.mark.parametrize("confidence", [0.0, 1.0, 95.0, np.nan])
-def test_confidence_is_a_share(confidence: float) -> None:
-    with pytest.raises(StudyError, match=r"such as 0\.95"):
-        estimate_difference(ARM, SCRATCH, confidence=confidence)
-    with pytest.raises(StudyError, match=r"such as 0\.95"):
-        ratio(ARM, SCRATCH, confidence=confidence)
-
-
-@pytest.mark.parametrize(("confidence", "fewest"), [(0.9, 20), (0.95, 40), (0.99, 200)])
-def test_each_tail_needs_a_resample(confidence: float, fewest: int) -> None:
-    assert ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest).value is not None
-    with pytest.raises(StudyError, match=f"at least {fewest} resamples, got {fewest - 1}"):
-        ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest - 1)
-
-
-def test_estimates_survive_json() -> None:
-    for estimate in (undefined("Undefined: because."), estimate_difference(ARM, SCRATCH)):
-        assert msgspec.json.decode(msgspec.json.encode(estimate), type=Estimate) == estimate
-    assert b'"value":null' in msgspec.json.encode(undefined("Undefined: because."))

@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
-from shapechanger.errors import ShapechangerError, StudyError
+from shapechanger.errors import StudyError
 from shapechanger.transfer.metrics import LearningCurves, in_total_steps
 from shapechanger.transfer.metrics.curves import check_comparable
 
@@ -52,13 +52,6 @@ def test_floor_must_be_finite(floor: float) -> None:
         in_total_steps(RISING, 10, floor)
 
 
-def test_errors_are_also_value_errors() -> None:
-    with pytest.raises(ShapechangerError):
-        LearningCurves(np.array([1.0]), np.array([[1.0]]))
-    with pytest.raises(ValueError, match="start at 0"):
-        LearningCurves(np.array([1.0]), np.array([[1.0]]))
-
-
 def test_curves_are_copies() -> None:
     """Later changes of the given arrays have no effect."""
     steps, returns = np.array([0.0, 1.0]), np.array([[1.0, 2.0]])
@@ -87,17 +80,6 @@ def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
     with pytest.raises(AttributeError):
         copied.floor = 1.0  # type: ignore[misc]
     np.testing.assert_array_equal(copied.returns, RISING.returns)
-
-
-def test_last_steps() -> None:
-    np.testing.assert_array_equal(RISING.last_steps(2), [50.0, 100.0])
-
-
-@pytest.mark.parametrize("last_k", [-1, 0, 4])
-def test_last_steps_must_exist(last_k: int) -> None:
-    """The message states how many evaluations there are."""
-    with pytest.raises(StudyError, match="from 1 to 3"):
-        RISING.last_steps(last_k)
 
 
 def test_curves_are_straight_between_evaluations_and_hold_their_end() -> None:
@@ -151,13 +133,6 @@ def test_area_in_total_steps_is_exact(source_steps: int, rising: float, falling:
 def test_source_steps_count_once() -> None:
     with pytest.raises(StudyError, match="already count 30"):
         in_total_steps(in_total_steps(RISING, 30, 0.0), 30, 0.0)
-
-
-def test_comparison_needs_the_same_evaluations() -> None:
-    other = LearningCurves(np.array([0.0, 50.0, 99.0]), np.zeros((1, 3)))
-    with pytest.raises(StudyError, match="the steps must be the same"):
-        check_comparable(other, RISING)
-    check_comparable(LearningCurves(np.array([0.0]), np.zeros((1, 1))), RISING)
 
 
 def test_scratch_has_no_source() -> None:

@@ -59,6 +59,12 @@ def test_asymptotic_gain(last_k: int, gain: float) -> None:
     assert asymptotic_gain(ARM, SCRATCH, last_k=last_k).value == pytest.approx(gain)
 
 
+@pytest.mark.parametrize("last_k", [-1, 0, 5])
+def test_the_last_evaluations_must_exist(last_k: int) -> None:
+    with pytest.raises(StudyError, match="from 1 to 4"):
+        asymptotic_gain(ARM, SCRATCH, last_k=last_k)
+
+
 @pytest.mark.parametrize(
     ("source_steps", "gain"),
     [
@@ -117,12 +123,6 @@ def test_zero_shot_of_one_seed_keeps_both_reasons() -> None:
     note = asymptotic_gain(one, SCRATCH, last_k=1).note
     assert "not trained" in note
     assert "at least two seeds" in note
-
-
-def test_zero_shot_has_no_curve() -> None:
-    for estimate in (total_reward_gain(ZERO_SHOT, SCRATCH), ratio(ZERO_SHOT, SCRATCH)):
-        assert estimate.value is None
-        assert "one evaluation only" in estimate.note
 
 
 @pytest.mark.parametrize(

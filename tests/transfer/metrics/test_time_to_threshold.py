@@ -63,12 +63,6 @@ def test_no_seed_reaches_the_threshold() -> None:
     assert "all seeds" in times.steps_saved.note
 
 
-def test_zero_shot_has_no_times() -> None:
-    times = time_to_threshold(LearningCurves(np.array([0.0]), np.array([[0.9]])), SCRATCH, 0.5)
-    assert (times.arm, times.scratch, times.steps_saved.value) == (None, None, None)
-    assert "one evaluation only" in times.steps_saved.note
-
-
 @pytest.mark.parametrize("threshold", [math.nan, math.inf])
 def test_threshold_is_a_number(threshold: float) -> None:
     with pytest.raises(StudyError, match="finite"):

@@ -13,6 +13,8 @@ from shapechanger.transfer.metrics.intervals import (
     Estimate,
     estimate_difference,
     estimate_ratio,
+    interquartile_mean,
+    probability_of_improvement,
     undefined,
 )
 from shapechanger.transfer.metrics.measures import (
@@ -31,7 +33,6 @@ from shapechanger.transfer.metrics.measures import (
     time_to_threshold,
     total_reward_gain,
 )
-from shapechanger.transfer.metrics.pooled import interquartile_mean, probability_of_improvement
 
 __all__ = [
     "DEFAULT_THRESHOLDS",

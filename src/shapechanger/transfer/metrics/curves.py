@@ -98,16 +98,6 @@ class LearningCurves:
         learning = np.atleast_1d(np.asarray(steps, dtype=np.float64)) - self.source_steps
         return np.where(learning < 0.0, self.floor, self._after_training(learning))
 
-    def last_steps(self, last_k: int) -> NDArray[np.float64]:
-        """The steps of the last `last_k` evaluations, shape (last_k,).
-
-        Raises:
-            StudyError: If there are not that many, or `last_k` is below one.
-        """
-        if not 1 <= last_k <= self.n_evals:
-            raise StudyError(f"last_k must be from 1 to {self.n_evals} evaluations, got {last_k}.")
-        return self.steps[-last_k:]
-
     def auc(self) -> NDArray[np.float64]:
         """Area under each curve from 0 to H, divided by H, shape (n_seeds,).
 

@@ -73,7 +73,9 @@ def asymptotic_gain(arm: LearningCurves, scratch: LearningCurves, *, last_k: int
         StudyError: If the curves cannot be compared or have fewer than k evaluations.
     """
     check_comparable(arm, scratch)
-    steps = scratch.last_steps(last_k)
+    if not 1 <= last_k <= scratch.n_evals:
+        raise StudyError(f"last_k must be from 1 to {scratch.n_evals} evaluations, got {last_k}.")
+    steps = scratch.steps[-last_k:]
     gain = estimate_difference(arm.at(steps).mean(axis=1), scratch.at(steps).mean(axis=1))
     if arm.n_evals > 1:
         return gain
@@ -181,19 +183,12 @@ def forward_transfer(
         rng=rng,
         n_resamples=n_resamples,
     )
-    return Estimate(
-        _rest(left.value),
-        _rest(left.high),
-        # A headroom is never negative, but the interval can be.
-        None if left.low is None else _rest(max(left.low, 0.0)),
-        left.method,
-        left.note,
+    # A headroom is never negative, but the interval can be.
+    least = None if left.low is None else max(left.low, 0.0)
+    value, low, high = (
+        None if share is None else 1.0 - share for share in (left.value, left.high, least)
     )
-
-
-def _rest(share: float | None) -> float | None:
-    """One minus a share, or None."""
-    return None if share is None else 1.0 - share
+    return Estimate(value, low, high, left.method, left.note)
 
 
 class ReachTimes(msgspec.Struct, frozen=True):
@@ -392,8 +387,29 @@ def summarise(
     check_comparable(arm, scratch)
     draws = int(rng.integers(2**63))
 
-    def measure(counted: LearningCurves) -> Measures:
-        return _measure(counted, scratch, reference, last_k, draws, n_resamples)
+    def measure(arm: LearningCurves) -> Measures:
+        """Compute all measures in one way of counting."""
+        baseline, ratio, transfer = scratch, undefined(_NO_SCORES), undefined(_NO_SCORES)
+        times = tuple(TimeToThreshold(height, None, None, ratio) for height in DEFAULT_THRESHOLDS)
+        if reference.defined:
+            transfer = forward_transfer(
+                reference.scores(arm, clip=True),
+                reference.scores(baseline, clip=True),
+                rng=np.random.default_rng(draws),
+                n_resamples=n_resamples,
+            )
+            arm, baseline = reference.scores(arm), reference.scores(baseline)
+            again = np.random.default_rng(draws)
+            ratio = auc_ratio(arm, baseline, rng=again, n_resamples=n_resamples)
+            times = tuple(time_to_threshold(arm, baseline, at) for at in DEFAULT_THRESHOLDS)
+        return Measures(
+            jumpstart=jumpstart(arm, baseline),
+            asymptotic_gain=asymptotic_gain(arm, baseline, last_k=last_k),
+            total_reward_gain=total_reward_gain(arm, baseline),
+            auc_ratio=ratio,
+            forward_transfer=transfer,
+            times_to_threshold=times,
+        )
 
     return Summary(
         unit="score" if reference.defined else "value",
@@ -406,35 +422,4 @@ def summarise(
         confidence=CONFIDENCE,
         in_target_steps=measure(arm),
         in_total_steps=measure(in_total_steps(arm, source_steps, floor=reference.zero)),
-    )
-
-
-def _measure(
-    arm: LearningCurves,
-    scratch: LearningCurves,
-    reference: Reference,
-    last_k: int,
-    draws: int,
-    n_resamples: int,
-) -> Measures:
-    """Compute all measures in one way of counting; the curves are in units of return."""
-    ratio, transfer = undefined(_NO_SCORES), undefined(_NO_SCORES)
-    times = tuple(TimeToThreshold(height, None, None, ratio) for height in DEFAULT_THRESHOLDS)
-    if reference.defined:
-        transfer = forward_transfer(
-            reference.scores(arm, clip=True),
-            reference.scores(scratch, clip=True),
-            rng=np.random.default_rng(draws),
-            n_resamples=n_resamples,
-        )
-        arm, scratch = reference.scores(arm), reference.scores(scratch)
-        ratio = auc_ratio(arm, scratch, rng=np.random.default_rng(draws), n_resamples=n_resamples)
-        times = tuple(time_to_threshold(arm, scratch, height) for height in DEFAULT_THRESHOLDS)
-    return Measures(
-        jumpstart=jumpstart(arm, scratch),
-        asymptotic_gain=asymptotic_gain(arm, scratch, last_k=last_k),
-        total_reward_gain=total_reward_gain(arm, scratch),
-        auc_ratio=ratio,
-        forward_transfer=transfer,
-        times_to_threshold=times,
     )
