@@ -153,12 +153,6 @@ def test_matching_bodies_have_no_list() -> None:
     assert "does not see" not in read.words
 
 
-def test_one_action_is_singular() -> None:
-    pictures = (np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2, 3), np.uint8))
-    read = Reader(study_html(make_study(the_map=same_body()), pictures))
-    assert "Target: BigAnt-v1, 1 observation, 1 action" in read.words
-
-
 def test_reward_terms_have_a_table(page: str) -> None:
     """The table has a column per kind of run, and is left out without terms."""
     assert "forward 469.4 5 2.500 440.3 200 502.3" in Reader(page).words

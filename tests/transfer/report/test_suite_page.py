@@ -122,6 +122,8 @@ def test_strips_are_embedded_and_films_linked(pairs: Mapping[str, Study], page: 
 def test_names_are_escaped() -> None:
     page = suite_html(EVIL, {EVIL: make_study(command=EVIL)}, seeds=5)
     assert "<script" not in page
+    with pytest.raises(StudyError, match="suite none has no finished study"):
+        suite_html("none", {}, seeds=5)
 
 
 def test_arms_of_some_studies_are_listed(pairs: Mapping[str, Study]) -> None:
@@ -140,12 +142,6 @@ def test_without_learning_there_are_no_scores() -> None:
     }
     words = Reader(suite_html("flat", studies, seeds=5)).words
     assert "1 show nothing" in words
-
-
-def test_a_page_needs_a_study() -> None:
-    """A suite of which nothing is finished is refused in a sentence."""
-    with pytest.raises(StudyError, match="suite none has no finished study"):
-        suite_html("none", {}, seeds=5)
 
 
 def test_missing_pairs_are_marked(pairs: Mapping[str, Study]) -> None:

@@ -15,13 +15,11 @@ from shapechanger.errors import RenderError
 from shapechanger.files import write_atomic
 from shapechanger.reports.numbers import UNDEFINED, count, number
 from shapechanger.reports.page import render
-from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
+from shapechanger.transfer.body_map import BodyMap, Copy
 from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.learners.presets import tuning_text
-from shapechanger.transfer.metrics import Summary
 from shapechanger.transfer.report.verdict import (
     ASYMPTOTIC_GAIN,
-    EXPLANATIONS,
     GOOD,
     JUMPSTART,
     TIME_TO_THRESHOLD,
@@ -38,6 +36,8 @@ Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
 _HEADLINE: Final = (TOTAL_REWARD_GAIN, JUMPSTART, ASYMPTOTIC_GAIN)
 _MAX_ARGUMENT_LENGTH: Final = 40
+# Names of kinds of runs that are no arms.
+_ARMS: Final = {"random": "random actions", "source": "source policy, in the source"}
 
 
 def study_html(
@@ -52,6 +52,7 @@ def study_html(
     plan = study.plan
     found = findings(study) if found is None else found
     measures, arms = found.measures, found.arms
+    summary = next(iter(study.summaries.values()))
     notes = list(dict.fromkeys(row.note for row in measures if _defined(row) and row.note))
     return render(
         Path(__file__).with_name("study.html"),
@@ -67,11 +68,21 @@ def study_html(
         curves=learning_curves(study, "target", "total"),
         measures=[_measure_table(arm, measures, notes) for arm in study.summaries],
         notes=notes,
-        explanations=EXPLANATIONS,
-        scale=_scale(next(iter(study.summaries.values()))),
+        summary=summary,
+        reference=summary.reference,
+        number=number,
         caveats=found.caveats,
         good=f"{100.0 * GOOD:.0f} %",
-        arms=[_arm_cells(row) for row in arms],
+        arms=[
+            (
+                _ARMS.get(row.kind, row.kind),
+                *row[1:6],
+                row.success or "not reported",
+                row.good or "not measured",
+                row.per_seed,
+            )
+            for row in arms
+        ],
         terms=_terms(arms),
         shift=study.shift,
         map=_body_map(plan.body_map),
@@ -85,14 +96,8 @@ def study_html(
         machine=found.machine,
         wall_time=_duration(sum(result.wall_s for result in study.runs)),
         runs=[
-            (
-                result.run.name,
-                result.seed,
-                count(result.curve[-1].steps),
-                len(result.curve),
-                _duration(result.wall_s),
-            )
-            for result in study.runs
+            (r.run.name, r.seed, count(r.curve[-1].steps), len(r.curve), _duration(r.wall_s))
+            for r in study.runs
         ],
     )
 
@@ -121,10 +126,12 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 
 def _short_name(env: EnvRef) -> str:
     """The env's name without its namespace, and its arguments, truncated if they are long."""
-    arguments = ", ".join(
-        _truncate(argument_text(value) if name == "body" else f"{name}={value}")
-        for name, value in env.kwargs.items()
-    )
+    shown: list[str] = []
+    for name, value in env.kwargs.items():
+        words = argument_text(value) if name == "body" else f"{name}={value}"
+        cut = f"{words[: _MAX_ARGUMENT_LENGTH - 1].rstrip()}…"
+        shown.append(words if len(words) <= _MAX_ARGUMENT_LENGTH else cut)
+    arguments = ", ".join(shown)
     name = env.id.rpartition("/")[2]
     return f"{name} ({arguments})" if arguments else name
 
@@ -139,11 +146,6 @@ def argument_text(value: object) -> str:
         " ".join(f"x{part}" if name == "factor" else str(part) for name, part in edit.items())
         for edit in edits
     )
-
-
-def _truncate(words: str) -> str:
-    cut = words[: _MAX_ARGUMENT_LENGTH - 1].rstrip()
-    return words if len(words) <= _MAX_ARGUMENT_LENGTH else f"{cut}…"
 
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
@@ -214,42 +216,6 @@ def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
     }
 
 
-def _scale(summary: Summary) -> str:
-    """Describe the score, or why it is missing."""
-    reference = summary.reference
-    zero, one = number(reference.zero), number(reference.one)
-    why = "which ships with its policy" if reference.shipped else "the best arm"
-    if summary.unit == "value":
-        return (
-            f"There are no scores: {reference.one_of} ended at {one}, which is not above "
-            f"{zero}, which takes no skill ({reference.zero_of}). Gains are in units of the "
-            "measure."
-        )
-    return (
-        "Values are normalised to scores by (value - zero) / (one - zero), both of the target: "
-        f"zero = {zero} is the most that takes no skill, here {reference.zero_of}, of random "
-        "actions, the action zero and untrained policies; one = "
-        f"{one} is the mean of the last {summary.last_k} evaluations of {reference.one_of}, "
-        f"{why}. The intervals take these two numbers as given. A gain in values "
-        f"is one in scores times {number(reference.one - reference.zero)}."
-    )
-
-
-def _arm_cells(row: ArmRow) -> tuple[Any, ...]:
-    names = {"random": "random actions", "source": "source policy, in the source"}
-    return (
-        names.get(row.kind, row.kind),
-        row.seeds,
-        row.first,
-        row.final,
-        row.final_return,
-        row.length,
-        row.success or "not reported",
-        row.good or "not measured",
-        row.per_seed,
-    )
-
-
 def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
     """The reward terms of each kind of run; no rows if no env reports any."""
     kinds = {"random": "random actions", "source": "source policy"}
@@ -274,9 +240,13 @@ def _body_map(ours: BodyMap) -> dict[str, Any]:
     for row in rows:
         if row.why != SAME_NAME:
             groups.setdefault((row.side, row.rule, row.why), []).append(row.entry)
+    observations, actions = (
+        " of ".join(str(sum(row.side == side for row in some)) for some in (matched, rows))
+        for side in ("observation", "action")
+    )
     return {
-        "matched_observations": _share(matched, rows, "observation"),
-        "matched_actions": _share(matched, rows, "action"),
+        "matched_observations": observations,
+        "matched_actions": actions,
         "others": [
             (f"{side}: {', '.join(entries)}", rule, why)
             for (side, rule, why), entries in groups.items()
@@ -286,27 +256,21 @@ def _body_map(ours: BodyMap) -> dict[str, Any]:
     }
 
 
-def _share(matched: list[MapRow], rows: tuple[MapRow, ...], side: str) -> str:
-    """Format as in `11 of 13`."""
-    ours, every = (sum(row.side == side for row in some) for some in (matched, rows))
-    return f"{ours} of {every}"
-
-
 def _unused(ours: BodyMap) -> list[str]:
     """Sentences on the target observations and source actions that no rule copies."""
-    sentences: list[str] = []
-    for what, entries, names in (
+    sides = (
         (
             "Target observations that the source policy does not see",
             ours.observation,
-            ours.target_observation.names,
+            ours.target_observation,
         ),
-        ("Source actions that move nothing in the target", ours.action, ours.source_action.names),
-    ):
+        ("Source actions that move nothing in the target", ours.action, ours.source_action),
+    )
+    sentences: list[str] = []
+    for title, entries, layout in sides:
         copied = {entry.rule.feature for entry in entries if isinstance(entry.rule, Copy)}
-        left = [name for name in names if name not in copied]
-        if left:
-            sentences.append(f"{what}: {', '.join(left)}.")
+        if left := [name for name in layout.names if name not in copied]:
+            sentences.append(f"{title}: {', '.join(left)}.")
     return sentences
 
 

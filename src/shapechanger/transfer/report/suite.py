@@ -71,10 +71,9 @@ def suite_html(
 
     first = next(iter(studies.values()))
     arm, plan = first.headline_arm, first.plan
-    swept = None
-    if sweep is not None:
-        by_value = {sweep.values[one]: study for one, study in studies.items()}
-        swept = sweep_chart(by_value, sweep.name)
+    swept = sweep and sweep_chart(
+        {sweep.values[one]: study for one, study in studies.items()}, sweep.name
+    )
     return render(
         Path(__file__).with_name("suite.html"),
         title=name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -18,13 +19,7 @@ from shapechanger.reports.numbers import (
     spread_text,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.metrics import (
-    Estimate,
-    Measures,
-    ReachTimes,
-    Summary,
-    TimeToThreshold,
-)
+from shapechanger.transfer.metrics import Estimate, ReachTimes, Summary, TimeToThreshold
 from shapechanger.transfer.plan import NO_SKILL, SOURCE
 from shapechanger.transfer.runs import RunResult
 from shapechanger.transfer.study import Study
@@ -36,26 +31,13 @@ AUC_RATIO: Final = "Area ratio"
 FORWARD_TRANSFER: Final = "Forward transfer"
 TIME_TO_THRESHOLD: Final = "Time to threshold"
 
-PURE_NUMBER: Final = "pure number"
-
-_TAYLOR_STONE: Final = "Taylor & Stone, JMLR 10, 2009"
-
-EXPLANATIONS: Final[dict[str, str]] = {
-    JUMPSTART: "The arm minus scratch at the first evaluation on the target; in "
-    "total steps, minus scratch after as many steps as the source used. Above 0: transfer "
-    f"helped. ({_TAYLOR_STONE})",
-    TOTAL_REWARD_GAIN: "Height of the arm's learning curve above scratch's, averaged over "
-    f"the whole budget. Above 0: transfer helped. ({_TAYLOR_STONE}, divided by the budget)",
-    ASYMPTOTIC_GAIN: "The arm minus scratch at the end of the budget. Above 0: "
-    f"transfer helped. ({_TAYLOR_STONE})",
-    AUC_RATIO: "Area under the arm's learning curve over scratch's, both in scores. Above 1: "
-    f"transfer helped. ({_TAYLOR_STONE}, as the transfer ratio)",
-    FORWARD_TRANSFER: "The share of the area between scratch's curve and the score 1 that the arm "
-    "wins, with scores cut off at 0 and 1. At most 1; above 0: transfer helped. (Wołczyk et al., "
-    "Continual World, NeurIPS 2021)",
-    TIME_TO_THRESHOLD: "How many steps sooner than scratch the arm reaches a score for the first "
-    "time. Runs that never reach it count with the whole budget; none are dropped. Above 0: "
-    f"transfer helped. ({_TAYLOR_STONE}; Royston & Parmar, BMC Med. Res. Methodol. 13, 2013)",
+# Measures that are not times, with their fields of `Measures`.
+_FIELDS: Final = {
+    JUMPSTART: "jumpstart",
+    TOTAL_REWARD_GAIN: "total_reward_gain",
+    ASYMPTOTIC_GAIN: "asymptotic_gain",
+    AUC_RATIO: "auc_ratio",
+    FORWARD_TRANSFER: "forward_transfer",
 }
 
 
@@ -102,49 +84,24 @@ def findings(study: Study) -> Findings:
 
 
 def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
-    """Format every measure of every arm other than scratch."""
+    """Format every measure of every arm other than scratch, gains first."""
     rows: list[MeasureRow] = []
     for arm in study.plan.arms:
-        if arm != "scratch":
-            rows += _rows_of(arm, study.summaries[arm])
+        if arm == "scratch":
+            continue
+        summary = study.summaries[arm]
+        ours, total = summary.in_target_steps, summary.in_total_steps
+        for name, field in _FIELDS.items():
+            pure = name in (AUC_RATIO, FORWARD_TRANSFER)
+            unit = "pure number" if pure else summary.unit
+            both: tuple[Estimate, Estimate] = getattr(ours, field), getattr(total, field)
+            rows.append(_measure_row(arm, name, unit, *both, signed=name != AUC_RATIO))
+        for here, there in zip(ours.times_to_threshold, total.times_to_threshold, strict=True):
+            name = f"{TIME_TO_THRESHOLD} {here.threshold:g}: steps saved"
+            row = _measure_row(arm, name, "steps", here.steps_saved, there.steps_saved, signed=True)
+            reached = _reached(arm, summary, here, there)
+            rows.append(row._replace(note=" ".join(filter(None, (reached, row.note)))))
     return tuple(rows)
-
-
-def _rows_of(arm: str, summary: Summary) -> list[MeasureRow]:
-    """Rows of one arm, gains first."""
-    ours, total = _named(summary.in_target_steps), _named(summary.in_total_steps)
-    rows: list[MeasureRow] = []
-    for name, estimate in ours.items():
-        unit = PURE_NUMBER if name in (AUC_RATIO, FORWARD_TRANSFER) else summary.unit
-        rows.append(_measure_row(arm, name, unit, estimate, total[name], signed=name != AUC_RATIO))
-    times = zip(
-        summary.in_target_steps.times_to_threshold,
-        summary.in_total_steps.times_to_threshold,
-        strict=True,
-    )
-    for in_target, in_total in times:
-        row = _measure_row(
-            arm,
-            f"{TIME_TO_THRESHOLD} {in_target.threshold:g}: steps saved",
-            "steps",
-            in_target.steps_saved,
-            in_total.steps_saved,
-            signed=True,
-        )
-        reached = _reached(arm, summary, in_target, in_total)
-        rows.append(row._replace(note=" ".join(filter(None, (reached, row.note)))))
-    return rows
-
-
-def _named(measures: Measures) -> dict[str, Estimate]:
-    """The measures that are not times, keyed by name."""
-    return {
-        JUMPSTART: measures.jumpstart,
-        TOTAL_REWARD_GAIN: measures.total_reward_gain,
-        ASYMPTOTIC_GAIN: measures.asymptotic_gain,
-        AUC_RATIO: measures.auc_ratio,
-        FORWARD_TRANSFER: measures.forward_transfer,
-    }
 
 
 def _measure_row(
@@ -243,10 +200,8 @@ def weak_individuals(study: Study) -> list[str]:
     does not report success.
     """
     sentences: list[str] = []
-    if not study.plan.individual:
-        return sentences
     noun = study.plan.individual.removesuffix("_seed")
-    for arm in study.plan.arms:
+    for arm in study.plan.arms if noun else ():
         shares = successes(study, arm)
         indices = [result.run.index for result in study.of(arm)]
         # Not strict, as `shares` is empty where the env does not report success.
@@ -355,11 +310,7 @@ def verdict(study: Study) -> str:
     tenth of its end, the sentence says that the study shows nothing.
     """
     arm, plan = study.headline_arm, study.plan
-    scratch = study.curves("scratch")
-
-    def text(values: NDArray[np.float64]) -> str:
-        return _mean_text(values, plan.unit)
-
+    scratch, text = study.curves("scratch"), partial(_mean_text, unit=plan.unit)
     if is_flat(study):
         return (
             f"This budget or measure shows nothing: scratch's {plan.measure} starts at "
@@ -420,14 +371,6 @@ def is_flat(study: Study) -> bool:
     return max(end, best) - start <= _FLAT * max(abs(end), abs(best))
 
 
-def source_takes_all(summary: Summary) -> bool:
-    """Return whether the source used up the budget of total steps.
-
-    Every measure in total steps but the jumpstart then compares no skill with scratch.
-    """
-    return summary.source_steps >= summary.horizon
-
-
 def devices_of(study: Study) -> dict[str, list[str]]:
     """Return the kinds of runs that learned on each device; runs of old studies name none."""
     devices: dict[str, list[str]] = {}
@@ -454,7 +397,8 @@ def caveats(study: Study) -> tuple[str, ...]:
     summary = next(iter(study.summaries.values()))
     source, budget = count(summary.source_steps), count(summary.horizon)
     sentences: list[str] = []
-    if source_takes_all(summary):
+    # Every measure in total steps but the jumpstart then compares no skill with scratch.
+    if summary.source_steps >= summary.horizon:
         sentences.append(
             f"The source used {source} steps and the budget is {budget}, so in total steps "
             "nothing is left for the target: only the jumpstart is meaningful there, and the "
