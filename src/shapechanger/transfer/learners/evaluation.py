@@ -107,6 +107,7 @@ def evaluate(
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
         played += _play(act, envs, seed + first)
+    stood = [episode.stood for episode in played if episode.stood is not None]
     reached = [episode.success for episode in played if episode.success is not None]
     return Evaluation(
         steps,
@@ -115,14 +116,8 @@ def evaluate(
         _means([episode.terms for episode in played]),
         float(np.mean(reached)) if reached else None,
         _means([episode.measures for episode in played]),
-        _standing(played),
+        sum(stood) / sum(episode.length for episode in played) if stood else None,
     )
-
-
-def _standing(played: Sequence[_Episode]) -> float | None:
-    """Return the share of all steps at which a vehicle stood; None if no episode reports it."""
-    stood = [episode.stood for episode in played if episode.stood is not None]
-    return sum(stood) / sum(episode.length for episode in played) if stood else None
 
 
 def _means(episodes: Sequence[dict[str, float]]) -> dict[str, float]:

@@ -12,7 +12,6 @@ are the same as for other learners.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import version
 from typing import Any, Final, cast
 
 import numpy as np
@@ -30,21 +29,18 @@ from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
 )
-from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy, actor
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
 from shapechanger.transfer.learners.sb3 import Sb3Learner, statistics_of
 
 try:
     import torch
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-    from torch import Tensor
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
-try:
     from rsl_rl.algorithms import PPO
     from rsl_rl.env import VecEnv
     from rsl_rl.models import MLPModel
     from rsl_rl.storage import RolloutStorage
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
     from tensordict import TensorDict
+    from torch import Tensor
 except ImportError as error:
     raise MissingExtra("rsl-rl-lib", "gpu") from error
 
@@ -204,18 +200,7 @@ class RslLearner(Sb3Learner):
             training.write_back()
             evaluated(done)
             model.num_timesteps = done
-            card = PolicyCard(
-                env,
-                *layouts,
-                self.name,
-                settings,
-                done,
-                seed,
-                version("shapechanger"),
-                identity,
-                start_log_std=explores,
-            )
-            return TrainedPolicy(model, statistics_of(envs), card)
+            return self._trained(model, envs, env, layouts, settings, seed, identity, explores)
         finally:
             worlds.close()
             for one in eval_envs:

@@ -18,6 +18,7 @@ from shapechanger.contract.env_ref import (
     layouts_of,
 )
 from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError
+from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.policy import kind_of
 from shapechanger.transfer.actions import require_ranges
@@ -53,6 +54,8 @@ except ImportError as error:
 
 OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
+# Evaluates a model with the statistics of its envs, after so many steps.
+_Evaluate = Callable[[BaseAlgorithm, VecEnv, int], Evaluation]
 
 START_LOG_STD: Final = -1.0
 """Smallest logarithm of the standard deviation of an action, in half its range, at the start of
@@ -103,6 +106,13 @@ class Sb3Learner(Learner[Sb3Settings]):
         else:
             together = self._training_envs(env)
         layouts = layouts_of(eval_envs[0])
+        episodes = settings.eval_episodes
+        first_seed = evaluation_seed(env, episodes)
+
+        def evaluate_model(model: BaseAlgorithm, envs: VecEnv, steps: int) -> Evaluation:
+            act = actor(model, statistics_of(envs), layouts[1])
+            return evaluate(act, eval_envs, first_seed, steps, episodes=episodes)
+
         try:
             scaled = with_scaled_actions(together, layouts[1], env.id)
         except SpaceMismatch:
@@ -113,18 +123,10 @@ class Sb3Learner(Learner[Sb3Settings]):
             model, explores = self._first_model(
                 envs, settings, seed, start, body_map, env, layouts[0]
             )
-            evaluations = _PeriodicEvaluation(
-                self,
-                eval_envs,
-                layouts[1],
-                evaluation_seed(env, settings.eval_episodes),
-                single,
-                on_evaluation,
-                on_steps,
-            )
+            evaluations = _PeriodicEvaluation(self, evaluate_model, single, on_evaluation, on_steps)
             # Before `learn`: it starts with a reset, which already changes the running statistics.
             if on_evaluation is not ignore:
-                on_evaluation(evaluations.evaluate(model, envs))
+                on_evaluation(evaluate_model(model, envs, 0))
             callbacks: list[BaseCallback] = [] if callback is None else [callback]
             if start is not None and "off-policy" in settings.takes:
                 callbacks.append(_ActFirst(cast("Any", model).learning_starts))
@@ -135,23 +137,27 @@ class Sb3Learner(Learner[Sb3Settings]):
                 self.require_finite(model)
                 raise error
             evaluations.evaluate_now()
-            done = int(cast("Any", model).num_timesteps)
-            card = PolicyCard(
-                env,
-                *layouts,
-                self.name,
-                settings,
-                done,
-                seed,
-                version("shapechanger"),
-                identity,
-                start_log_std=explores,
-            )
-            return TrainedPolicy(model, statistics_of(envs), card)
+            return self._trained(model, envs, env, layouts, settings, seed, identity, explores)
         finally:
             envs.close()
             for one in eval_envs:
                 one.close()
+
+    def _trained(
+        self,
+        model: BaseAlgorithm,
+        envs: VecEnv,
+        env: EnvRef,
+        layouts: tuple[Layout, Layout],
+        settings: Sb3Settings,
+        seed: int,
+        identity: dict[str, Identity],
+        explores: tuple[float, ...] | None,
+    ) -> TrainedPolicy:
+        """Return a trained model with its card and the statistics of its envs."""
+        own = self.name, settings, int(model.num_timesteps), seed, version("shapechanger"), identity
+        card = PolicyCard(env, *layouts, *own, start_log_std=explores)
+        return TrainedPolicy(model, statistics_of(envs), card)
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:
         """Evaluate a policy through the body map."""
@@ -311,18 +317,14 @@ class _PeriodicEvaluation(BaseCallback):
     def __init__(
         self,
         learner: Sb3Learner,
-        envs: list[gym.Env[Any, Any]],
-        action: Layout,
-        first_seed: int,
+        evaluate_model: _Evaluate,
         single: bool,
         on_evaluation: OnEvaluation,
         on_steps: OnSteps,
     ) -> None:
         super().__init__()
         self._learner = learner
-        self._envs = envs
-        self._action = action
-        self._first_seed = first_seed
+        self._evaluate = evaluate_model
         self._single = single
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
@@ -338,22 +340,15 @@ class _PeriodicEvaluation(BaseCallback):
             self.evaluate_now()
             self._next += self._learner.settings.eval_every
             if self._single:
-                self._restart_episode()
-
-    def evaluate(self, model: BaseAlgorithm, envs: VecEnv, steps: int = 0) -> Evaluation:
-        """Evaluate a model."""
-        return evaluate(
-            actor(model, statistics_of(envs), self._action),
-            self._envs,
-            self._first_seed,
-            steps,
-            episodes=self._learner.settings.eval_episodes,
-        )
+                # The evaluation has used the training env.
+                model = cast("Any", self.model)
+                model._last_obs = self.training_env.reset()
+                model._last_episode_starts = np.ones((self.training_env.num_envs,), bool)
 
     def evaluate_now(self) -> None:
         """Evaluate, log and report the current policy."""
         self._learner.require_finite(self.model)
-        result = self.evaluate(self.model, self.training_env, self.num_timesteps)
+        result = self._evaluate(self.model, self.training_env, self.num_timesteps)
         self.logger.record("eval/mean_return", result.mean_return)
         self.logger.record("eval/mean_length", result.mean_length)
         if result.standing is not None:
@@ -361,9 +356,3 @@ class _PeriodicEvaluation(BaseCallback):
         for name, value in result.terms.items():
             self.logger.record(f"eval/{name}", value)
         self._on_evaluation(result)
-
-    def _restart_episode(self) -> None:
-        """Reset the training env, which the evaluation has used."""
-        model = cast("Any", self.model)
-        model._last_obs = self.training_env.reset()
-        model._last_episode_starts = np.ones((self.training_env.num_envs,), bool)

@@ -57,6 +57,11 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
     @property
     def model_arguments(self) -> dict[str, Any]:
         """Arguments of the class besides policy, env and seed."""
+        left_out = {*Sb3Settings.__struct_fields__, *self._ours}
+        own = {n: getattr(self, n) for n in self.__struct_fields__ if n not in left_out}
+        return {"policy_kwargs": self._policy_arguments(), **own}
+
+    def _policy_arguments(self) -> dict[str, Any]:
         raise NotImplementedError
 
     def whole_updates(self, steps: int) -> int:
@@ -82,11 +87,6 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
             else "Observations and rewards reach the learner as they are."
         )
         return f"{super().rhythm()} {seen}"
-
-    def _own(self) -> dict[str, Any]:
-        """The arguments of the class, keyed by name."""
-        left_out = {*Sb3Settings.__struct_fields__, *self._ours}
-        return {n: getattr(self, n) for n in self.__struct_fields__ if n not in left_out}
 
 
 class PpoSettings(Sb3Settings, frozen=True, kw_only=True, tag="ppo"):
@@ -117,19 +117,16 @@ class PpoSettings(Sb3Settings, frozen=True, kw_only=True, tag="ppo"):
 
     takes = Sb3Settings.takes | {"on-policy"}
     _steps_per_update = "n_steps"
+    _ours = ("log_std_init",)
 
-    @property
-    def model_arguments(self) -> dict[str, Any]:
-        """Arguments of the class besides policy, env and seed."""
-        arguments = self._own()
-        arguments["policy_kwargs"] = {
+    def _policy_arguments(self) -> dict[str, Any]:
+        return {
             "net_arch": list(self.net_arch),
-            "log_std_init": arguments.pop("log_std_init"),
+            "log_std_init": self.log_std_init,
             # Stable-Baselines3's own epsilon for PPO; `foreach` makes fewer calls from Python, for
             # equal numbers.
             "optimizer_kwargs": {"eps": 1e-5, "foreach": True},
         }
-        return arguments
 
 
 class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
@@ -147,20 +144,16 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
     takes = frozenset[Takes]({"trial", "callback", "many bodies"})
     learner = "shapechanger.transfer.limbs.learner:LimbLearner"
     policy_class = "shapechanger.transfer.limbs.policy:LimbPolicy"
-    _ours = ("network", "room")
+    _ours = (*PpoSettings._ours, "network", "room")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.network == "padded" and self.room < 1:
             raise StudyError("A padded network needs room for at least one limb, as --set room=12.")
 
-    @property
-    def model_arguments(self) -> dict[str, Any]:
-        """Arguments of the class besides policy, env and seed."""
-        arguments = super().model_arguments
-        policy = arguments["policy_kwargs"]
-        policy |= {"network": self.network, "hidden": policy.pop("net_arch")}
-        return arguments
+    def _policy_arguments(self) -> dict[str, Any]:
+        policy = super()._policy_arguments()
+        return {"hidden": policy.pop("net_arch"), "network": self.network, **policy}
 
 
 class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
@@ -176,7 +169,7 @@ class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
     takes = frozenset[Takes]({"trial", "device"})
     learner = "shapechanger.transfer.learners.rsl:RslLearner"
     packages = _RSL
-    _ours = ("device",)
+    _ours = (*PpoSettings._ours, "device")
 
 
 class RslLimbSettings(LimbSettings, frozen=True, kw_only=True, tag="rsl-limbs"):
@@ -227,11 +220,8 @@ class OffPolicySettings(Sb3Settings, frozen=True, kw_only=True, tag="off-policy"
     takes = Sb3Settings.takes | {"off-policy"}
     _steps_per_update = "train_freq"
 
-    @property
-    def model_arguments(self) -> dict[str, Any]:
-        """Arguments of the class besides policy, env and seed."""
-        policy = {"net_arch": list(self.net_arch), "optimizer_kwargs": {"foreach": True}}
-        return {"policy_kwargs": policy, **self._own()}
+    def _policy_arguments(self) -> dict[str, Any]:
+        return {"net_arch": list(self.net_arch), "optimizer_kwargs": {"foreach": True}}
 
 
 class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):

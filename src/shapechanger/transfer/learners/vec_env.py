@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, cast
 
 import gymnasium as gym
@@ -80,10 +79,6 @@ class ThreadVecEnv(DummyVecEnv):
     def close(self) -> None:
         """Close the envs; may be called twice."""
         self._envs.close()
-
-    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Render one image per env."""
-        return self._envs.render()
 
 
 class ScaledActions(VecEnvWrapper):

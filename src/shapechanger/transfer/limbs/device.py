@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import torch
 from rsl_rl.models import MLPModel
 from rsl_rl.modules.distribution import GaussianDistribution
@@ -33,18 +33,18 @@ class DeviceRows:
 
     def __init__(self, envs: Any, each: Sequence[LimbRows]) -> None:
         self.room = each[0].room
-        # Each batch has its own spaces, and so its own tensors.
         self._apart = isinstance(envs.single_action_space, gym.spaces.Tuple)
-        self._batches = [
-            _Batch(batch.numbers, [each[int(i)] for i in batch.numbers.tolist()])
-            for batch in envs.batches
-        ]
+        # Each batch has arrays of the same shapes, and numbers in one order.
+        self._batches: list[tuple[Tensor, LimbRows]] = []
+        for batch in envs.batches:
+            rows = LimbRows.stacked([each[int(i)] for i in batch.numbers.tolist()])
+            self._batches.append((batch.numbers, _on_device(rows, batch.numbers.device)))
 
     def of(self, observations: Any) -> Tensor:
         """Return the rows of all worlds, flattened, shape (n, (room + 1) * width)."""
         parts = [
-            batch.rows(observations[i] if self._apart else observations[batch.numbers])
-            for i, batch in enumerate(self._batches)
+            rows.unrounded(observations[i] if self._apart else observations[numbers])
+            for i, (numbers, rows) in enumerate(self._batches)
         ]
         return self._gathered(parts)
 
@@ -54,45 +54,26 @@ class DeviceRows:
         Args:
             limbs: A number from -1 to 1 for each limb, shape (n, room).
         """
-        parts = [batch.actions(limbs[batch.numbers]) for batch in self._batches]
+        parts = [rows.unrounded_actions(limbs[numbers]) for numbers, rows in self._batches]
         return parts if self._apart else self._gathered(parts)
 
     def _gathered(self, parts: list[Tensor]) -> Tensor:
         """Return rows of all batches in the order of the worlds."""
         count = sum(len(part) for part in parts)
         whole = parts[0].new_empty((count, parts[0].shape[1]))
-        for batch, part in zip(self._batches, parts, strict=True):
-            whole[batch.numbers] = part
+        for (numbers, _), part in zip(self._batches, parts, strict=True):
+            whole[numbers] = part
         return whole
 
 
-class _Batch:
-    """Rows of worlds whose bodies have arrays of the same shapes, and numbers in one order."""
-
-    def __init__(self, numbers: Tensor, each: Sequence[LimbRows]) -> None:
-        def stacked(name: str) -> Tensor:
-            values = np.stack([getattr(rows, name) for rows in each])
-            return torch.as_tensor(values, dtype=torch.float32, device=numbers.device)
-
-        first = each[0]
-        self.numbers = numbers
-        self._scale, self._offset = stacked("scale"), stacked("offset")
-        self._low, self._high = stacked("low"), stacked("high")
-        self._constant = stacked("constant")
-        self._selection = torch.as_tensor(
-            first.selection, dtype=torch.float32, device=numbers.device
-        )
-        self._actuators = torch.as_tensor(first.actuators, device=numbers.device)
-
-    def rows(self, observations: Tensor) -> Tensor:
-        """Return the rows; observations have the shape (k, observations)."""
-        scaled = observations * self._scale + self._offset
-        return scaled @ self._selection + self._constant
-
-    def actions(self, limbs: Tensor) -> Tensor:
-        """Return the worlds' own actions; `limbs` has the shape (k, room)."""
-        share = 0.5 * (limbs[:, self._actuators] + 1.0)
-        return self._low + share * (self._high - self._low)
+def _on_device(rows: LimbRows, device: Any) -> LimbRows:
+    floats = ("scale", "offset", "selection", "constant", "low", "high")
+    tensors: dict[str, Any] = {
+        name: torch.as_tensor(getattr(rows, name), dtype=torch.float32, device=device)
+        for name in floats
+    }
+    tensors["actuators"] = torch.as_tensor(rows.actuators, device=device)
+    return replace(rows, **tensors)
 
 
 class LimbModel(MLPModel):

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from contextlib import closing
+from typing import Any, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from shapechanger.contract.env_ref import EnvRef, each_body
-from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.errors import StudyError
 from shapechanger.layout import Layout
 from shapechanger.transfer.learners.vec_env import training_vec_env
 from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, rows_of
-
-try:
-    from stable_baselines3.common.vec_env import VecEnv
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
 
 
 class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
@@ -101,7 +98,16 @@ def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
     return limbs
 
 
-class LimbVecEnv(VecEnv):
+class _Group(NamedTuple):
+    """Envs whose bodies have equal spaces."""
+
+    numbers: list[int]
+    each: list[LimbRows]
+    rows: LimbRows
+    envs: Any  # Stable-Baselines3 leaves out types.
+
+
+class LimbVecEnv(DummyVecEnv):
     """Many envs of different bodies, also with different numbers of limbs, as rows.
 
     Envs whose spaces agree are stepped together.
@@ -125,11 +131,18 @@ class LimbVecEnv(VecEnv):
         groups: dict[tuple[tuple[str, ...], ...], list[int]] = {}
         for i, rows in enumerate(own):
             groups.setdefault(rows.names, []).append(i)
-        self._groups = [
-            _Group(numbers, [bodies[i] for i in numbers], [own[i] for i in numbers], threads)
-            for numbers in groups.values()
-        ]
-        cast("Any", super()).__init__(num_envs, *limb_spaces(own[0]))
+        self._groups: list[_Group] = []
+        self.envs: list[Any] = [None] * num_envs
+        for numbers in groups.values():
+            each = [own[i] for i in numbers]
+            envs: Any = training_vec_env(
+                together([bodies[i] for i in numbers]), len(numbers), threads
+            )
+            self._groups.append(_Group(numbers, each, LimbRows.stacked(each), envs))
+            for i, one in zip(numbers, envs.envs, strict=True):
+                self.envs[i] = one
+        # Skips DummyVecEnv's, which would make its own envs and buffers.
+        cast("Any", VecEnv).__init__(self, num_envs, *limb_spaces(own[0]))
         self._size = own[0].constant.size
         self._actions = np.zeros((num_envs, own[0].room), np.float32)
 
@@ -138,7 +151,7 @@ class LimbVecEnv(VecEnv):
         rows = np.empty((self.num_envs, self._size), np.float32)
         for group in self._groups:
             group.envs._seeds = [self._seeds[i] for i in group.numbers]
-            rows[group.numbers] = group.rows(group.envs.reset())
+            rows[group.numbers] = group.rows.of(group.envs.reset())
             for i, info in zip(group.numbers, group.envs.reset_infos, strict=True):
                 self.reset_infos[i] = info
         self._reset_seeds()
@@ -158,9 +171,10 @@ class LimbVecEnv(VecEnv):
         ends = np.empty(self.num_envs, np.bool_)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for group in self._groups:
-            given = group.actions(self._actions[group.numbers])
-            observed, paid, ended, told = group.envs.step(given)
-            rows[group.numbers] = group.rows(observed)
+            given = zip(group.each, self._actions[group.numbers], strict=True)
+            actions = np.stack([one.actions(limbs) for one, limbs in given])
+            observed, paid, ended, told = group.envs.step(actions)
+            rows[group.numbers] = group.rows.of(observed)
             rewards[group.numbers], ends[group.numbers] = paid, ended
             for k, (i, info) in enumerate(zip(group.numbers, told, strict=True)):
                 infos[i] = info
@@ -172,58 +186,6 @@ class LimbVecEnv(VecEnv):
         """Close all envs."""
         for group in self._groups:
             group.envs.close()
-
-    # Unused by learners, and asked for by the base class.
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of each env, in the order of the envs."""
-        del indices
-        found: list[Any] = [None] * self.num_envs
-        for group in self._groups:
-            for i, value in zip(group.numbers, group.envs.get_attr(attr_name), strict=True):
-                found[i] = value
-        return found
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refuse to change attributes."""
-        raise NotImplementedError
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Refuse to call methods."""
-        raise NotImplementedError
-
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return that no env is wrapped."""
-        del wrapper_class, indices
-        return [False] * self.num_envs
-
-
-class _Group:
-    """Envs whose bodies have equal spaces."""
-
-    def __init__(
-        self,
-        numbers: list[int],
-        bodies: Sequence[EnvRef],
-        each: list[LimbRows],
-        threads: int | None,
-    ) -> None:
-        self.numbers = numbers
-        self.each = each
-        # Stable-Baselines3 leaves out types.
-        self.envs: Any = training_vec_env(together(bodies), len(numbers), threads)
-        self._scale = np.stack([rows.scale for rows in each])
-        self._offset = np.stack([rows.offset for rows in each])
-        self._constant = np.stack([rows.constant for rows in each])
-
-    def rows(self, observations: NDArray[Any]) -> NDArray[np.float32]:
-        """Return the rows of all envs; observations have the shape (envs, observations)."""
-        scaled = observations * self._scale + self._offset
-        return (scaled @ self.each[0].selection + self._constant).astype(np.float32)
-
-    def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
-        """Return the actions of all envs; `limbs` has the shape (envs, room)."""
-        return np.stack([rows.actions(own) for rows, own in zip(self.each, limbs, strict=True)])
 
 
 def bodies_in_turn(
@@ -254,11 +216,8 @@ def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
     """Return the rows of the bodies of some envs, all with the same room."""
     own: list[LimbRows] = []
     for body in bodies:
-        made = body.make()
-        try:
+        with closing(body.make()) as made:
             own.append(rows_of(made, room))
-        finally:
-            made.close()
     if others := [rows.columns for rows in own if rows.columns != own[0].columns]:
         raise StudyError(f"These bodies sense different things: {own[0].columns} and {others[0]}.")
     room = max(rows.room for rows in own)

@@ -14,18 +14,13 @@ from itertools import pairwise
 from typing import Any, Literal, cast
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch import Tensor, nn
+from torch.distributions import Normal
 
-from shapechanger.errors import MissingExtra
 from shapechanger.transfer.limbs.rows import DESCRIBED
-
-try:
-    import torch
-    from stable_baselines3.common.policies import ActorCriticPolicy
-    from torch import Tensor, nn
-    from torch.distributions import Normal
-except ImportError as error:
-    raise MissingExtra("stable-baselines3", "learn") from error
 
 _CODE = 64
 _HIDDEN = 64

@@ -6,6 +6,7 @@ all bodies of a family. So one network fits every body of the family.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -78,8 +79,11 @@ class LimbRows:
         Returns:
             Shape (..., (room + 1) * width).
         """
-        rows = (observation * self.scale + self.offset) @ self.selection + self.constant
-        return rows.astype(np.float32)
+        return self.unrounded(observation).astype(np.float32)
+
+    def unrounded(self, observation: Any) -> Any:
+        """Return the same in the precision of the arrays, which may be tensors of a device."""
+        return (observation * self.scale + self.offset) @ self.selection + self.constant
 
     def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
         """Return a body's own actions.
@@ -90,8 +94,20 @@ class LimbRows:
         Returns:
             Shape (..., actions).
         """
+        return self.unrounded_actions(limbs).astype(np.float32)
+
+    def unrounded_actions(self, limbs: Any) -> Any:
+        """Return the same in the precision of the arrays."""
         share = 0.5 * (limbs[..., self.actuators] + 1.0)
-        return (self.low + share * (self.high - self.low)).astype(np.float32)
+        return self.low + share * (self.high - self.low)
+
+    @staticmethod
+    def stacked(each: Sequence[LimbRows]) -> LimbRows:
+        """Return the rows of bodies with numbers in one order, whose observations are stacked."""
+        own = ("scale", "offset", "constant", "low", "high")
+        return replace(
+            each[0], **{name: np.stack([getattr(rows, name) for rows in each]) for name in own}
+        )
 
     @property
     def room(self) -> int:
