@@ -10,7 +10,7 @@ import msgspec
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
-from shapechanger.transfer.study import make_plan
+from shapechanger.transfer.study import Study, make_plan
 
 SMALL = EnvRef("shapechanger/SmallInvertedPendulum-v1")
 BIG = EnvRef("shapechanger/BigInvertedPendulum-v1")
@@ -34,6 +34,13 @@ def tiny_plan(settings: PpoSettings = TINY, **arguments: Any) -> Plan:
     """Return the plan of a study that takes seconds."""
     task = arguments.pop("task", TransferTask(SMALL, BIG))
     return make_plan(task, "tiny", settings, **{"seeds": 2, **arguments})
+
+
+def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
+    """Return every number that must be reproduced."""
+    return {
+        result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
+    }
 
 
 def files_of(folder: Path) -> dict[str, bytes]:

@@ -18,7 +18,6 @@ from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
-from shapechanger.transfer.report.study import study_html
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from shapechanger.vehicles import cloning
 from shapechanger.vehicles.cloning import (
@@ -27,7 +26,7 @@ from shapechanger.vehicles.cloning import (
     record_demonstrations,
 )
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
-from tests.transfer.studies import BIG
+from tests.transfer.studies import BIG, curves
 
 _FRAMING = TINY_CLONING.clone.framing
 _LEARNER = CloneLearner("cloning", TINY_CLONING)
@@ -36,12 +35,6 @@ _LEARNER = CloneLearner("cloning", TINY_CLONING)
 def _plan(*more: str) -> Plan:
     task = TransferTask(LANE, SLIPPERY)
     return make_plan(task, "cloning", TINY_CLONING, seeds=2, arms=(*ARMS, *more))
-
-
-def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
-    return {
-        result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
-    }
 
 
 @pytest.fixture(scope="module")
@@ -200,11 +193,6 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
     assert again == study.of("scratch")[0].curve[-1].mean_return
 
 
-def test_arms_learn_from_the_same_demonstrations(finished: tuple[Study, Path]) -> None:
-    names = sorted(path.name for path in (finished[1] / "demonstrations").iterdir())
-    assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
-
-
 def test_a_study_that_was_killed_ends_with_the_same_numbers(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
@@ -219,15 +207,8 @@ def test_a_study_that_was_killed_ends_with_the_same_numbers(
     (cut / "demonstrations" / ".scratch-1.7.npz").write_bytes(b"half a pict")
     kept = (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
     resumed = run_study(_plan(), cut, executor=Serial())
-    assert _curves(resumed) == _curves(study)
+    assert curves(resumed) == curves(study)
     assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
-
-
-def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path]) -> None:
-    page = study_html(finished[0])
-    assert "cloning" in page
-    assert "tests/Lane-v0" in page
-    assert "data:image/" in page
 
 
 def test_settings_that_contradict_themselves_are_refused() -> None:

@@ -21,6 +21,7 @@ from shapechanger.errors import (
     CorruptStudy,
     EmptyShift,
     ForeignStudy,
+    LayoutError,
     MapError,
     OutputError,
     SpaceMismatch,
@@ -29,9 +30,8 @@ from shapechanger.errors import (
 )
 from shapechanger.files import read_json
 from shapechanger.layout import Feature, Layout
-from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import Job, OnProgress, Serial
-from shapechanger.transfer.plan import ARMS, Run, TransferTask
+from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import (
     STUDY_FILE,
     Study,
@@ -39,14 +39,7 @@ from shapechanger.transfer.study import (
     inspect_task,
     run_study,
 )
-from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
-
-
-def curves(study: Study) -> dict[str, list[tuple[int, float]]]:
-    """Return every number that must be reproduced."""
-    return {
-        result.run.name: [(e.steps, e.mean_return) for e in result.curve] for result in study.runs
-    }
+from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, curves, tiny_plan
 
 
 @pytest.fixture(scope="module")
@@ -112,24 +105,13 @@ def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], tmp_path: Pa
     for name in ("scratch-1", "source-1", "fine-tune-1"):
         (cut / "runs" / name / "run.json").unlink()
     (cut / "runs" / "scratch-1" / "curve.jsonl").write_text("half a li")
+    (cut / "runs" / "source-0" / "policy.safetensors").unlink()
     kept = (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
     resumed = run_study(tiny_plan(), cut, executor=Serial())
     assert curves(resumed) == curves(study)
     assert resumed.summaries == study.summaries
+    assert (cut / "runs" / "source-0" / "policy.safetensors").exists()
     assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
-
-
-def test_a_finished_study_runs_nothing(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    study, out = finished[0], tmp_path / "study"
-    shutil.copytree(finished[1], out)
-    before = (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
-    seen: list[str] = []
-    again = run_study(
-        tiny_plan(), out, executor=Serial(), on_progress=lambda n, s, e: seen.append(n)
-    )
-    assert curves(again) == curves(study)
-    assert not seen
-    assert (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == before
 
 
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
@@ -152,30 +134,6 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
     assert "reward_forward" in study.of("scratch")[0].curve[-1].terms
 
 
-def test_a_source_policy_can_be_given(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    policy = Run("source", 0).policy_file(finished[1])
-    plan = tiny_plan(source_policy=policy)
-    study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
-    assert not study.of("source")
-    assert study.source_return == ()
-    assert plan.source_steps == load_policy(policy).card.steps == 64
-    (unchanged,) = study.of("zero-shot")
-    assert unchanged.curve[0].mean_return == (finished[0].of("zero-shot")[0].curve[0].mean_return)
-    with pytest.raises(StudyError, match="not the one that this study was planned with"):
-        run_study(
-            plan,
-            tmp_path / "study",
-            source_policy=Run("source", 1).policy_file(finished[1]),
-        )
-
-
-def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
-    ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
-    policy = Run("source", 0).policy_file(finished[1])
-    with pytest.raises(SpaceMismatch, match=r"was trained in .*Small.*the source is .*/Ant"):
-        tiny_plan(task=ants, source_policy=policy)
-
-
 def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
     """Equal source and target are refused before any training."""
     with pytest.raises(EmptyShift, match="nothing to transfer across"):
@@ -183,67 +141,59 @@ def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "s").exists()
 
 
-def test_spaces_that_cannot_be_mapped_are_refused() -> None:
-    with pytest.raises(MapError, match="cannot be mapped"):
-        tiny_plan(task=TransferTask(SMALL, EnvRef("shapechanger/Ant-v1")))
+_SPARSE = msgspec.structs.replace(TINY, eval_every=96)
+_NOT_PLANNED: list[tuple[dict[str, Any], type[Exception], str]] = [
+    ({"task": TransferTask(SMALL, EnvRef("shapechanger/Ant-v1"))}, MapError, "cannot be mapped"),
+    ({"task": TransferTask(EnvRef("shapechanger/BigAnd-v1"), BIG)}, UnknownName, "r/BigAnt-v1"),
+    ({"task": TransferTask(EnvRef("CartPole-v1"), BIG)}, LayoutError, "no observation_layout"),
+    (
+        {"task": TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)},
+        UnknownName,
+        "No argument of InvertedPendulum matches 'colour'",
+    ),
+    *(
+        ({name: steps}, StudyError, f"{steps} {which} steps is smaller than one.*32")
+        for name, which in (("steps", "target"), ("source_steps", "source"))
+        for steps in (1, 31)
+    ),
+    # Half of the target's steps, which the user has not typed.
+    ({"settings": _SPARSE, "steps": 96}, StudyError, "64 source steps .* as source_steps"),
+    ({"seeds": 1}, StudyError, "at least 2 seeds"),
+    # What a generator would refuse after hours.
+    *(
+        ({"seed": seed}, StudyError, "A seed is a whole number from 0 to 4294967295, got ")
+        for seed in (-1, 2**32, 2**64, 0.5, True, "3")
+    ),
+    ({"arms": ("scratch", "fine-tun")}, UnknownName, "'fine-tune'"),
+    ({"arms": ("scratch", "fine-tune", "fine-tune")}, StudyError, "named once"),
+    ({"arms": ("zero-shot", "fine-tune")}, StudyError, "compares scratch"),
+    ({"measure": "reward_survived"}, UnknownName, "Did you mean 'reward_survive'"),
+]
 
 
-@pytest.mark.parametrize("steps", [1, 31])
-def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
-    with pytest.raises(
-        StudyError, match=f"{steps} target steps is smaller than one evaluation.*32"
-    ):
-        tiny_plan(steps=steps)
-    with pytest.raises(StudyError, match=rf"of {steps} source steps is smaller.*that\.$"):
-        tiny_plan(source_steps=steps)
+@pytest.mark.parametrize(("arguments", "kind", "message"), _NOT_PLANNED)
+def test_wrong_arguments_are_refused_before_anything_is_trained(
+    arguments: dict[str, Any], kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=message):
+        tiny_plan(**arguments)
 
 
-def test_the_default_of_the_source_is_named_where_it_is_too_small() -> None:
-    """It is half of the target's steps, which the user has not typed."""
-    settings = msgspec.structs.replace(TINY, eval_every=96)
-    with pytest.raises(StudyError, match=r"64 source steps is smaller.*that as source_steps\."):
-        tiny_plan(settings, steps=96)
-
-
-def test_one_seed_is_refused() -> None:
-    with pytest.raises(StudyError, match="at least 2 seeds"):
-        tiny_plan(seeds=1)
-
-
-@pytest.mark.parametrize("seed", [-1, 2**32, 2**63, 2**64, 0.5, True, "3"])
-def test_a_seed_of_a_study_fits_every_generator(seed: Any) -> None:
-    """What a generator would refuse after hours is refused in the plan."""
-    with pytest.raises(StudyError, match="A seed is a whole number from 0 to 4294967295, got "):
-        tiny_plan(seed=seed)
-
-
-def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
-    with pytest.raises(UnknownName, match="'fine-tune'"):
-        tiny_plan(arms=("scratch", "fine-tun"))
-    with pytest.raises(StudyError, match="named once"):
-        tiny_plan(arms=("scratch", "fine-tune", "fine-tune"))
-    with pytest.raises(StudyError, match="compares scratch"):
-        tiny_plan(arms=("zero-shot", "fine-tune"))
-
-
-def test_a_measure_is_one_of_the_target() -> None:
-    """A misspelt reward term is refused before anything is trained."""
+def test_a_reward_term_can_be_the_measure() -> None:
     assert tiny_plan(measure="reward_survive").measure == "reward_survive"
-    with pytest.raises(UnknownName, match="Did you mean 'reward_survive'"):
-        tiny_plan(measure="reward_survived")
 
 
-def test_unknown_envs_are_refused() -> None:
-    with pytest.raises(UnknownName, match="shapechanger/BigAnt-v1"):
-        tiny_plan(task=TransferTask(EnvRef("shapechanger/BigAnd-v1"), BIG))
-
-
-def test_a_folder_of_another_study_is_refused(finished: tuple[Study, Path], tmp_path: Path) -> None:
+@pytest.mark.parametrize("differs", ["seed", "versions"])
+def test_a_folder_of_another_study_is_refused(
+    finished: tuple[Study, Path], tmp_path: Path, differs: str
+) -> None:
     """The message names the differences; nothing is overwritten."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
-    with pytest.raises(ForeignStudy, match="differs in seed"):
-        run_study(tiny_plan(seed=1), out, executor=Serial())
+    changed: Any = {"seed": 1, "versions": {"mujoco": "0.1"}}[differs]
+    other = msgspec.structs.replace(tiny_plan(), **{differs: changed})
+    with pytest.raises(ForeignStudy, match=f"differs in {differs}"):
+        run_study(other, out, executor=Serial())
     assert read_json(out / STUDY_FILE, Study, "") == finished[0]
 
 
@@ -252,17 +202,6 @@ def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ForeignStudy, match="holds other files"):
         run_study(tiny_plan(), tmp_path, executor=Serial())
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
-
-
-def test_a_policy_that_was_deleted_is_made_again(
-    finished: tuple[Study, Path], tmp_path: Path
-) -> None:
-    out = tmp_path / "study"
-    shutil.copytree(finished[1], out)
-    (out / "runs" / "source-1" / "policy.safetensors").unlink()
-    again = run_study(tiny_plan(), out, executor=Serial())
-    assert curves(again) == curves(finished[0])
-    assert (out / "runs" / "source-1" / "policy.safetensors").exists()
 
 
 class _Planned:
@@ -298,15 +237,6 @@ def test_a_result_that_is_not_the_runs_own_is_refused(
         path.write_text(json.dumps(content))
     with pytest.raises(CorruptStudy, match=r"does not hold the result of scratch-0: delete"):
         run_study(tiny_plan(), out, executor=Serial())
-
-
-def test_other_versions_are_another_study(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    out = tmp_path / "study"
-    shutil.copytree(finished[1], out)
-    plan = tiny_plan()
-    other = msgspec.structs.replace(plan, versions={**plan.versions, "mujoco": "0.1"})
-    with pytest.raises(ForeignStudy, match="differs in versions"):
-        run_study(other, out, executor=Serial())
 
 
 @pytest.mark.parametrize("name", ["plan.json", "runs/scratch-0/run.json"])
@@ -348,12 +278,6 @@ def test_a_full_disk_loses_nothing(
     assert (out / "runs" / "scratch-0" / "run.json").exists()
     assert not (out / "runs" / "scratch-1" / "run.json").exists()
     assert curves(run_study(tiny_plan(), out, executor=Serial())) == curves(finished[0])
-
-
-def test_a_study_of_an_env_without_layouts_is_refused() -> None:
-    bare = EnvRef("CartPole-v1")
-    with pytest.raises(Exception, match="publishes no observation_layout"):
-        tiny_plan(task=TransferTask(bare, BIG))
 
 
 def test_evaluations_are_not_more_frequent_than_updates(finished: tuple[Study, Path]) -> None:
@@ -407,12 +331,6 @@ def test_an_env_that_fails_in_the_rollout_is_refused() -> None:
         StudyError, match=r"Failing.* or .*Misnamed.* fails in a short rollout \(can"
     ):
         certify_shift(Failing(), Misnamed())
-
-
-def test_an_argument_that_does_not_exist_is_refused() -> None:
-    task = TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)
-    with pytest.raises(UnknownName, match="No argument of InvertedPendulum matches 'colour'"):
-        tiny_plan(task=task)
 
 
 def test_each_env_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Set
 from pathlib import Path
 from typing import Any, Final
 
@@ -167,19 +166,13 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
         The runs of the other study then count here, because no run depends on another arm.
         """
+        added = {f"method {arm}" for arm in {*self.arms} - {*other.arms}}
+        identity = {part: each for part, each in self.identity.items() if part in added}
         grown = msgspec.structs.replace(
-            other,
-            seeds=self.seeds,
-            arms=self.arms,
-            identity=other.identity | self._identities_of({*self.arms} - {*other.arms}),
+            other, seeds=self.seeds, arms=self.arms, identity=other.identity | identity
         )
         more = self.seeds >= other.seeds and set(self.arms) >= set(other.arms)
         return more and grown == self != other
-
-    def _identities_of(self, arms: Set[str]) -> dict[str, Identity]:
-        """Return the identities of some methods."""
-        parts = {f"method {arm}" for arm in arms}
-        return {part: each for part, each in self.identity.items() if part in parts}
 
     def difference(self, other: Plan) -> str:
         """Names of the fields in which two plans differ; empty if they are equal."""
@@ -218,10 +211,14 @@ class _PlannedArms(msgspec.Struct):
     arms: tuple[str, ...] = ()
 
 
+def planned_arms(out: Path, remedy: str = "it is kept as it is") -> tuple[str, ...]:
+    """Return the names of the methods of the study in a folder, without importing them."""
+    return read_json(out / PLAN_FILE, _PlannedArms, remedy).arms
+
+
 def read_plan(out: Path, remedy: str) -> Plan:
     """Read the plan of the study in a folder."""
-    path = out / PLAN_FILE
-    for arm in read_json(path, _PlannedArms, remedy).arms:
+    for arm in planned_arms(out, remedy):
         try:
             load_method(arm)
         except UnknownName as error:
@@ -230,9 +227,4 @@ def read_plan(out: Path, remedy: str) -> Plan:
                 "to the folder that the study was started in, or install the method; nothing was "
                 f"changed. {error}"
             ) from error
-    return read_json(path, Plan, remedy)
-
-
-def planned_arms(out: Path) -> tuple[str, ...]:
-    """Return the names of the methods of the study in a folder, without importing them."""
-    return read_json(out / PLAN_FILE, _PlannedArms, f"{out} is kept as it is").arms
+    return read_json(out / PLAN_FILE, Plan, remedy)

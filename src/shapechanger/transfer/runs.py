@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import pkgutil
 import time
-from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
 
@@ -112,12 +112,34 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         curve.append(evaluation)
         append_line(folder / _CURVE, evaluation)
 
+    def shared(kind: str) -> SharedFile:
+        one = Run(kind, run.index)
+        path = Path(study, "demonstrations", f"{one.name}.npz")
+        return SharedFile(path, plan.seed_of(one))
+
     policy = None
     learner = learner_of(plan.learner, plan.settings)
     if run.kind in NO_SKILL:
         on_evaluation(_evaluate_unskilled(plan, run, learner))
     else:
-        context = _method_run(plan, run, Path(study), learner, given, on_evaluation, report)
+        part = f"method {run.kind}"
+        context = MethodRun(
+            source=plan.task.source,
+            target=plan.target_of(run),
+            body_map=plan.body_map,
+            learner=learner,
+            steps=plan.steps,
+            source_steps=plan.source_steps_of(run.kind),
+            seed=plan.seed_of(run),
+            folder=folder,
+            source_file=given or Run(SOURCE, run.index).policy_file(Path(study)),
+            policy_file=run.policy_file(Path(study)),
+            shared=shared,
+            kind=run.kind,
+            identity={part: plan.identity[part]} if part in plan.identity else {},
+            report=on_evaluation,
+            on_steps=report,
+        )
         if run.kind == SOURCE:
             policy = context.train(
                 context.source, context.source_steps, on_evaluation=context.report
@@ -134,51 +156,14 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
     write_json(folder / _RESULT, result)
 
 
-def _method_run(
-    plan: Plan,
-    run: Run,
-    study: Path,
-    learner: Learner[Any],
-    given: Path | None,
-    on_evaluation: Callable[[Evaluation], None],
-    on_steps: ReportSteps,
-) -> MethodRun:
-    """Return a run as its method sees it."""
-
-    def shared(kind: str) -> SharedFile:
-        one = msgspec.structs.replace(run, kind=kind)
-        return SharedFile(study / "demonstrations" / f"{one.name}.npz", plan.seed_of(one))
-
-    part = f"method {run.kind}"
-    return MethodRun(
-        source=plan.task.source,
-        target=plan.target_of(run),
-        body_map=plan.body_map,
-        learner=learner,
-        steps=plan.steps,
-        source_steps=plan.source_steps_of(run.kind),
-        seed=plan.seed_of(run),
-        folder=run.folder(study),
-        source_file=given or msgspec.structs.replace(run, kind=SOURCE).policy_file(study),
-        policy_file=run.policy_file(study),
-        shared=shared,
-        kind=run.kind,
-        identity={part: plan.identity[part]} if part in plan.identity else {},
-        report=on_evaluation,
-        on_steps=on_steps,
-    )
-
-
 def _evaluate_unskilled(plan: Plan, run: Run, learner: Learner[Any]) -> Evaluation:
     """Evaluate random actions, or the action zero, in the target."""
-    envs = learner.evaluation_envs(plan.target_of(run))
-    try:
+    with ExitStack() as stack:
+        envs = learner.evaluation_envs(plan.target_of(run))
+        for env in envs:
+            stack.callback(env.close)
         # Each run draws its own actions and its own starts.
         seed = plan.seed_of(run)
         draw = random_actions if run.kind == "random" else zero_actions
-        return evaluate(
-            draw(envs[0].action_space, seed), envs, seed, episodes=plan.settings.eval_episodes
-        )
-    finally:
-        for env in envs:
-            env.close()
+        act = draw(envs[0].action_space, seed)
+        return evaluate(act, envs, seed, episodes=plan.settings.eval_episodes)

@@ -11,7 +11,6 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
 
-import gymnasium as gym
 import msgspec
 import numpy as np
 
@@ -133,17 +132,15 @@ class TaskTraits(NamedTuple):
 def inspect_task(task: TransferTask) -> TaskTraits:
     """Make both envs of a task once, and read what a study needs to know."""
     with closing(task.source.make()) as source, closing(task.target.make()) as target:
-        traits = _traits(task.source, source), _traits(task.target, target)
+        traits: list[EnvTraits] = []
+        for ref, made in ((task.source, source), (task.target, target)):
+            found = env_traits(made, ref.id)
+            traits.append(replace(found, identified=steady(ref, found.identified)))
         try:
-            return TaskTraits(*traits, certify_shift(source, target))
+            certificate = certify_shift(source, target)
         except ShapechangerError as error:
-            return TaskTraits(*traits, error)
-
-
-def _traits(ref: EnvRef, made: gym.Env[Any, Any]) -> EnvTraits:
-    """Return the traits of an env, with an identity that can be compared."""
-    traits = env_traits(made, ref.id)
-    return replace(traits, identified=steady(ref, traits.identified))
+            certificate = error
+        return TaskTraits(traits[0], traits[1], certificate)
 
 
 def default_arms(traits: TaskTraits) -> tuple[str, ...]:
@@ -276,30 +273,25 @@ def make_plan(
 
 def _identities(traits: TaskTraits, settings: LearnerSettings, arms: Sequence[str]) -> Identities:
     """Return the versions of the two envs, the learner and the methods."""
-    envs = {"source": traits.source.identified, "target": traits.target.identified}
-    found = known({part: each.identity for part, each in envs.items()})
-    return found | identities_of_code(settings, arms)
+    found = {"source": traits.source.identified, "target": traits.target.identified}
+    envs = known({part: each.identity for part, each in found.items()})
+    return envs | identities_of_code(settings, arms)
 
 
 def _measure(env: EnvRef, target: EnvTraits, name: str) -> Measure:
     """Return a measure of the target, or one of its reward terms; unchecked for a robot."""
     known = {measure.name: measure for measure in target.measures}
-    if not name:
-        return target.measures[0]
-    if name in known:
-        return known[name]
-    terms = () if target.exclusive else _reward_terms(env)
-    if name in terms or (target.exclusive and is_reward_term(name)):
-        return Measure(name, RETURN.unit)
-    raise UnknownName("measure", name, (*known, *terms))
-
-
-def _reward_terms(env: EnvRef) -> tuple[str, ...]:
-    """Names of the reward terms that an env reports in its first step."""
-    with closing(env.make()) as made:
-        made.reset(seed=0)
-        info = made.step(made.action_space.sample())[4]
-    return tuple(name for name in info if is_reward_term(name))
+    if not name or name in known:
+        return known[name] if name else target.measures[0]
+    if target.exclusive:
+        terms = [name] if is_reward_term(name) else []
+    else:
+        with closing(env.make()) as made:
+            made.reset(seed=0)
+            terms = list(filter(is_reward_term, made.step(made.action_space.sample())[4]))
+    if name not in terms:
+        raise UnknownName("measure", name, (*known, *terms))
+    return Measure(name, RETURN.unit)
 
 
 def run_study(
@@ -344,12 +336,16 @@ def run_study(
     require_versions(plan, plan.identity, present, remedy)
     claim_folder(plan, out)
     keep_models(out, traits.source.identified, traits.target.identified)
-    jobs = [
-        Job(run.name, perform_run, (plan, run, str(out), source_policy), after=_after(plan, run))
-        for run in unfinished_runs(plan, out)
-    ]
-    if plan.exclusive:
-        jobs = _one_by_one(jobs)
+    jobs: list[Job] = []
+    for run in unfinished_runs(plan, out):
+        needs = run.kind in plan.arms and load_method(run.kind).uses_source_policy
+        after = [Run(SOURCE, run.index).name] if needs and not plan.source_policy else []
+        if plan.exclusive:
+            # No robot moves again once a run has failed.
+            after += [job.name for job in jobs[-1:]]
+        attempts = 1 if plan.exclusive else Job.attempts
+        arguments = (plan, run, str(out), source_policy)
+        jobs.append(Job(run.name, perform_run, arguments, tuple(after), attempts))
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
     found = {run: load_result(plan, out, run) for run in plan.runs()}
@@ -359,6 +355,9 @@ def run_study(
             "share this folder."
         )
     results = tuple(result for result in found.values() if result is not None)
+    # Numbers of seeds at which this study has been evaluated, with the present one.
+    looks = looks_in(out / STUDY_FILE)
+    looks += tuple(sorted(set(looked) - {*looks, plan.seeds}))
     study = Study(
         plan=plan,
         command=command,
@@ -367,18 +366,11 @@ def run_study(
         runs=results,
         source_return=tuple(r.curve[-1].mean_return for r in results if r.run.kind == SOURCE),
         summaries={},
-        looks=_looks(plan, out / STUDY_FILE, looked),
+        looks=looks if looks[-1:] == (plan.seeds,) else (*looks, plan.seeds),
     )
     study = msgspec.structs.replace(study, summaries=_summaries(study))
     write_json(out / STUDY_FILE, study)
     return study
-
-
-def _looks(plan: Plan, before: Path, elsewhere: Sequence[int]) -> tuple[int, ...]:
-    """Numbers of seeds at which this study has been evaluated, with the present one."""
-    looked = looks_in(before)
-    looked += tuple(sorted(set(elsewhere) - {*looked, plan.seeds}))
-    return looked if looked[-1:] == (plan.seeds,) else (*looked, plan.seeds)
 
 
 def looks_in(path: Path) -> tuple[int, ...]:
@@ -428,29 +420,14 @@ def claim_folder(plan: Plan, out: Path) -> None:
 
 
 def _plan_in(out: Path) -> Plan:
-    remedy = "give another --out, or delete that folder to start again; nothing was changed"
-    return read_plan(out, remedy)
+    return read_plan(
+        out, "give another --out, or delete that folder to start again; nothing was changed"
+    )
 
 
 def _digest(policy: Path) -> str:
     """SHA-256 of a file."""
     return hashlib.sha256(policy.read_bytes()).hexdigest()
-
-
-def _after(plan: Plan, run: Run) -> tuple[str, ...]:
-    """Names of the runs that must end before this one."""
-    if run.kind not in plan.arms or plan.source_policy:
-        return ()
-    return (Run(SOURCE, run.index).name,) if load_method(run.kind).uses_source_policy else ()
-
-
-def _one_by_one(jobs: Sequence[Job]) -> list[Job]:
-    """Let each job wait for the one before, so that no robot moves again once a run has failed."""
-    names = ["", *(job.name for job in jobs)]
-    return [
-        replace(job, after=(*job.after, before) if before else job.after, attempts=1)
-        for before, job in zip(names, jobs, strict=False)
-    ]
 
 
 def _summaries(study: Study) -> dict[str, Summary]:
@@ -459,6 +436,8 @@ def _summaries(study: Study) -> dict[str, Summary]:
     curves = {kind: study.curves(kind) for kind in (*NO_SKILL, *plan.arms)}
     scratch = curves["scratch"]
     last_k = min(plan.last_k, scratch.n_evals)
+    shipped = reference_of(plan.task.target)
+    end = None if shipped is None else shipped.end(plan.measure)
     reference = Reference.of(
         {
             "random actions": float(curves["random"].returns.mean()),
@@ -466,7 +445,7 @@ def _summaries(study: Study) -> dict[str, Summary]:
             "untrained policies": float(scratch.returns[:, 0].mean()),
         },
         {arm: float(curves[arm].returns[:, -last_k:].mean()) for arm in plan.arms},
-        _shipped_reference(plan),
+        None if shipped is None or end is None else (shipped.text, end),
     )
     return {
         arm: summarise(
@@ -480,10 +459,3 @@ def _summaries(study: Study) -> dict[str, Summary]:
         for arm in plan.arms
         if arm != "scratch"
     }
-
-
-def _shipped_reference(plan: Plan) -> tuple[str, float] | None:
-    """Name and value of the target's reference, if one ships."""
-    reference = reference_of(plan.task.target)
-    value = None if reference is None else reference.end(plan.measure)
-    return None if reference is None or value is None else (reference.text, value)

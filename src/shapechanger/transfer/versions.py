@@ -7,6 +7,7 @@ NAME" for each arm. Parts without a model and without own files have none.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -29,7 +30,6 @@ from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
 _METHOD: Final = "method "
 _MODELS: Final = "models"
-_SETTINGS: Final = ("learner", "settings")
 
 
 def identities_of_code(settings: object, arms: Sequence[str] = ()) -> Identities:
@@ -48,31 +48,27 @@ def parts_of(plan: Plan, run: Run) -> Identities:
     return {part: each for part, each in plan.identity.items() if part in parts}
 
 
-def shared(mine: Plan, theirs: Plan) -> Iterator[tuple[str, Identity, Identity]]:
-    """Yield the parts that two plans have in common: a title, my identity and theirs."""
+def _common(mine: Plan, theirs: Plan) -> Iterator[tuple[str, str, str]]:
+    """Yield the parts that two plans have in common: a title, and the part in each of them."""
     envs = ("source", "target")
     for part in envs:
         for other in envs:
             ref: EnvRef = getattr(mine.task, part)
             if ref == getattr(theirs.task, other):
-                yield f"{ref}", *_pair(mine, part, theirs, other)
-    if all(getattr(mine, name) == getattr(theirs, name) for name in _SETTINGS):
-        yield f"the learner {mine.learner}", *_pair(mine, LEARNER, theirs, LEARNER)
+                yield f"{ref}", part, other
+    if (mine.learner, mine.settings) == (theirs.learner, theirs.settings):
+        yield f"the learner {mine.learner}", LEARNER, LEARNER
     for arm in (arm for arm in mine.arms if arm in theirs.arms):
-        yield f"the method {arm}", *_pair(mine, _METHOD + arm, theirs, _METHOD + arm)
-
-
-def _pair(mine: Plan, part: str, theirs: Plan, other: str) -> tuple[Identity, Identity]:
-    return mine.identity.get(part, NOTHING), theirs.identity.get(other, NOTHING)
+        yield f"the method {arm}", _METHOD + arm, _METHOD + arm
 
 
 def changes_between(old: Plan, new: Plan, *folders: Path) -> str:
     """Describe how the common parts of two plans differ; empty if they do not."""
-    found = {
-        title: before.changes_to(after, _numbers(before, after, new, folders))
-        for title, after, before in shared(new, old)
-        if before != after
-    }
+    found: dict[str, str] = {}
+    for title, part, other in _common(new, old):
+        before, after = old.identity.get(other, NOTHING), new.identity.get(part, NOTHING)
+        if before != after:
+            found[title] = before.changes_to(after, _numbers(before, after, new, folders))
     return "; ".join(f"{title}: {words}" for title, words in found.items())
 
 
@@ -82,23 +78,14 @@ def _numbers(
     """Return the differences of two models as far as their numbers can be found."""
     if not (before.model and after.model):
         return ()
-    old = _kept(before, folders)
-    present = _kept(after, folders) or next(
-        (each.numbers for each in _present(new) if each.identity.model == after.model), b""
-    )
-    try:
+    old, present = _kept(before, folders), _kept(after, folders)
+    for ref in (new.task.source, new.task.target):
+        with suppress(ShapechangerError):  # An env that cannot be made.
+            if not present and (found := identify(ref)).identity.model == after.model:
+                present = found.numbers
+    with suppress(msgspec.MsgspecError):  # Only words of a message are lost.
         return model_changes(old, present) if old and present else ()
-    except msgspec.MsgspecError:  # Only words of a message are lost.
-        return ()
-
-
-def _present(plan: Plan) -> Iterator[IdentifiedEnv]:
-    """Yield the present versions of a plan's envs, as far as they can be made."""
-    for ref in (plan.task.source, plan.task.target):
-        try:
-            yield identify(ref)
-        except ShapechangerError:
-            continue
+    return ()
 
 
 def _kept(identity: Identity, folders: Sequence[Path]) -> bytes:
@@ -144,12 +131,10 @@ def require_planned(plan: Plan, run: Run) -> None:
     arms = [run.kind] if _METHOD + run.kind in parts else []
     code = identities_of_code(plan.settings, arms)
     found = {part: each for part, each in code.items() if part in parts}
-    for part in ("source", "target"):
-        # A robot is not connected to once more.
-        if part in parts and not (plan.exclusive and part == "target"):
-            ref: EnvRef = getattr(plan.task, part)
-            found[part] = identify(ref).identity
-        elif part in parts:
-            found[part] = parts[part]
+    for part, ref in (("source", plan.task.source), ("target", plan.task.target)):
+        if part in parts:
+            # A robot is not connected to once more.
+            is_robot = plan.exclusive and part == "target"
+            found[part] = parts[part] if is_robot else identify(ref).identity
     remedy = "Restore it and run the same command again, or start again with another --out."
     require_versions(plan, parts, found, remedy)
