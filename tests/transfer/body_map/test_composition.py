@@ -45,13 +45,17 @@ def test_composition_multiplies_scales_and_joins_reasons() -> None:
         pendulum_observation(),
         motors,
         motors,
-        rules={"hinge/angle": Copy("hinge/angle", -2.0), "hinge/velocity": Hold(3.0)},
+        rules={
+            "hinge/angle": Copy("hinge/angle", -2.0),
+            "hinge/velocity": Hold(3.0),
+            "slider/velocity": "zero",
+        },
     )
     both = first.then(second)
     assert [entry.rule for entry in both.observation] == [
         Copy("slider/position"),
         Copy("hinge/angle", -2.0),
-        Copy("slider/velocity"),
+        Zero(),
         Hold(3.0),
     ]
     assert both.observation[0].why == "same name"

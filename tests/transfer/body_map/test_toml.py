@@ -57,6 +57,7 @@ def test_exact_rules_are_not_checked() -> None:
     text = 'units = "exact"\n[action]\n"foot_*/motor" = { hold = 3.0 }'
     built = BodyMap.from_toml(text, *GROWN)
     assert {e.rule for e in built.action if e.feature.startswith("foot")} == {Hold(3.0)}
+    assert BodyMap.from_toml(built.to_toml(), *GROWN) == built
 
 
 def test_the_text_is_short() -> None:
