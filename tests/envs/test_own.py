@@ -38,7 +38,7 @@ from shapechanger.morphology import (
 )
 from shapechanger.transfer.body_map import BodyMap
 from tests.envs.own_robots import DOG, Move, Nonsense, Rear
-from tests.morphology.edits.test_rigging import URDF
+from tests.morphology.models import URDF
 
 REAR = "tests.envs.own_robots:Rear"
 

@@ -20,8 +20,7 @@ from shapechanger.morphology import (
     TotalMass,
     compile_body,
 )
-from tests.morphology.edits.test_rigging import URDF
-from tests.morphology.models import LEG
+from tests.morphology.models import LEG, URDF
 
 # A pyramid, as a mesh.
 _OBJ = "v 0 0 0\nv .2 0 0\nv 0 .2 0\nv 0 0 .2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

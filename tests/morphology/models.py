@@ -76,6 +76,23 @@ GANTRY = """
 </mujoco>
 """
 
+# An arm of two joints on a base, as URDF: the second joint states no effort.
+URDF = """
+<robot name="arm">
+  <link name="base"><inertial><mass value="2"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size=".2 .2 .2"/></geometry></collision></link>
+  <link name="upper"><inertial><mass value="1"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><mass value="1"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="7" velocity="1"/></joint>
+  <joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0 0 .3"/><axis xyz="0 1 0"/></joint>
+</robot>
+"""
+
 
 def spec_of(text: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(text)

@@ -70,7 +70,7 @@ def test_other_json_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("kind", ["strech", "", None, 3, ["stretch"]])
 def test_unknown_kinds_are_refused(kind: object) -> None:
-    with pytest.raises(UnknownName, match=r"No edit matches .* There are: joint_range, lock, cut"):
+    with pytest.raises(UnknownName, match=r"No edit matches .* There are: joint_range, lock, add"):
         from_json(json.dumps([{"edit": kind, "body": "shin"}]))
     with pytest.raises(UnknownName, match=r"Did you mean 'stretch'\?"):
         from_json('[{"edit":"strech"}]')
@@ -94,13 +94,13 @@ def test_unknown_fields_are_refused() -> None:
         ({"edit": "stretch", "body": "shin", "factor": "2"}, "stretch: Expected `float`"),
         ({"edit": "stretch", "body": "shin", "factor": None}, "stretch: Expected `float`"),
         ({"edit": "stretch", "body": "shin", "factor": 2, "axis": "w"}, "stretch: .*'w'"),
-        ({"edit": "stretch", "body": "shin", "factor": -2}, "stretch: The factor of a stretch"),
-        ({"edit": "stretch", "body": "shin", "factor": 2, "amount": 2}, "stretch: amount must be"),
+        ({"edit": "stretch", "body": "shin", "factor": -2}, "stretch: Expected `float` >= 0.01"),
+        ({"edit": "stretch", "body": "shin", "factor": 2, "amount": 2}, "stretch: .* <= 1.0"),
         ({"edit": "gravity", "to": [0, -9.81]}, "gravity: Expected `array` of length 3"),
         ({"edit": "gravity", "to": [0, 0, -300]}, "gravity: Gravity is at most 250"),
         ({"edit": "mass", "element": "*"}, "mass: Mass takes either scale or to"),
         ({"edit": "mass", "element": "*", "scale": 2, "to": 3}, "mass: Mass takes either scale"),
-        ({"edit": "split", "body": "a", "name": "b", "at": 1}, "split: A segment is split between"),
+        ({"edit": "split", "body": "a", "name": "b", "at": 1}, "split: Expected `float` < 1.0"),
     ],
 )
 def test_invalid_fields_are_refused(fields: dict[str, Any], message: str) -> None:
@@ -112,9 +112,9 @@ def test_invalid_fields_are_refused(fields: dict[str, Any], message: str) -> Non
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
 def test_infinite_numbers_are_refused(number: str) -> None:
     """NaN and infinity are refused, although Python's parser accepts them."""
-    with pytest.raises(MorphologyError, match="stretch: The factor of a stretch must be a ratio"):
+    with pytest.raises(MorphologyError, match="stretch: "):
         from_json(f'[{{"edit":"stretch","body":"shin","factor":{number}}}]')
-    with pytest.raises(MorphologyError, match="lock: A joint cannot be locked at"):
+    with pytest.raises(MorphologyError, match="lock: position of Lock: Expected a finite number"):
         from_json(f'[{{"edit":"lock","joint":"hip","position":{number}}}]')
 
 

@@ -27,10 +27,15 @@ from shapechanger.morphology.body import (
     to_json,
 )
 from shapechanger.morphology.edits import EDITS, Edit
-from shapechanger.morphology.edits.joints import JointRange, Lock
+from shapechanger.morphology.edits.joints import AddFreeJoint, AddMotor, JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
-from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
-from shapechanger.morphology.edits.rigging import AddFloor, AddFreeJoint, AddMotor
+from shapechanger.morphology.edits.places import (
+    AddFloor,
+    PlaceBody,
+    PlaceGeom,
+    StartHeight,
+    TotalMass,
+)
 from shapechanger.morphology.edits.values import (
     Damping,
     Density,
@@ -39,7 +44,6 @@ from shapechanger.morphology.edits.values import (
     Gravity,
     Mass,
     Radius,
-    StartHeight,
     Stiffness,
     Stretch,
 )

@@ -19,8 +19,8 @@ import numpy as np
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
 from shapechanger.morphology.edits import EDITS, Edit
 from shapechanger.morphology.edits.edit import part_of_the_way
-from shapechanger.morphology.spec.carried import Carried
-from shapechanger.morphology.spec.explicit import make_explicit
+from shapechanger.morphology.spec.carried import carried
+from shapechanger.morphology.spec.elements import make_explicit
 
 Body = tuple[Edit, ...]
 """The edits, in order, that make a body from the model of its family."""
@@ -165,12 +165,11 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
     if not effective:
         return result
     make_explicit(result)
-    carried = Carried(result)
-    for edit in effective:
-        edit.require_effect(result)
-        edit.apply(result)
-        edit.follow_in_keyframes(result, carried.keyframes)
-    carried.put_back(result)
+    with carried(result) as keyframes:
+        for edit in effective:
+            edit.require_effect(result)
+            edit.apply(result)
+            edit.follow_in_keyframes(result, keyframes)
     return result
 
 

@@ -27,10 +27,6 @@ def test_edits_are_values() -> None:
         edit.factor = 3.0  # type: ignore[misc]
 
 
-def test_amounts_multiply() -> None:
-    assert Mass("*", scale=2.0).partly(0.5).partly(0.5) == Mass("*", scale=2.0, amount=0.25)
-
-
 def test_the_base_class_is_abstract() -> None:
     with pytest.raises(NotImplementedError):
         Edit().apply(leg())

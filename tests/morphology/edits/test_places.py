@@ -1,14 +1,25 @@
-"""Edits that place one body or geom, and that set the total mass."""
+"""Edits that place one body, geom or floor, and that set the total mass."""
 
 from __future__ import annotations
 
 import math
 
+import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology import Mass, PlaceBody, PlaceGeom, TotalMass
+from shapechanger.morphology import (
+    AddFloor,
+    AddFreeJoint,
+    Mass,
+    PlaceBody,
+    PlaceGeom,
+    StartHeight,
+    TotalMass,
+    compile_body,
+)
 from tests.morphology.models import (
+    URDF,
     ant,
     built,
     capsule_inertia,
@@ -16,6 +27,7 @@ from tests.morphology.models import (
     leg,
     limb,
     posed,
+    spec_of,
     tip,
 )
 
@@ -97,3 +109,20 @@ def test_the_total_mass_is_set() -> None:
     np.testing.assert_allclose(after.body_inertia, factor * before.body_inertia, rtol=1e-9)
     half = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0, amount=0.5))
     assert half.body_mass.sum() == pytest.approx(0.5 * (14.0 + before.body_mass.sum()))
+
+
+def test_the_trunk_starts_higher() -> None:
+    model = built(leg(), StartHeight("trunk", 1.7))
+    np.testing.assert_array_equal(model.body("trunk").pos, [0.0, 0.0, 1.7])
+    assert model.qpos0[2] == 1.7
+    assert built(leg(), StartHeight("trunk", 2.0).partly(0.5)).qpos0[2] == 1.5
+
+
+def test_a_robot_lands_on_its_floor() -> None:
+    """The box of 0.2 m comes to rest 0.1 m above it."""
+    body = (AddFreeJoint("base"), StartHeight("base", 0.7), AddFloor(friction=0.5, height=0.5))
+    model = compile_body(spec_of(URDF), body)
+    assert model.geom("floor").friction[0] == 0.5
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=500)
+    assert data.qpos[2] == pytest.approx(0.6, abs=0.01)

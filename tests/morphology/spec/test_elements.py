@@ -1,18 +1,22 @@
-"""Selection and naming of elements."""
+"""Selection and naming of elements, and what is written out: frames and a total mass."""
 
 from __future__ import annotations
 
+import math
+import warnings
+
+import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import name_elements
+from shapechanger.morphology import AddLimb, Cut, Mass, Stretch, name_elements, reshape
 from shapechanger.morphology.spec.elements import (
-    limbs_and_trunks,
-    require_free_name,
-    require_limb,
+    make_explicit,
+    resolve_frames,
     select,
 )
-from tests.morphology.models import ant, leg, spec_of
+from tests.morphology.models import ant, built, differing, leg, mass, posed, spec_of
+from tests.morphology.scenes import asset_spec
 
 _NAMELESS = """
 <mujoco>
@@ -38,35 +42,16 @@ def test_a_name_is_preferred_to_a_pattern() -> None:
         "<mujoco><worldbody><body name='a*'><geom size='.1'/></body>"
         "<body name='ab'><geom size='.1'/></body></worldbody></mujoco>"
     )
-    assert [b.name for b in select("body", "a*", limbs_and_trunks(spec))] == ["a*"]
-    assert [b.name for b in select("body", "a?", limbs_and_trunks(spec))] == ["a*", "ab"]
+    assert [b.name for b in select("body", "a*", spec.bodies[1:])] == ["a*"]
+    assert [b.name for b in select("body", "a?", spec.bodies[1:])] == ["a*", "ab"]
 
 
 def test_globs_select_in_model_order() -> None:
     """Matching is case-sensitive."""
-    found = select("body", "shank_[14]", limbs_and_trunks(ant()))
+    found = select("body", "shank_[14]", ant().bodies[1:])
     assert [body.name for body in found] == ["shank_1", "shank_4"]
     with pytest.raises(UnknownName, match=r"No body matches 'Shank_1'\. Did you mean 'shank_1'"):
-        select("body", "Shank_1", limbs_and_trunks(ant()))
-
-
-def test_trunks_are_no_limbs() -> None:
-    spec = leg()
-    require_limb(spec.body("thigh"), "cut")
-    with pytest.raises(MorphologyError, match=r"'trunk' is the trunk .* its limbs can: thigh\."):
-        require_limb(spec.body("trunk"), "cut")
-    lone = spec_of("<mujoco><worldbody><body name='ball'/></worldbody></mujoco>")
-    with pytest.raises(MorphologyError, match="its limbs can: it has none"):
-        require_limb(lone.body("ball"), "removed")
-
-
-@pytest.mark.parametrize(
-    ("kind", "name"),
-    [("body", "thigh"), ("joint", "hip"), ("geom", "floor"), ("actuator", "knee"), ("body", "")],
-)
-def test_new_names_must_be_unused(kind: str, name: str) -> None:
-    with pytest.raises(MorphologyError, match=f"A new {kind} needs an unused name, got '{name}'"):
-        require_free_name(leg(), kind, name)
+        select("body", "Shank_1", ant().bodies[1:])
 
 
 def test_all_elements_get_unique_names() -> None:
@@ -86,3 +71,138 @@ def test_all_elements_get_unique_names() -> None:
     assert [site.name for site in spec.sites] == ["world_part_site"]
     assert [camera.name for camera in spec.cameras] == ["world_part_camera"]
     assert [actuator.name for actuator in spec.actuators] == ["knee", "knee_2", "m"]
+
+
+# Every element that frames can hold, in nested frames, in degrees.
+_FRAMES = """
+<mujoco>
+  <worldbody>
+    <frame name="stand" pos="0 0 1" euler="0 0 90">
+      <body name="trunk" pos=".1 0 0" euler="0 30 0">
+        <freejoint name="root"/>
+        <geom name="trunk" type="box" size=".2 .1 .05"/>
+        <frame pos="0 .1 0" axisangle="1 1 0 40">
+          <geom name="ends" type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
+          <geom name="beam" type="box" fromto="0 0 0 .1 .2 .1" size=".02"/>
+          <geom name="pose" type="capsule" pos="0 .1 0" euler="10 20 30" size=".01 .1"/>
+          <site name="ends" type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
+          <site name="pose" pos=".1 .1 .1"/>
+          <camera name="eye" pos="1 0 0" xyaxes="0 1 0 0 0 1"/>
+          <light name="lamp" pos="0 0 1" dir="1 0 -1"/>
+          <frame pos=".3 0 0" quat="1 2 0 0">
+            <body name="limb" pos="0 .2 0" euler="10 0 0">
+              <geom name="limb" type="capsule" fromto="0 0 0 0 .3 0" size=".03"/>
+              <frame pos=".1 .02 0" euler="0 0 20"><joint name="hip" axis="1 0 0"/></frame>
+              <joint name="twist" axis="0 0 1"/>
+            </body>
+          </frame>
+        </frame>
+      </body>
+    </frame>
+    <light name="sun" pos="0 0 3"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_frames_are_resolved() -> None:
+    """Poses become relative to the body, and the compiled model does not change."""
+    spec = spec_of(_FRAMES)
+    before = built(spec)
+    resolve_frames(spec)
+    after = built(spec)
+    # The rotation of a capsule about its axis affects only its bounding box.
+    boxes = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid", "geom_aabb", "geom_quat")
+    for field in differing(before, after, ignoring=(*boxes, "site_quat")):
+        np.testing.assert_allclose(
+            getattr(after, field), getattr(before, field), rtol=1e-9, atol=1e-12, err_msg=field
+        )
+    for name in ("trunk", "beam", "pose"):
+        np.testing.assert_allclose(after.geom(name).quat, before.geom(name).quat, atol=1e-12)
+    for name in ("ends", "limb"):
+        places = [posed(model).geom(name).xmat[[2, 5, 8]] for model in (before, after)]
+        np.testing.assert_allclose(places[0], places[1], atol=1e-12)
+    assert all(not np.any(frame.pos) for frame in spec.frames)
+    once = built(spec)
+    resolve_frames(spec)
+    assert differing(once, built(spec)) == []
+
+
+def test_stretches_ignore_the_axes_of_frames() -> None:
+    """A limb in a rotated frame moves along the trunk's axis."""
+    spec = spec_of(
+        """<mujoco><worldbody><body name="trunk"><geom type="box" size=".1 .2 .3"/>
+        <frame euler="0 0 90"><body name="limb" pos=".2 0 0"><geom size=".1"/></body></frame>
+        </body></worldbody></mujoco>"""
+    )
+    np.testing.assert_allclose(built(spec).body("limb").pos, [0.0, 0.2, 0.0], atol=1e-12)
+    model = built(spec, Stretch("trunk", 2.0, axis="y"))
+    np.testing.assert_allclose(model.body("limb").pos, [0.0, 0.4, 0.0], atol=1e-12)
+
+
+def test_copied_limbs_have_poses_relative_to_their_body() -> None:
+    """Later cuts and stretches use the position of the copy."""
+    spec = leg()
+    turned = built(spec, AddLimb("thigh", "_2", math.pi / 2.0), Stretch("trunk", 2.0, axis="x"))
+    np.testing.assert_allclose(turned.body("thigh_2").pos, [-0.4, 0.0, 0.0], atol=1e-12)
+    fixed = spec_of(
+        """<mujoco><worldbody><body name="base"><geom size=".1"/>
+        <body name="arm"><joint name="arm"/><geom type="capsule" fromto="0 0 0 1 0 0" size=".1"/>
+        <body name="hand" pos=".9 0 0"><joint name="hand"/><geom name="hand" size=".1"/></body>
+        </body></body></worldbody></mujoco>"""
+    )
+    kept = built(fixed, AddLimb("hand", "_2", math.pi), Cut("arm", 0.5))
+    assert [kept.body(i).name for i in range(kept.nbody)] == ["world", "base", "arm", "hand_2"]
+
+
+@pytest.mark.parametrize("scaling", ['scale="2"', 'scale="2" massscale="1"'])
+def test_frames_that_scale_are_refused(scaling: str) -> None:
+    text = f"""<mujoco><worldbody><frame name="big" {scaling}><body name="b"><joint/>
+    <geom size=".1"/></body></frame></worldbody></mujoco>"""
+    with pytest.raises(MorphologyError, match="The frame 'big' scales its elements: write the"):
+        built(spec_of(text), Mass("b", scale=2.0))
+
+
+def test_a_total_mass_does_not_undo_an_edit() -> None:
+    """`settotalmass` of the half cheetah is resolved before edits of masses."""
+    spec = asset_spec("half_cheetah")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # MuJoCo warns about total masses.
+        before = spec.copy().compile()
+    make_explicit(spec)
+    after = built(spec)
+    for field in differing(before, after):
+        np.testing.assert_allclose(
+            getattr(after, field), getattr(before, field), rtol=1e-9, atol=1e-12, err_msg=field
+        )
+    heavier = built(asset_spec("half_cheetah"), Mass("torso", scale=2.0))
+    assert mass(heavier) == pytest.approx(14.0 + mass(before, "torso"))
+    assert mass(built(asset_spec("half_cheetah"), Mass("*", to=0.5))) == pytest.approx(3.5)
+
+
+def test_a_total_mass_scales_explicit_inertias() -> None:
+    spec = spec_of(
+        """<mujoco><compiler settotalmass="10"/><worldbody>
+        <body name="a"><freejoint/><geom type="capsule" size=".1 .2" mass="1"/>
+        <body name="b"><inertial pos="0 0 0" mass="3" diaginertia=".1 .2 .2"/></body></body>
+        </worldbody></mujoco>"""
+    )
+    make_explicit(spec)
+    model = built(spec)
+    assert mass(model, "a") == pytest.approx(2.5)
+    assert mass(model, "b") == pytest.approx(7.5)
+    np.testing.assert_allclose(sorted(model.body("b").inertia), [0.25, 0.5, 0.5])
+
+
+def test_generated_names_can_be_edited() -> None:
+    """Models that were loaded without a family have generated names."""
+    model = built(asset_spec("ant"), Stretch("ankle_1", 2.0))
+    assert model.geom("left_ankle_geom").size[1] == pytest.approx(0.4 * math.sqrt(2.0))
+    assert "ankle_1" not in [body.name for body in asset_spec("ant").bodies]
+
+
+def test_a_model_without_edits_is_unchanged() -> None:
+    """Without edits, or with an amount of 0, frames are not resolved."""
+    spec = spec_of(_FRAMES)
+    assert any(np.any(frame.pos) for frame in reshape(spec, ()).frames)
+    assert any(np.any(f.pos) for f in reshape(spec, [Stretch("limb", 2.0, amount=0.0)]).frames)

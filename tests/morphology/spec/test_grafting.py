@@ -1,4 +1,4 @@
-"""Copying and moving of limbs in models with many kinds of references."""
+"""Copying and moving of limbs, with assets and many kinds of references."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import AddLimb, Split
-from shapechanger.morphology.spec.grafting import copy_geom, copy_limb
+from shapechanger.morphology.spec.grafting import copy_element, copy_limb
 from tests.morphology.models import built, spec_of
 from tests.morphology.scenes import EVERYTHING
 
-# A limb with every kind of reference to it, and with its own assets and defaults.
-_REFERRED_TO = """
+_WITH_ASSETS = """
 <mujoco>
   <compiler angle="radian"/>
   <asset>
@@ -22,13 +21,11 @@ _REFERRED_TO = """
   </asset>
   <default><default class="leg"><geom density="500"/><joint damping="3"/></default></default>
   <worldbody>
-    <geom name="floor" type="plane" size="5 5 1"/>
     <body name="trunk" pos="0 0 1"><freejoint name="root"/>
       <geom name="trunk" type="box" size=".2 .1 .05"/>
       <body name="thigh" pos="0 .2 0" childclass="leg">
         <joint name="hip" axis="1 0 0" range="-1 1"/>
         <geom name="thigh" type="capsule" fromto="0 0 0 0 .3 0" size=".03" material="red"/>
-        <site name="palm" pos="0 .3 0"/>
         <body name="shin" pos="0 .3 0">
           <joint name="knee" axis="1 0 0" range="-1 1"/>
           <geom name="shin" type="capsule" fromto="0 0 0 0 .3 0" size=".03" material="red"/>
@@ -37,39 +34,14 @@ _REFERRED_TO = """
           <camera name="eye"/><light name="lamp"/>
         </body>
       </body>
-      <body name="wing" pos="0 -.2 0">
-        <joint name="flap" axis="1 0 0" range="-1 1"/>
-        <geom name="wing" type="capsule" fromto="0 0 0 0 -.3 0" size=".03"/>
-      </body>
     </body>
   </worldbody>
-  <contact>
-    <exclude name="apart" body1="trunk" body2="shin"/><pair name="p" geom1="floor" geom2="shin"/>
-  </contact>
-  <tendon>
-    <fixed name="sum"><joint joint="knee" coef="1"/><joint joint="flap" coef="-2"/></fixed>
-    <spatial name="rope"><site site="palm"/><site site="tip"/></spatial>
-  </tendon>
-  <equality>
-    <joint name="couple" joint1="knee" joint2="flap"/>
-    <weld name="weld" body1="shin" body2="wing" active="false"/>
-  </equality>
-  <actuator>
-    <motor name="knee" joint="knee" gear="3"/><motor name="hip" joint="hip" gear="2"/>
-    <motor name="flap" joint="flap"/><motor name="tie" tendon="sum"/>
-    <motor name="jet" site="tip" gear="0 0 1 0 0 0"/>
-  </actuator>
-  <sensor>
-    <jointpos name="angle" joint="knee"/><touch name="touch" site="tip"/>
-    <framepos name="place" objtype="body" objname="shin"/>
-    <actuatorpos name="drive" actuator="knee"/><tendonpos name="length" tendon="rope"/>
-  </sensor>
 </mujoco>
 """
 
 
 def test_a_copied_limb_shares_the_assets() -> None:
-    spec = spec_of(_REFERRED_TO)
+    spec = spec_of(_WITH_ASSETS)
     before = built(spec)
     for suffix, angle in (("_2", 2.0), ("_3", 4.0)):
         copy = copy_limb(spec, spec.body("thigh"), suffix, angle)
@@ -111,7 +83,7 @@ def test_a_copied_geom_equals_the_original() -> None:
         fluidcoef=".6 .3 1.6 1.1 1.2"/></body>
         <body name="b"><freejoint/></body></worldbody></mujoco>"""
     )
-    copy_geom(spec, spec.geom("a"), spec.body("b"), "b")
+    copy_element(spec, spec.geom("a"), spec.body("b"), "b")
     model = built(spec)
     for field in [name for name in dir(model) if name.startswith("geom_")]:
         if field not in ("geom_bodyid",):
@@ -119,4 +91,4 @@ def test_a_copied_geom_equals_the_original() -> None:
             np.testing.assert_array_equal(second, first, err_msg=field)
     np.testing.assert_array_equal(model.body("b").inertia, model.body("a").inertia)
     with pytest.raises(MorphologyError, match="A new geom needs an unused name"):
-        copy_geom(spec, spec.geom("a"), spec.body("b"), "b")
+        copy_element(spec, spec.geom("a"), spec.body("b"), "b")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import Lock, Remove, compile_body
+from shapechanger.morphology import Lock
 from tests.morphology.models import built, gantry, spec_of
 from tests.morphology.scenes import asset_spec
 
@@ -74,19 +73,3 @@ def test_tendons_over_sites_do_not_tie_joints() -> None:
     rest = '<actuator><motor tendon="rope"/></actuator><sensor><tendonpos tendon="rope"/></sensor>'
     model = built(spec_of(_TIED.format(tendon="", rest=rest)), Lock("b", 0.1))
     assert (model.ntendon, model.nu, model.nsensor) == (1, 1, 1)
-
-
-def test_cameras_and_lights_look_at_the_parent_of_a_removed_limb() -> None:
-    """What they were aimed at is gone."""
-    spec = mujoco.MjSpec.from_string(
-        """<mujoco><worldbody>
-        <body name="trunk"><geom size="0.1"/>
-          <body name="leg"><joint/><geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.02"/></body>
-        </body>
-        <camera name="eye" mode="targetbody" target="leg" pos="1 0 0"/>
-        <light mode="targetbody" target="leg" pos="0 0 2"/></worldbody></mujoco>"""
-    )
-    model = compile_body(spec, (Remove("leg"),))
-    trunk = model.body("trunk").id
-    assert model.cam_targetbodyid.tolist() == [trunk]
-    assert model.light_targetbodyid.tolist() == [trunk]

@@ -6,32 +6,34 @@ bodies, where it makes the path continuous (see `shapechanger.morphology.body.in
 
 from __future__ import annotations
 
+import functools
 import math
 import re
-from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar
 
 import msgspec
 import mujoco
 import numpy as np
-from msgspec.structs import force_setattr
+from msgspec.structs import FieldInfo, force_setattr
 
 from shapechanger.errors import MorphologyError
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.carried import Keyframes
 
-Vector = tuple[float, float, float]
 _N = TypeVar("_N", float, np.ndarray)
+
+Vector = tuple[float, float, float]
+# A limb a hundred times longer or shorter is a typing mistake, and the softness of MuJoCo's
+# contacts, which is absolute, does not fit it.
+Ratio = Annotated[float, msgspec.Meta(ge=0.01, le=100.0)]
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
 EDITS: Final[dict[str, type[Edit]]] = {}
 """The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` enters itself."""
 
 # Of modules whose kinds of edits cannot be replaced.
 _SHIPPED: Final = "shapechanger."
-# A limb a hundred times longer or shorter is a typing mistake, and the softness of MuJoCo's
-# contacts, which is absolute, does not fit it.
-_SMALLEST_FACTOR: Final = 0.01
-_LARGEST_FACTOR: Final = 100.0
 
 
 def _tag(class_name: str) -> str:
@@ -52,19 +54,20 @@ class Edit(
     """One change to a model.
 
     A subclass with an `apply` is known to JSON by the snake case of its name, as worker processes
-    and files need, once its module is imported.
+    and files need, once its module is imported. The types of its fields, with their bounds as
+    `msgspec.Meta`, are checked when an edit is made.
 
     Attributes:
         amount: Share of the change that is made, 0 (none) to 1 (all).
         needs: Flag of the model that disables what the edit changes, and the word for it.
 
     Raises:
-        MorphologyError: If the amount, or a number of the edit, is out of its range; of a subclass,
-            if another one has its name.
+        MorphologyError: If a field has the wrong type, or a number is not finite or out of its
+            range; of a subclass, if another one has its name.
     """
 
     needs: ClassVar[tuple[mujoco.mjtDisableBit, str] | None] = None
-    amount: float = 1.0
+    amount: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 1.0
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
@@ -81,19 +84,26 @@ class Edit(
         EDITS[tag] = cls
 
     def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
-            value: Any = getattr(self, name)
+        for field in _fields(type(self)):
+            value: Any = getattr(self, field.name)
             if isinstance(value, np.generic | np.ndarray):
-                force_setattr(self, name, _as_python(value))
-        try:
-            if not 0.0 <= self.amount <= 1.0:  # Also refuses NaN.
-                raise MorphologyError(f"amount must be between 0 and 1, got {self.amount}.")
-            self.check()
-        except TypeError as error:
-            raise MorphologyError(f"A value has the wrong type in {self}.") from error
+                value = value.tolist()
+            if isinstance(value, list):
+                value = tuple(value)
+            force_setattr(self, field.name, value)
+            try:
+                msgspec.convert(value, field.type)
+                reason = "" if _is_finite(value) else "Expected a finite number"
+            except msgspec.ValidationError as error:
+                reason = str(error)
+            if reason:
+                raise MorphologyError(
+                    f"{field.name} of {type(self).__name__}: {reason}, got {value!r}."
+                )
+        self.check()
 
     def check(self) -> None:
-        """Refuse numbers out of range; subclasses override it."""
+        """Refuse values that do not fit each other; subclasses override it."""
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change `spec` in place.
@@ -115,9 +125,6 @@ class Edit(
     def require_effect(self, spec: mujoco.MjSpec) -> None:
         """Refuse an edit of something that the model's options switch off.
 
-        Args:
-            spec: The specification.
-
         Raises:
             MorphologyError: If the edit would change nothing.
         """
@@ -132,10 +139,14 @@ class Edit(
         return msgspec.structs.replace(self, amount=self.amount * alpha)
 
 
-def _as_python(value: Any) -> Any:
-    """Return a NumPy scalar as a Python number, and an array as a tuple of them."""
-    plain = value.tolist()
-    return tuple(cast("list[Any]", plain)) if isinstance(plain, list) else plain
+@functools.cache
+def _fields(kind: type[Edit]) -> tuple[FieldInfo, ...]:
+    return msgspec.structs.fields(kind)
+
+
+def _is_finite(value: Any) -> bool:
+    numbers: Any = value if isinstance(value, tuple) else (value,)
+    return all(math.isfinite(number) for number in numbers if isinstance(number, float))
 
 
 def part_of_the_way(old: _N, new: _N, amount: float) -> _N:
@@ -143,36 +154,11 @@ def part_of_the_way(old: _N, new: _N, amount: float) -> _N:
     return new if amount == 1.0 else old + amount * (new - old)
 
 
-def require_factor(name: str, value: float) -> None:
-    """Refuse a ratio that is zero, negative, NaN or out of range.
-
-    Args:
-        name: Name of the ratio, for the message.
-        value: The ratio.
+def require_gear(gear: float | None) -> None:
+    """Refuse a gear of zero.
 
     Raises:
-        MorphologyError: Unless `value` lies between 0.01 and 100.
+        MorphologyError: If it is zero.
     """
-    if not _SMALLEST_FACTOR <= value <= _LARGEST_FACTOR:  # Also refuses NaN.
-        raise MorphologyError(
-            f"{name} must be a ratio between {_SMALLEST_FACTOR:g} and {_LARGEST_FACTOR:g}, "
-            f"got {value}."
-        )
-
-
-def require_vector(name: str, value: Vector, *, nonzero: bool = True) -> None:
-    """Refuse anything but three finite numbers.
-
-    Args:
-        name: Name of the vector, for the message.
-        value: The vector.
-        nonzero: Whether to refuse a vector of zeros, which has no direction.
-
-    Raises:
-        MorphologyError: If `value` is anything else.
-    """
-    given: Any = value  # Not checked at run time.
-    if not isinstance(given, tuple) or len(value) != 3 or not all(map(math.isfinite, value)):
-        raise MorphologyError(f"{name} must be a tuple of three finite numbers, got {value}.")
-    if nonzero and not any(value):
-        raise MorphologyError(f"{name} must not be zero.")
+    if gear == 0.0:
+        raise MorphologyError(f"A motor needs a gear that is not zero, got {gear}.")

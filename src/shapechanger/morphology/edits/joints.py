@@ -1,20 +1,32 @@
-"""Edits of joints: their range, and locking them."""
+"""Edits of joints: their range, locks, motors, and the freedom of a body that is fixed.
+
+A URDF file has no motors and is fixed to the world: `AddMotor` and `AddFreeJoint` make a robot of
+it that can be run.
+"""
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar, Final
 
 import mujoco
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import Edit, part_of_the_way
-from shapechanger.morphology.spec.elements import select
-from shapechanger.morphology.spec.positions import displace, limits, reference_of, set_limits
-from shapechanger.morphology.spec.references import remove_joint
+from shapechanger.morphology.edits.edit import Edit, part_of_the_way, require_gear
+from shapechanger.morphology.spec.elements import require_free_name, select
+from shapechanger.morphology.spec.joints import (
+    add_motor,
+    displace,
+    limits,
+    reference_of,
+    set_limits,
+)
+from shapechanger.morphology.spec.references import OF_JOINTS, remove_joint
 
 # MuJoCo needs a range above zero; that of a partly locked joint is at least this.
 _NARROWEST_RAD: Final = 1e-3
+_MOVES_ONE_WAY: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+# A motor that exists in part is never weaker than this share.
+_WEAKEST_PART: Final = 0.01
 
 
 class JointRange(Edit, frozen=True):
@@ -35,9 +47,8 @@ class JointRange(Edit, frozen=True):
 
     def check(self) -> None:
         """Refuse an empty range, or none at all."""
-        limits = [x for x in (self.lower, self.upper) if x is not None]
-        if not limits or not all(math.isfinite(x) for x in limits):
-            raise MorphologyError(f"A joint range needs a finite lower or upper limit, got {self}.")
+        if self.lower is None and self.upper is None:
+            raise MorphologyError(f"A joint range needs a lower or upper limit, got {self}.")
         if self.lower is not None and self.upper is not None and not self.lower < self.upper:
             raise MorphologyError(f"The lower limit must be below the upper one, got {self}.")
 
@@ -46,7 +57,13 @@ class JointRange(Edit, frozen=True):
         for joint in select("joint", self.joint, spec.joints):
             old = limits(joint)
             if old is None:
-                old = self._far_limits(joint)
+                if self.lower is None or self.upper is None:
+                    raise MorphologyError(
+                        f"{joint.name!r} slides without limits: give both of them."
+                    )
+                # The smaller the amount, the wider.
+                reach = (self.upper - self.lower) / self.amount
+                old = self.lower - reach, self.upper + reach
             new = [
                 o if n is None else part_of_the_way(o, n, self.amount)
                 for o, n in zip(old, (self.lower, self.upper), strict=True)
@@ -56,17 +73,6 @@ class JointRange(Edit, frozen=True):
                     f"The range of {joint.name!r} would be {new[0]:.4g} to {new[1]:.4g}."
                 )
             set_limits(joint, *new)
-
-    def _far_limits(self, joint: mujoco.MjsJoint) -> tuple[float, float]:
-        """Return limits for a slide without limits: the smaller the amount, the wider.
-
-        Raises:
-            MorphologyError: If the edit gives one limit only.
-        """
-        if self.lower is None or self.upper is None:
-            raise MorphologyError(f"{joint.name!r} slides without limits: give both of them.")
-        reach = (self.upper - self.lower) / self.amount
-        return self.lower - reach, self.upper + reach
 
 
 class Lock(Edit, frozen=True):
@@ -84,11 +90,6 @@ class Lock(Edit, frozen=True):
     joint: str
     position: float | None = None
 
-    def check(self) -> None:
-        """Refuse a position that is not a finite number."""
-        if self.position is not None and not math.isfinite(self.position):
-            raise MorphologyError(f"A joint cannot be locked at {self.position}.")
-
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Lock every joint that fits."""
         joints = select("joint", self.joint, spec.joints)
@@ -105,11 +106,8 @@ class Lock(Edit, frozen=True):
             position, far = positions[joint.name], 1.0 / self.amount
             lower, upper = limits(joint) or (position - far, position + far)
             narrow = max(1.0 - self.amount, _NARROWEST_RAD / (upper - lower))
-            set_limits(
-                joint,
-                position + narrow * (lower - position),
-                position + narrow * (upper - position),
-            )
+            ends = (position + narrow * (lower - position), position + narrow * (upper - position))
+            set_limits(joint, *ends)
 
     def _position_of(self, joint: mujoco.MjsJoint) -> float:
         """Return the position at which a joint is locked, rad or m."""
@@ -121,3 +119,77 @@ class Lock(Edit, frozen=True):
                 f"{joint.name!r} slides without limits, so it has no middle: give a position."
             )
         return 0.5 * (old[0] + old[1])
+
+
+class AddMotor(Edit, frozen=True):
+    """Add a motor to joints that have none, named after the joint, with controls from -1 to 1.
+
+    Attributes:
+        joint: Name or glob of the joints; those of a glob that have a motor, that an equality
+            makes follow another joint, or that no single motor can move, are left as they are.
+        gear: Torque, N·m, or force, N, for a control of 1; None for the largest that the model
+            allows the joint (`effort` in URDF, `actuatorfrcrange` in MJCF).
+    """
+
+    needs: ClassVar = (mujoco.mjtDisableBit.mjDSBL_ACTUATION, "actuators")
+    joint: str
+    gear: float | None = None
+
+    def check(self) -> None:
+        """Refuse a gear of zero."""
+        require_gear(self.gear)
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add a motor to every joint that fits and has none."""
+        if not spec.joints:
+            raise MorphologyError("The model has no joints, so there is nothing to add a motor to.")
+        moved = {actuator.target for actuator in spec.actuators if actuator.trntype in OF_JOINTS}
+        # Also of a model that makes two joints follow each other: one of them has a motor.
+        moved |= {
+            coupling.name1
+            for coupling in spec.equalities
+            if coupling.type == mujoco.mjtEq.mjEQ_JOINT
+            and coupling.name2
+            and coupling.active
+            and coupling.name1 != self.joint
+        }
+        joints = [
+            joint
+            for joint in select("joint", self.joint, spec.joints)
+            if joint.type in _MOVES_ONE_WAY and joint.name not in moved
+        ]
+        if not joints:
+            raise MorphologyError(
+                f"Each hinge and slide that matches {self.joint!r} has a motor, or none matches; "
+                "a joint that follows another one needs none."
+            )
+        for joint in joints:
+            gear = float(abs(joint.actfrcrange).max()) if self.gear is None else self.gear
+            if not gear:
+                raise MorphologyError(
+                    f"The model states no largest torque or force of {joint.name!r}: give a gear."
+                )
+            add_motor(spec, joint.name, gear * max(self.amount, _WEAKEST_PART))
+
+
+class AddFreeJoint(Edit, frozen=True):
+    """Set a body that is fixed to the world free, with everything attached to it.
+
+    Attributes:
+        body: Name of a body on the world that has no joint.
+    """
+
+    body: str
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add the free joint."""
+        body = select("trunk", self.body, spec.worldbody.bodies)[0]
+        if body.joints:
+            raise MorphologyError(
+                f"{body.name!r} is not fixed: it has the joint {body.joints[0].name!r}."
+            )
+        # A body that MuJoCo has merged with the world cannot move.
+        spec.compiler.fusestatic = False
+        name = f"{body.name}_free"
+        require_free_name(spec, "joint", name)
+        body.add_freejoint(name=name)

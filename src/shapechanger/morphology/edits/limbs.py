@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import mujoco
 import numpy as np
+from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import (
     Edit,
+    Positive,
+    Ratio,
     Vector,
     part_of_the_way,
-    require_factor,
-    require_vector,
+    require_gear,
 )
 from shapechanger.morphology.spec.cutting import NearPart, Plane, shorten
 from shapechanger.morphology.spec.elements import (
-    limbs_and_trunks,
+    LEAST_MASS,
     require_free_name,
-    require_limb,
     select,
+    select_limbs,
 )
-from shapechanger.morphology.spec.explicit import LEAST_MASS
 from shapechanger.morphology.spec.geometry import (
-    Point,
+    LONG,
     anchor,
     far_end,
     held_at,
@@ -33,28 +34,28 @@ from shapechanger.morphology.spec.geometry import (
     place_of,
     require_geometry,
     resize_geom,
-    resize_limb,
     scale_geom_mass,
+    set_ends,
     stretched,
     volume,
 )
 from shapechanger.morphology.spec.grafting import (
-    copy_geom,
+    copy_element,
     copy_limb,
     move_limb,
     move_point,
+    resize_limb,
     share_contacts,
 )
-from shapechanger.morphology.spec.positions import set_limits
+from shapechanger.morphology.spec.joints import add_motor, set_limits
 from shapechanger.morphology.spec.references import (
-    elements_of,
+    key_of,
     release_drawings,
     remove_limb,
     require_divisible,
     require_removable,
     require_unnamed,
 )
-from shapechanger.morphology.spec.strength import add_motor
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.carried import Keyframes
@@ -64,6 +65,11 @@ if TYPE_CHECKING:
 _SMALLEST_PART: Final = 0.01
 # A geom that is divided this far from the axis of its segment lies on it, m.
 _ON_THE_AXIS_M: Final = 1e-12
+# Fields of a joint's resistance.
+_HINGE_FIELDS: Final = (
+    *("armature", "damping", "stiffness", "frictionloss", "margin"),
+    *("solref_limit", "solimp_limit", "solref_friction", "solimp_friction"),
+)
 
 
 class Cut(Edit, frozen=True):
@@ -78,30 +84,29 @@ class Cut(Edit, frozen=True):
     """
 
     body: str
-    keep: float
-
-    def check(self) -> None:
-        """Refuse a part that is not between 0 and 1."""
-        require_factor("The part kept by a cut", self.keep)
-        if self.keep > 1.0:
-            raise MorphologyError(f"A cut keeps at most all of a limb, got {self.keep}.")
+    keep: Annotated[float, Meta(ge=0.01, le=1.0)]
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Cut every segment that fits."""
-        for name in [body.name for body in select("body", self.body, limbs_and_trunks(spec))]:
-            body = spec.body(name)
-            if body is None:
-                continue  # It was part of a limb that has been cut off.
-            require_limb(body, "cut")
+        for body in select_limbs(spec, self.body, "cut"):
             require_geometry(spec, body)
             plane = Plane(spec, body, self.keep)
             if self.keep < 1.0:
-                release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, name)})
+                release_drawings(spec, {key_of(body)})
                 self._cut_geoms(spec, body, plane)
+                share = part_of_the_way(1.0, self.keep, self.amount)
                 for child in plane.children_beyond():
-                    self._take_child(spec, body, child)
+                    if self.amount < 1.0:
+                        there = held_at(spec, child)
+                        child.pos = child.pos + (stretched(there, anchor(body), share) - there)
+                    _take_away(spec, child, self.amount)
                 for point in plane.points_beyond():
-                    self._cut_point(spec, plane, point)
+                    if plane.is_at_end(point):
+                        move_by(point, share * plane.along - plane.along)
+                        continue
+                    require_unnamed(spec, key_of(point), "lies beyond the cut")
+                    if self.amount == 1.0:
+                        spec.delete(point)
 
     def _cut_geoms(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, plane: Plane) -> None:
         """Shorten the geoms that the plane cuts, and remove those that lie beyond it."""
@@ -113,7 +118,7 @@ class Cut(Edit, frozen=True):
             )
         for geom, piece in pieces:
             if not piece.share:
-                _require_unnamed_beyond(spec, geom)
+                require_unnamed(spec, key_of(geom), "lies beyond the cut")
                 if self.amount == 1.0:
                     spec.delete(geom)
                 else:
@@ -122,23 +127,6 @@ class Cut(Edit, frozen=True):
             elif piece.share < 1.0:
                 share = part_of_the_way(1.0, piece.share, self.amount)
                 shorten(spec, geom, piece.near, share, piece.axis)
-
-    def _cut_point(self, spec: mujoco.MjSpec, plane: Plane, point: Point) -> None:
-        """Pull a point at the far end to the new end, and remove any other one."""
-        if plane.is_at_end(point):
-            move_by(point, part_of_the_way(1.0, self.keep, self.amount) * plane.along - plane.along)
-            return
-        _require_unnamed_beyond(spec, point)
-        if self.amount == 1.0:
-            spec.delete(point)
-
-    def _take_child(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, child: mujoco.MjsBody) -> None:
-        """Remove a limb beyond the cut; at an amount below 1, pull it in and make it smaller."""
-        if self.amount < 1.0:
-            share = part_of_the_way(1.0, self.keep, self.amount)
-            there = held_at(spec, child)
-            child.pos = child.pos + (stretched(there, anchor(body), share) - there)
-        _take_away(spec, child, self.amount)
 
 
 class Remove(Edit, frozen=True):
@@ -152,11 +140,8 @@ class Remove(Edit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Remove every limb that fits."""
-        for name in [body.name for body in select("body", self.body, limbs_and_trunks(spec))]:
-            body = spec.body(name)
-            if body is not None:  # Else it was part of a limb that has been removed.
-                require_limb(body, "removed")
-                _take_away(spec, body, self.amount)
+        for body in select_limbs(spec, self.body, "removed"):
+            _take_away(spec, body, self.amount)
 
 
 class Split(Edit, frozen=True):
@@ -179,30 +164,27 @@ class Split(Edit, frozen=True):
 
     body: str
     name: str
-    at: float = 0.5
+    at: Annotated[float, Meta(gt=0.0, lt=1.0)] = 0.5
     lower: float = -0.5
     upper: float = 0.5
     gear: float | None = None
     axis: Vector | None = None
 
     def check(self) -> None:
-        """Refuse a place outside the segment, and a range or gear of zero."""
-        if not 0.0 < self.at < 1.0:
-            raise MorphologyError(f"A segment is split between 0 and 1, got {self.at}.")
-        _check_hinge(self.lower, self.upper, self.gear, self.axis)
+        """Refuse a range, gear or axis of zero."""
+        _check_hinge(self)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Split the segment."""
-        (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
-        require_limb(body, "split")
+        body = next(select_limbs(spec, self.body, "split"))
         require_geometry(spec, body)
         plane = Plane(spec, body, self.at)
         pieces = {geom.name: plane.piece_of(geom) for geom in body.geoms}
         cut = [name for name, piece in pieces.items() if 0.0 < piece.share < 1.0]
         require_divisible(spec, body, cut)
-        release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
+        release_drawings(spec, {key_of(body)})
         points, children = plane.points_beyond(), plane.children_beyond()
-        part = _new_segment(spec, body, self.name, plane.place)
+        part = _add_segment(spec, body, self, plane.place, self.amount)
         for name, piece in pieces.items():
             if not piece.share:
                 move_by(move_point(spec, spec.geom(name), part), -plane.place)
@@ -214,7 +196,6 @@ class Split(Edit, frozen=True):
             offset = child.pos - plane.place
             move_limb(spec, child, part).pos = offset
         share_contacts(spec, body, part, {name: self._far_half(name) for name in cut})
-        _add_hinge(spec, body, part, self, self.amount)
 
     def _far_half(self, geom: str) -> str:
         """Return the name of the farther half of a geom that is cut in two."""
@@ -230,7 +211,7 @@ class Split(Edit, frozen=True):
     ) -> None:
         """Divide a geom between both parts."""
         whole = volume(spec, geom)
-        copy = copy_geom(spec, geom, part, self._far_half(geom.name))
+        copy = copy_element(spec, geom, part, self._far_half(geom.name))
         # About its near end, which then goes to where the geom is cut.
         move_by(copy, -piece.near)
         shorten(spec, copy, np.zeros(3), 1.0 - piece.share, piece.axis)
@@ -271,32 +252,27 @@ class AddSegment(Edit, frozen=True):
     upper: float = 0.5
     gear: float | None = None
     axis: Vector | None = None
-    radius: float | None = None
+    radius: Positive | None = None
 
     def check(self) -> None:
-        """Refuse a length, range, gear or radius of zero."""
-        require_vector("The end of a segment", self.end)
-        _check_hinge(self.lower, self.upper, self.gear, self.axis)
-        if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0.0):
-            raise MorphologyError(f"A radius must be above zero, got {self.radius}.")
+        """Refuse a length, range, gear or axis of zero."""
+        _check_hinge(self)
+        if not any(self.end):
+            raise MorphologyError("The end of a segment must not be zero.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the segment."""
-        (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
+        body = select("body", self.body, spec.bodies[1:])[0]
         require_geometry(spec, body)
-        place = far_end(spec, body)
-        model_geom = _long_geom(body)
-        part = _new_segment(spec, body, self.name, place)
-        geom = copy_geom(spec, model_geom, part, f"{self.name}_geom")
+        part = _add_segment(spec, body, self, far_end(spec, body), 1.0)
+        model_geom = next(geom for geom in body.geoms if geom.type in LONG)
+        geom = copy_element(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         if not math.isnan(geom.mass):
             geom.density, geom.mass = geom.mass / volume(spec, model_geom), math.nan
-        # MuJoCo takes either both ends or a pose.
-        geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
-        geom.fromto = [0.0, 0.0, 0.0, *self.end]
+        set_ends(geom, np.array([0.0, 0.0, 0.0, *self.end]))
         if self.radius is not None:
             geom.size = [self.radius, 0.0, 0.0]
-        _add_hinge(spec, body, part, self, 1.0)
         if self.amount != 1.0:
             _shrink(spec, part, self.amount)
 
@@ -313,22 +289,13 @@ class AddLimb(Edit, frozen=True):
     """
 
     like: str
-    suffix: str
+    suffix: Annotated[str, Meta(min_length=1)]
     angle: float
-    size: float = 1.0
-
-    def check(self) -> None:
-        """Refuse an absurd size, an empty suffix, or an angle that is not a finite number."""
-        require_factor("The size of a limb", self.size)
-        if not self.suffix or not math.isfinite(self.angle):
-            raise MorphologyError(f"A copied limb needs a suffix and a finite angle, got {self}.")
+    size: Ratio = 1.0
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the limb."""
-        (limb,) = select("body", self.like, limbs_and_trunks(spec))[:1]
-        require_limb(limb, "copied")
-        for kind, name in elements_of(limb):
-            require_free_name(spec, kind.name.removeprefix("mjOBJ_").lower(), name + self.suffix)
+        limb = next(select_limbs(spec, self.like, "copied"))
         copy = copy_limb(spec, limb, self.suffix, self.angle)
         if self.size != 1.0:
             resize_limb(spec, copy, self.size)
@@ -341,24 +308,15 @@ class AddLimb(Edit, frozen=True):
         keyframes.copy({n: n.removesuffix(self.suffix) for n in named if n.endswith(self.suffix)})
 
 
-def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | None) -> None:
+def _check_hinge(edit: Split | AddSegment) -> None:
     """Refuse a hinge that MuJoCo would refuse."""
-    if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
+    if not edit.lower < edit.upper:
         raise MorphologyError(
-            f"A hinge needs a lower limit below its upper one, got {lower}, {upper}."
+            f"A hinge needs a lower limit below its upper one, got {edit.lower}, {edit.upper}."
         )
-    if gear is not None and not (math.isfinite(gear) and gear != 0.0):
-        raise MorphologyError(f"A motor needs a gear that is not zero, got {gear}.")
-    if axis is not None:
-        require_vector("The axis of a hinge", axis)
-
-
-def _require_unnamed_beyond(spec: mujoco.MjSpec, element: Point) -> None:
-    """Refuse a cut that would remove an element that something names."""
-    kind = type(element).__name__.removeprefix("Mjs").upper()
-    require_unnamed(
-        spec, (getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), element.name), "lies beyond the cut"
-    )
+    require_gear(edit.gear)
+    if edit.axis is not None and not any(edit.axis):
+        raise MorphologyError("The axis of a hinge must not be zero.")
 
 
 def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None:
@@ -378,50 +336,26 @@ def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, LEAST_MASS)
 
 
-def _new_segment(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, place: np.ndarray
-) -> mujoco.MjsBody:
-    """Add an empty body to `body`, at `place` in its frame."""
-    require_free_name(spec, "body", name)
-    require_free_name(spec, "joint", name)
-    require_free_name(spec, "actuator", name)
-    return body.add_body(name=name, pos=place, gravcomp=body.gravcomp)
-
-
-def _long_geom(body: mujoco.MjsBody) -> mujoco.MjsGeom:
-    """The body's first capsule or cylinder; `far_end` has refused a body without one."""
-    return next(
-        geom
-        for geom in body.geoms
-        if geom.type in (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
-    )
-
-
-# Fields of a joint's resistance.
-_HINGE_FIELDS: Final = (
-    *("armature", "damping", "stiffness", "frictionloss", "margin"),
-    *("solref_limit", "solimp_limit", "solref_friction", "solimp_friction"),
-)
-
-
-def _add_hinge(
+def _add_segment(
     spec: mujoco.MjSpec,
     body: mujoco.MjsBody,
-    part: mujoco.MjsBody,
     edit: Split | AddSegment,
+    place: np.ndarray,
     amount: float,
-) -> None:
-    """Attach `part` to `body` by a hinge like the body's own, with a motor if the edit has one."""
+) -> mujoco.MjsBody:
+    """Add a body without geoms at `place` of `body`, on a hinge like its own, with its motor."""
+    for kind in ("body", "joint", "actuator"):
+        require_free_name(spec, kind, edit.name)
     own = next((j for j in body.joints if j.type == mujoco.mjtJoint.mjJNT_HINGE), None)
     axis = edit.axis if own is None or edit.axis is not None else own.axis
     if axis is None:
         raise MorphologyError(f"{body.name!r} has no hinge to take the axis from: give one.")
-    part.add_joint(name=edit.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
-    hinge = spec.joint(edit.name)
-    if own is not None:
-        for field in _HINGE_FIELDS:
-            setattr(hinge, field, getattr(own, field))
+    part = body.add_body(name=edit.name, pos=place, gravcomp=body.gravcomp)
+    hinge = part.add_joint(name=edit.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+    for field in _HINGE_FIELDS if own is not None else ():
+        setattr(hinge, field, getattr(own, field))
     strength = max(amount, _SMALLEST_PART)
     set_limits(hinge, strength * edit.lower, strength * edit.upper)
     if edit.gear is not None:
         add_motor(spec, edit.name, strength * edit.gear)
+    return part

@@ -1,38 +1,52 @@
-"""Edits that put one body or one geom where a published model has it, and set a total mass.
+"""Edits that put a body, a geom or a floor where a model has it, and set a total mass.
 
-`Stretch` and its like keep a body in proportion. These change one element alone, so that any
+`Stretch` and similar edits keep a body in proportion. These change one element alone, so that any
 variant of a model that is written as a file can be written as edits.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Final
 
 import mujoco
 import numpy as np
+from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import Edit, Vector, part_of_the_way, require_vector
+from shapechanger.morphology.edits.edit import Edit, Positive, Vector, part_of_the_way
 from shapechanger.morphology.robot import robot_bodies
-from shapechanger.morphology.spec.elements import compiled, limbs_and_trunks, select
+from shapechanger.morphology.spec.elements import (
+    compiled,
+    require_free_name,
+    select,
+)
 from shapechanger.morphology.spec.geometry import (
     axis_ends,
     has_ends,
-    keep_density,
     move_by,
+    orientation,
     place_of,
     require_geometry,
+    rotation,
+    same_density,
     scale_mass,
-    volume,
+    set_ends,
 )
-from shapechanger.morphology.spec.references import release_drawings
+from shapechanger.morphology.spec.joints import reference_of
+from shapechanger.morphology.spec.references import key_of, release_drawings
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.carried import Keyframes
 
-# A robot of a million kilograms is a typing mistake.
-_LARGEST_MASS_KG = 1e6
+_J: Final = mujoco.mjtJoint
+_G: Final = mujoco.mjtGeom
+# Share of an axis that is vertical from which a slide raises its body.
+_VERTICAL: Final = 1.0 - 1e-6
+# MuJoCo's default friction of a geom: torsional and rolling, m.
+_TORSIONAL: Final = 0.005
+_ROLLING: Final = 0.0001
+_FLOOR_GRID_M: Final = 0.05
 
 
 class PlaceBody(Edit, frozen=True):
@@ -46,25 +60,57 @@ class PlaceBody(Edit, frozen=True):
     body: str
     to: Vector
 
-    def check(self) -> None:
-        """Refuse anything but three finite numbers."""
-        require_vector("The place of a body", self.to, nonzero=False)
-
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Move every body that fits."""
-        for body in select("body", self.body, limbs_and_trunks(spec)):
+        for body in select("body", self.body, spec.bodies[1:]):
             body.pos = part_of_the_way(np.array(body.pos), np.array(self.to, float), self.amount)
 
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
         """Place the bodies that float in every keyframe too."""
-        for body in select("body", self.body, limbs_and_trunks(spec)):
-            for joint in (j for j in body.joints if j.type == mujoco.mjtJoint.mjJNT_FREE):
+        for body in select("body", self.body, spec.bodies[1:]):
+            for joint in (j for j in body.joints if j.type == _J.mjJNT_FREE):
                 keyframes.change(joint.name, self._placed)
 
     def _placed(self, pose: np.ndarray) -> np.ndarray:
         """Return the position of a free joint, shape (7,), at the new place."""
         place = part_of_the_way(pose[:3], np.array(self.to, float), self.amount)
         return np.concatenate([place, pose[3:]])
+
+
+class StartHeight(Edit, frozen=True):
+    """Change the height at which a trunk starts.
+
+    Attributes:
+        body: Name of a body on the world.
+        to: Height of its origin above the world's, -100 to 100 m.
+    """
+
+    body: str
+    to: Annotated[float, Meta(ge=-100.0, le=100.0)]
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Raise or lower every trunk that fits."""
+        for body in select("trunk", self.body, spec.worldbody.bodies):
+            body.pos = self._raised(body.pos)
+
+    def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
+        """Raise or lower the trunks in every keyframe too, because robots start in one."""
+        trunks = select("trunk", self.body, spec.worldbody.bodies)
+        for joint in (joint for body in trunks for joint in body.joints):
+            axis = rotation(orientation(spec, joint.parent)) @ joint.axis
+            vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
+            if joint.type == _J.mjJNT_FREE:
+                keyframes.change(joint.name, self._raised)
+            elif vertical:
+                # At its reference the body is where the model puts it.
+                own = np.array([reference_of(joint)])
+                keyframes.change(joint.name, lambda old, own=own: old + self.amount * (own - old))
+
+    def _raised(self, pose: np.ndarray) -> np.ndarray:
+        """Return a position that begins with x, y and z, at the new height."""
+        pose = pose.copy()
+        pose[2] = part_of_the_way(float(pose[2]), self.to, self.amount)
+        return pose
 
 
 class PlaceGeom(Edit, frozen=True):
@@ -85,7 +131,7 @@ class PlaceGeom(Edit, frozen=True):
     start: Vector | None = None
     end: Vector | None = None
     middle: Vector | None = None
-    radius: float | None = None
+    radius: Positive | None = None
 
     def check(self) -> None:
         """Refuse one end alone, ends together with a middle, equal ends, and no change at all."""
@@ -97,56 +143,69 @@ class PlaceGeom(Edit, frozen=True):
             )
         if self.start is None and self.middle is None and self.radius is None:
             raise MorphologyError(f"PlaceGeom takes two ends, a middle or a radius, got {self}.")
-        for name, point in (("start", self.start), ("end", self.end), ("middle", self.middle)):
-            if point is not None:
-                require_vector(f"The {name} of a geom", point, nonzero=False)
-        if self.radius is not None and not 0.0 < self.radius < math.inf:
-            raise MorphologyError(f"A radius must be above zero, got {self.radius}.")
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every geom that fits."""
         for geom in select("geom", self.geom, spec.geoms):
             if geom.parent.parent is not None:
                 require_geometry(spec, geom.parent)
-                release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, geom.parent.name)})
-            before = volume(spec, geom)
-            if self.start is not None and self.end is not None:
-                self._place_ends(spec, geom, np.array(self.start, float), np.array(self.end, float))
-            if self.middle is not None:
-                place = place_of(geom)
-                to = np.array(self.middle, float)
-                move_by(geom, part_of_the_way(place, to, self.amount) - place)
-            if self.radius is not None:
-                self._set_radius(geom, self.radius)
-            keep_density(spec, geom, before)
+                release_drawings(spec, {key_of(geom.parent)})
+            with same_density(spec, geom):
+                if self.start is not None and self.end is not None:
+                    self._place_ends(spec, geom, np.array([self.start, self.end], float))
+                if self.middle is not None:
+                    place = place_of(geom)
+                    to = np.array(self.middle, float)
+                    move_by(geom, part_of_the_way(place, to, self.amount) - place)
+                if self.radius is not None:
+                    self._set_radius(geom, self.radius)
 
-    def _place_ends(
-        self, spec: mujoco.MjSpec, geom: mujoco.MjsGeom, start: np.ndarray, end: np.ndarray
-    ) -> None:
-        """Set both ends of the axis."""
-        old = axis_ends(spec, geom)
-        if old is None:
+    def _place_ends(self, spec: mujoco.MjSpec, geom: mujoco.MjsGeom, new: np.ndarray) -> None:
+        """Set both ends of the axis, shape (2, 3)."""
+        ends = axis_ends(spec, geom)
+        if ends is None:
             raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
-        # Which end of an axis comes first means nothing: each goes to the nearer one.
-        if not has_ends(geom) and _apart(old, (start, end)) > _apart(old, (end, start)):
+        old = np.array(ends)
+        # The ends of a geom that is given by its pose have no order: match the nearest.
+        if not has_ends(geom) and _apart(old, new) > _apart(old, new[::-1]):
             old = old[::-1]
-        ends = [part_of_the_way(o, n, self.amount) for o, n in zip(old, (start, end), strict=True)]
         geom.size = [geom.size[0], 0.0, 0.0]
-        # MuJoCo takes either both ends or a pose.
-        geom.pos, geom.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
-        geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-        geom.fromto = np.concatenate(ends)
+        set_ends(geom, part_of_the_way(old, new, self.amount))
 
     def _set_radius(self, geom: mujoco.MjsGeom, radius: float) -> None:
         """Set the radius of a round geom."""
-        kinds = mujoco.mjtGeom
-        if geom.type not in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE, kinds.mjGEOM_CYLINDER):
+        if geom.type not in (_G.mjGEOM_SPHERE, _G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER):
             raise MorphologyError(
                 f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
             )
         size = np.array(geom.size)
         size[0] = part_of_the_way(float(size[0]), radius, self.amount)
         geom.size = size
+
+
+class AddFloor(Edit, frozen=True):
+    """Add a horizontal floor without an edge, named `floor`.
+
+    Attributes:
+        friction: Coefficient of sliding friction; MuJoCo uses the larger one of two geoms.
+        height: Its height, m.
+    """
+
+    friction: Annotated[float, Meta(ge=0.0)] = 1.0
+    height: float = 0.0
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add the floor."""
+        require_free_name(spec, "geom", "floor")
+        spec.worldbody.add_geom(
+            name="floor",
+            type=_G.mjGEOM_PLANE,
+            pos=[0.0, 0.0, self.height],
+            size=[0.0, 0.0, _FLOOR_GRID_M],
+            friction=[self.friction, _TORSIONAL, _ROLLING],
+            contype=1,
+            conaffinity=1,
+        )
 
 
 class TotalMass(Edit, frozen=True):
@@ -156,15 +215,10 @@ class TotalMass(Edit, frozen=True):
     theirs.
 
     Attributes:
-        to: Mass of the robot's bodies together, kg.
+        to: Mass of the robot's bodies together, kg, at most a million.
     """
 
-    to: float
-
-    def check(self) -> None:
-        """Refuse a mass that is not above zero."""
-        if not 0.0 < self.to <= _LARGEST_MASS_KG:  # Also refuses NaN.
-            raise MorphologyError(f"A robot cannot have a mass of {self.to} kg.")
+    to: Annotated[float, Meta(gt=0.0, le=1e6)]
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Scale the mass of every body."""
@@ -173,11 +227,11 @@ class TotalMass(Edit, frozen=True):
         robot = robot_bodies(model)
         old = float(np.where(robot, model.body_mass, 0.0).sum())
         names = {model.body(i).name for i in np.flatnonzero(robot)}
-        for body in limbs_and_trunks(spec):
+        for body in spec.bodies[1:]:
             if body.name in names:
                 scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)
 
 
-def _apart(old: tuple[np.ndarray, np.ndarray], new: tuple[np.ndarray, np.ndarray]) -> float:
+def _apart(old: np.ndarray, new: np.ndarray) -> float:
     """Return the sum of the distances between two pairs of points, m."""
-    return sum(float(np.linalg.norm(o - n)) for o, n in zip(old, new, strict=True))
+    return float(np.linalg.norm(old - new, axis=1).sum())

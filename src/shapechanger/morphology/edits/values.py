@@ -7,43 +7,30 @@ words for these are the operations `scale` and `abs` of domain randomization.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import mujoco
 import numpy as np
+from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import (
-    Edit,
-    Vector,
-    part_of_the_way,
-    require_factor,
-    require_vector,
-)
-from shapechanger.morphology.spec.elements import compiled, limbs_and_trunks, select
+from shapechanger.morphology.edits.edit import Edit, Ratio, Vector, part_of_the_way, require_gear
+from shapechanger.morphology.spec.elements import compiled, select
 from shapechanger.morphology.spec.geometry import (
     inertia_is_written_out,
-    orientation,
     require_geometry,
-    rotation,
     scale_mass,
     stretch_segment,
     thicken_geom,
 )
-from shapechanger.morphology.spec.positions import reference_of
-from shapechanger.morphology.spec.references import release_drawings
-from shapechanger.morphology.spec.strength import is_motor, scale_clamps, scale_strength
-
-if TYPE_CHECKING:
-    from shapechanger.morphology.spec.carried import Keyframes
+from shapechanger.morphology.spec.joints import is_motor, scale_clamps, scale_strength
+from shapechanger.morphology.spec.references import key_of, release_drawings
 
 _D: Final = mujoco.mjtDisableBit
-_J: Final = mujoco.mjtJoint
-# Share of an axis that is vertical from which a slide raises its body.
-_VERTICAL: Final = 1.0 - 1e-6
 # A larger value, in any unit here, is a typing mistake, and MuJoCo's numbers overflow.
-_LARGEST_VALUE: Final = 1e6
-
+_LARGEST: Final = 1e6
+# Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
+_LARGEST_GRAVITY: Final = 250.0
 _FRICTION_PLACES: Final = {"sliding": 0, "torsional": 1, "rolling": 2}
 
 
@@ -53,27 +40,17 @@ class ValueEdit(Edit, frozen=True, tag=None):
     Attributes:
         element: Name or glob of the bodies, geoms, joints or actuators.
         scale: New value over old value, 0.01 to 100.
-        to: New value, in the SI unit that the edit names.
+        to: New value, in the SI unit that the edit names, 0 to a million.
     """
 
     element: str
-    scale: float | None = None
-    to: float | None = None
+    scale: Ratio | None = None
+    to: Annotated[float, Meta(ge=0.0, le=_LARGEST)] | None = None
 
     def check(self) -> None:
-        """Refuse anything but one of `scale` and `to`, or a number out of its range."""
-        name = type(self).__name__
+        """Refuse anything but one of `scale` and `to`."""
         if (self.scale is None) == (self.to is None):
-            raise MorphologyError(f"{name} takes either scale or to, got {self}.")
-        if self.scale is not None:
-            require_factor(f"The scale of {name}", self.scale)
-        if self.to is not None and not (self._possible(self.to) and abs(self.to) <= _LARGEST_VALUE):
-            raise MorphologyError(f"{name} cannot be {self.to}.")
-
-    @staticmethod
-    def _possible(value: float) -> bool:
-        """Return whether the number can be set to this."""
-        return value >= 0.0
+            raise MorphologyError(f"{type(self).__name__} takes either scale or to, got {self}.")
 
     def changed(self, old: float) -> float:
         """Return the new value that replaces `old`."""
@@ -88,13 +65,11 @@ class Mass(ValueEdit, frozen=True):
     `to` is the mass of each body by itself, without what hangs on it.
     """
 
-    @staticmethod
-    def _possible(value: float) -> bool:
-        return value > 0.0
+    to: Annotated[float, Meta(gt=0.0, le=_LARGEST)] | None = None
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
-        bodies = select("body", self.element, limbs_and_trunks(spec))
+        bodies = select("body", self.element, spec.bodies[1:])
         # Only the compiler knows the volume of every shape.
         whole = compiled(spec) if self.to is not None else None
         for body in bodies:
@@ -110,7 +85,7 @@ class Density(ValueEdit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
-        bodies = select("body", self.element, limbs_and_trunks(spec))
+        bodies = select("body", self.element, spec.bodies[1:])
         for body in bodies:
             if inertia_is_written_out(spec, body):
                 raise MorphologyError(
@@ -135,10 +110,12 @@ class Gear(ValueEdit, frozen=True):
     """
 
     needs: ClassVar = (_D.mjDSBL_ACTUATION, "actuators")
+    to: Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)] | None = None
 
-    @staticmethod
-    def _possible(value: float) -> bool:
-        return value != 0.0
+    def check(self) -> None:
+        """Refuse a gear of zero too."""
+        super().check()
+        require_gear(self.to)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every actuator that fits."""
@@ -247,17 +224,13 @@ class Stretch(Edit, frozen=True):
     """
 
     body: str
-    factor: float
+    factor: Ratio
     axis: Literal["x", "y", "z"] | None = None
-
-    def check(self) -> None:
-        """Refuse a factor out of range."""
-        require_factor("The factor of a stretch", self.factor)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Stretch every body that fits."""
         factor = part_of_the_way(1.0, self.factor, self.amount)
-        for body in select("body", self.body, limbs_and_trunks(spec)):
+        for body in select("body", self.body, spec.bodies[1:]):
             require_geometry(spec, body)
             stretch_segment(spec, body, factor, self.axis)
 
@@ -272,25 +245,16 @@ class Radius(Edit, frozen=True):
     """
 
     body: str
-    factor: float
-
-    def check(self) -> None:
-        """Refuse a factor out of range."""
-        require_factor("The factor of a radius", self.factor)
+    factor: Ratio
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Thicken every body that fits."""
         factor = part_of_the_way(1.0, self.factor, self.amount)
-        for body in select("body", self.body, limbs_and_trunks(spec)):
+        for body in select("body", self.body, spec.bodies[1:]):
             require_geometry(spec, body)
-            release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
+            release_drawings(spec, {key_of(body)})
             for geom in body.geoms:
                 thicken_geom(spec, geom, factor)
-
-
-# Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
-_LARGEST_GRAVITY: Final = 250.0
-_LARGEST_HEIGHT_M: Final = 100.0
 
 
 class Gravity(Edit, frozen=True):
@@ -305,8 +269,7 @@ class Gravity(Edit, frozen=True):
     to: Vector
 
     def check(self) -> None:
-        """Refuse a vector that is not finite or out of range."""
-        require_vector("Gravity", self.to, nonzero=False)
+        """Refuse one that is out of range."""
         if math.hypot(*self.to) > _LARGEST_GRAVITY:
             raise MorphologyError(
                 f"Gravity is at most {_LARGEST_GRAVITY:g} m/s², got {math.hypot(*self.to):g}."
@@ -316,52 +279,3 @@ class Gravity(Edit, frozen=True):
         """Set the model's gravity."""
         old = np.array(spec.option.gravity)
         spec.option.gravity = part_of_the_way(old, np.array(self.to, float), self.amount)
-
-
-class StartHeight(Edit, frozen=True):
-    """Change the height at which a trunk starts.
-
-    Attributes:
-        body: Name of a body on the world.
-        to: Height of its origin above the world's, m.
-    """
-
-    body: str
-    to: float
-
-    def check(self) -> None:
-        """Refuse a height that is not a finite number."""
-        if not abs(self.to) <= _LARGEST_HEIGHT_M:  # Also refuses NaN.
-            raise MorphologyError(
-                f"A start height is at most {_LARGEST_HEIGHT_M:g} m, got {self.to}."
-            )
-
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Raise or lower every trunk that fits."""
-        for body in self._trunks(spec):
-            position = body.pos.copy()
-            position[2] = part_of_the_way(float(position[2]), self.to, self.amount)
-            body.pos = position
-
-    def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
-        """Raise or lower the trunks in every keyframe too, because robots start in one."""
-        for joint in (joint for body in self._trunks(spec) for joint in body.joints):
-            axis = rotation(orientation(spec, joint.parent)) @ joint.axis
-            vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
-            if joint.type == _J.mjJNT_FREE:
-                keyframes.change(joint.name, self._raised)
-            elif vertical:
-                # At its reference the body is where the model puts it.
-                own = np.array([reference_of(joint)])
-                keyframes.change(joint.name, lambda old, own=own: old + self.amount * (own - old))
-
-    def _raised(self, pose: np.ndarray) -> np.ndarray:
-        """Return the position of a free joint, shape (7,), at the new height."""
-        pose = pose.copy()
-        pose[2] = part_of_the_way(float(pose[2]), self.to, self.amount)
-        return pose
-
-    def _trunks(self, spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
-        """Return the trunks that fit."""
-        trunks = [body for body in limbs_and_trunks(spec) if body.parent.parent is None]
-        return select("trunk", self.body, trunks)

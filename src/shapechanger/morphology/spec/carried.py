@@ -1,36 +1,92 @@
 """What a specification states by place or by order: keyframes, pins of loops, paths of tendons.
 
-Edits see none of the keyframes, and pins as sites. Both are written back when all edits are made.
+Edits see none of the keyframes, and pins as sites. MuJoCo states the pin of a loop in the frame of
+its first body, and takes its place on the second from the model's own pose. So each pin is two
+sites while edits are applied; then the own pose is changed until what was closed in it is closed
+again, and pins and keyframes are written back.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.elements import compiled
-from shapechanger.morphology.spec.geometry import Array
-from shapechanger.morphology.spec.loops import (
-    close_loops,
-    has_loops,
-    mark_pins,
-    open_loops,
-    unmark_pins,
-)
-from shapechanger.morphology.spec.references import MARK, Element
+from shapechanger.morphology.spec.elements import compiled, unique_namer
+from shapechanger.morphology.spec.geometry import UPRIGHT, Array, inverse, orientation, product
+from shapechanger.morphology.spec.joints import displace, reference_of, set_reference
+from shapechanger.morphology.spec.references import COUPLINGS, MARK, OF_JOINTS, PINS, Element
 
+_E: Final = mujoco.mjtEq
 _J: Final = mujoco.mjtJoint
+_O: Final = mujoco.mjtObj
+_W: Final = mujoco.mjtWrap
+_D: Final = mujoco.mjtDisableBit
 _SIZES: Final = {_J.mjJNT_FREE: (7, 6), _J.mjJNT_BALL: (4, 3)}
 _FIELDS: Final = ("qpos", "qvel", "act", "ctrl", "mpos", "mquat")
-Slices = dict[str, dict[str, slice]]
-_W: Final = mujoco.mjtWrap
 _ROUND: Final = (int(_W.mjWRAP_SPHERE), int(_W.mjWRAP_CYLINDER))
 # A tendon that is longer than its limit by less is within it, m or rad.
 _WITHIN: Final = 1e-6
+_FREE, _BALL = int(_J.mjJNT_FREE), int(_J.mjJNT_BALL)
+_WITHOUT: Final = _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
+_UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
+_DRIVES: Final = [int(kind) for kind in OF_JOINTS]
+# Residual of an equality that is closed, m or rad; above the rounding of a compiled model.
+_CLOSED: Final = 1e-9
+# Points of a closed loop coincide within this, m.
+_TOGETHER: Final = 1e-8
+# A joint that moves less has not moved, rad or m.
+_STILL: Final = 1e-12
+# A longer step, rad or m, can jump to another way to assemble the loop.
+_LONGEST_STEP: Final = 0.2
+_MOST_STEPS: Final = 200
+# Singular values below this share of the largest belong to motions that close nothing.
+_SINGULAR: Final = 1e-6
+
+
+@contextmanager
+def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
+    """Take keyframes and pins out of the way of edits, and write them back after these.
+
+    Args:
+        spec: The specification, with its elements named and its frames resolved.
+
+    Yields:
+        Its keyframes.
+
+    Raises:
+        MorphologyError: If a loop cannot be closed, or a tendon does not fit its new path.
+    """
+    keyframes = Keyframes()
+    if not (spec.keys or spec.tendons or _has_loops(spec)):
+        yield keyframes
+        return
+    for i, tendon in enumerate(spec.tendons):
+        tendon.name = tendon.name or f"{MARK}tendon{i}"
+    model = compiled(spec)
+    keyframes.take(spec, model)
+    tendons, torn = _tendons(model), set[Element]()
+    if _has_loops(spec):
+        _mark_pins(spec, model)
+        residuals = _residuals(spec, _posed(compiled(spec)))
+        torn = {key for key, residual in residuals.items() if residual > _CLOSED}
+    yield keyframes
+    if _has_loops(spec):
+        data, balls = _close_loops(spec, compiled(spec), torn)
+        for joint, turn in balls.items():
+            keyframes.change(joint, lambda pose, turn=turn: product(inverse(turn), pose))
+        _unmark_pins(spec, data)
+    if spec.tendons and tendons:
+        _follow_tendons(spec, tendons)
+    keyframes.put_back(spec)
+
+
+# --- Keyframes ---------------------------------------------------------------------------------
 
 
 class Keyframes:
@@ -40,12 +96,7 @@ class Keyframes:
         self._values: list[tuple[dict[str, Any], dict[str, dict[str, Array]]]] = []
 
     def take(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-        """Take the keyframes out of a specification.
-
-        Args:
-            spec: The specification; its keyframes are deleted.
-            model: The model that it compiles to.
-        """
+        """Take the keyframes out of a specification that compiles to the model."""
         slices = _slices_of(model)
         for i, key in enumerate(list(spec.keys)):
             values: dict[str, dict[str, Array]] = {}
@@ -56,18 +107,13 @@ class Keyframes:
             spec.delete(key)
 
     def copy(self, originals: Mapping[str, str]) -> None:
-        """Give copied joints, actuators and bodies the values of those that they were copied from.
+        """Give copied joints, actuators and bodies the values of the elements that were copied.
 
         Args:
             originals: Names of the elements that were copied, by those of the copies.
         """
-        for _, values in self._values:
-            for known in values.values():
-                known |= {
-                    copy: known[original]
-                    for copy, original in originals.items()
-                    if original in known
-                }
+        for known in (known for _, values in self._values for known in values.values()):
+            known |= {new: known[old] for new, old in originals.items() if old in known}
 
     def change(self, joint: str, changed: Callable[[Array], Array]) -> None:
         """Change the position of a joint in every keyframe that gives positions.
@@ -82,11 +128,7 @@ class Keyframes:
                 positions[joint] = changed(positions[joint])
 
     def put_back(self, spec: mujoco.MjSpec) -> None:
-        """Add the keyframes to the edited specification; new elements have their own pose.
-
-        Args:
-            spec: The edited specification.
-        """
+        """Add the keyframes to the edited specification; new elements have their own pose."""
         if not self._values:
             return
         model = compiled(spec)
@@ -103,78 +145,30 @@ class Keyframes:
                 setattr(key, field, row)
 
 
-class Carried:
-    """The keyframes, pins and tendons of a specification that edits are applied to.
+def _slices_of(model: mujoco.MjModel) -> dict[str, dict[str, slice]]:
+    """Return where each element's numbers are, by field of a keyframe and by name."""
+    found: dict[str, dict[str, slice]] = {field: {} for field in _FIELDS}
+    for i in range(model.njnt):
+        position, velocity = _SIZES.get(_J(model.jnt_type[i]), (1, 1))
+        name, at, dof = model.joint(i).name, model.jnt_qposadr[i], model.jnt_dofadr[i]
+        found["qpos"][name] = slice(at, at + position)
+        found["qvel"][name] = slice(dof, dof + velocity)
+    for i in range(model.nactuator):
+        name = model.actuator(i).name
+        for field, starts, counts in (
+            ("act", model.actuator_actadr, model.actuator_actnum),
+            ("ctrl", model.actuator_ctrladr, model.actuator_ctrlnum),
+        ):
+            if counts[i]:
+                found[field][name] = slice(starts[i], starts[i] + counts[i])
+    for body in np.flatnonzero(model.body_mocapid >= 0).tolist():
+        name, i = model.body(body).name, int(model.body_mocapid[body])
+        found["mpos"][name] = slice(3 * i, 3 * i + 3)
+        found["mquat"][name] = slice(4 * i, 4 * i + 4)
+    return found
 
-    Args:
-        spec: The specification, with its elements named and its frames resolved.
 
-    Attributes:
-        keyframes: Its keyframes.
-    """
-
-    def __init__(self, spec: mujoco.MjSpec) -> None:
-        self.keyframes = Keyframes()
-        self._tendons: dict[str, _Tendon] = {}
-        self._open: set[Element] = set()
-        if not (spec.keys or spec.tendons or has_loops(spec)):
-            return
-        for i, tendon in enumerate(spec.tendons):
-            tendon.name = tendon.name or f"{MARK}tendon{i}"
-        model = compiled(spec)
-        self.keyframes.take(spec, model)
-        self._tendons = _tendons(model)
-        if has_loops(spec):
-            mark_pins(spec, model)
-            self._open = open_loops(spec, compiled(spec))
-
-    def put_back(self, spec: mujoco.MjSpec) -> None:
-        """Write everything into the edited specification.
-
-        Args:
-            spec: The specification.
-
-        Raises:
-            MorphologyError: If a loop cannot be closed, or a tendon does not fit its new path.
-        """
-        if has_loops(spec):
-            data, balls = close_loops(spec, compiled(spec), self._open)
-            for joint, turn in balls.items():
-                self.keyframes.change(joint, lambda pose, turn=turn: _before(turn, pose))
-            unmark_pins(spec, data)
-        if spec.tendons and self._tendons:
-            self._follow_tendons(spec)
-        self.keyframes.put_back(spec)
-
-    def _follow_tendons(self, spec: mujoco.MjSpec) -> None:
-        """Refuse paths that mean something else now, and fit muscles to their new lengths."""
-        new = _tendons(compiled(spec))
-        for name, old in self._tendons.items():
-            if name not in new:
-                continue
-            if old.inside != new[name].inside and len(old.inside) == len(new[name].inside):
-                raise MorphologyError(
-                    f"The tendon {name!r} would pass a geom on its other side, because its side "
-                    "site gets into the geom or out of it: change the geom less."
-                )
-            if old.fits and not new[name].fits:
-                raise MorphologyError(
-                    f"The tendon {name!r} would start {new[name].length:.3g} long, outside of its "
-                    "limits: write other limits into the model first."
-                )
-        for actuator in spec.actuators:
-            old = self._tendons.get(actuator.target)
-            tendon = actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON
-            muscle = actuator.gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
-            if tendon and muscle and old and np.any(actuator.lengthrange):
-                # As in musculoskeletal models that are fitted to a person: S. Delp and others,
-                # OpenSim, IEEE Transactions on Biomedical Engineering 54(11), 2007.
-                actuator.lengthrange = actuator.lengthrange * (
-                    new[actuator.target].length / old.length
-                )
-        for tendon in spec.tendons:
-            if tendon.name.startswith(MARK):
-                tendon.name = ""
+# --- Tendons -----------------------------------------------------------------------------------
 
 
 class _Tendon(NamedTuple):
@@ -214,32 +208,212 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
     return found
 
 
-def _before(turn: Array, pose: Array) -> Array:
-    """Return the position of a ball whose reference has turned, as quaternions (w, x, y, z)."""
-    back, result = np.empty(4), np.empty(4)
-    mujoco.mju_negQuat(back, turn)
-    mujoco.mju_mulQuat(result, back, pose)
-    return result
+def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
+    """Refuse paths that mean something else now, and fit muscles to their new lengths."""
+    new = _tendons(compiled(spec))
+    for name, old in tendons.items():
+        if (now := new.get(name)) is None:
+            continue
+        if old.inside != now.inside and len(old.inside) == len(now.inside):
+            raise MorphologyError(
+                f"The tendon {name!r} would pass a geom on its other side, because its side "
+                "site gets into the geom or out of it: change the geom less."
+            )
+        if old.fits and not now.fits:
+            raise MorphologyError(
+                f"The tendon {name!r} would start {now.length:.3g} long, outside of its "
+                "limits: write other limits into the model first."
+            )
+    for actuator in spec.actuators:
+        old = tendons.get(actuator.target)
+        tendon = actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON
+        muscle = actuator.gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
+        if tendon and muscle and old and np.any(actuator.lengthrange):
+            # As in musculoskeletal models that are fitted to a person: S. Delp and others,
+            # OpenSim, IEEE Transactions on Biomedical Engineering 54(11), 2007.
+            longer = new[actuator.target].length / old.length
+            actuator.lengthrange = actuator.lengthrange * longer
+    for tendon in spec.tendons:
+        if tendon.name.startswith(MARK):
+            tendon.name = ""
 
 
-def _slices_of(model: mujoco.MjModel) -> Slices:
-    """Return where each element's numbers are, by field of a keyframe and by name."""
-    found: Slices = {field: {} for field in _FIELDS}
+# --- Loops and couplings -----------------------------------------------------------------------
+
+
+def _has_loops(spec: mujoco.MjSpec) -> bool:
+    return any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
+
+
+def _mark_pins(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Replace the places of pins between bodies by sites, which edits carry along."""
+    for i, equality in enumerate(spec.equalities):
+        if equality.type not in PINS or equality.objtype != _O.mjOBJ_BODY:
+            continue
+        data, welds = model.eq_data[i], equality.type == _E.mjEQ_WELD
+        places = (data[3:6], data[:3]) if welds else (data[:3], data[3:6])
+        turns = (data[6:10] if welds else UPRIGHT, UPRIGHT)
+        names = (f"{MARK}{i}", f"{MARK}{i}~")
+        bodies = (equality.name1, equality.name2)
+        for name, body, place, turn in zip(names, bodies, places, turns, strict=True):
+            on = spec.body(body) if body else spec.worldbody
+            on.add_site(name=name, pos=place, quat=turn)
+        equality.objtype = _O.mjOBJ_SITE
+        equality.name1, equality.name2 = names
+
+
+def _close_loops(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, torn: set[Element]
+) -> tuple[mujoco.MjData, dict[str, Array]]:
+    """Move the joints of the model's own pose until all pins and couplings hold that held before.
+
+    Positions of hinges and slides keep their meaning: their references move.
+
+    Returns:
+        The data of the model in its new pose, and the turns of ball joints by their names as
+        quaternions (w, x, y, z).
+
+    Raises:
+        MorphologyError: If no pose of its joints closes a loop.
+    """
+    data = _posed(model)
+    for i, key in enumerate(_keys(spec)):
+        data.eq_active[i] &= key not in torn
+    mujoco.mj_fwdPosition(model, data)
+    lengths = np.array(data.ten_length)
+    if not _solve(model, data):
+        (_, name), gap = max(_residuals(spec, data).items(), key=lambda item: item[1])
+        equality = next(e for e in spec.equalities if e.name1 == name)
+        names = [equality.name1, equality.name2]
+        if name.startswith(MARK):
+            names = [spec.site(end).parent.name for end in names]
+        ends = " and ".join(repr(end) for end in names if end)
+        loop = f"the {'coupling' if equality.type in COUPLINGS else 'pin'} of {ends}"
+        raise MorphologyError(
+            f"The edits leave {loop} open by {gap:.3g} m or rad, and no position "
+            "of its joints within their limits closes it: change its other links or joints too."
+        )
+    balls: dict[str, Array] = {}
+    changes: dict[Element, float] = {}
     for i in range(model.njnt):
-        position, velocity = _SIZES.get(_J(model.jnt_type[i]), (1, 1))
-        name, at, dof = model.joint(i).name, model.jnt_qposadr[i], model.jnt_dofadr[i]
-        found["qpos"][name] = slice(at, at + position)
-        found["qvel"][name] = slice(dof, dof + velocity)
-    for i in range(model.nactuator):
-        name = model.actuator(i).name
-        for field, starts, counts in (
-            ("act", model.actuator_actadr, model.actuator_actnum),
-            ("ctrl", model.actuator_ctrladr, model.actuator_ctrlnum),
-        ):
-            if counts[i]:
-                found[field][name] = slice(starts[i], starts[i] + counts[i])
-    for body in np.flatnonzero(model.body_mocapid >= 0).tolist():
-        name, i = model.body(body).name, int(model.body_mocapid[body])
-        found["mpos"][name] = slice(3 * i, 3 * i + 3)
-        found["mquat"][name] = slice(4 * i, 4 * i + 4)
+        at = model.jnt_qposadr[i]
+        name, by = model.joint(i).name, float(data.qpos[at] - model.qpos0[at])
+        if model.jnt_type[i] == _J.mjJNT_BALL:
+            turn = data.qpos[at : at + 4].copy()
+            if np.abs(turn - UPRIGHT).max() > _STILL:
+                balls[name] = turn
+                displace(spec, spec.joint(name), turn)
+        elif model.jnt_type[i] != _J.mjJNT_FREE and abs(by) > _STILL:
+            joint = spec.joint(name)
+            displace(spec, joint, by)
+            set_reference(joint, reference_of(joint) + by)
+            changes[_O.mjOBJ_JOINT, name] = by
+    if changes or balls:
+        by_name = zip(range(model.ntendon), data.ten_length - lengths, strict=True)
+        changes |= {(_O.mjOBJ_TENDON, model.tendon(i).name): float(by) for i, by in by_name}
+        for equality in spec.equalities:
+            _shift_coupling(equality, changes)
+    return data, balls
+
+
+def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
+    """State the pins in the frames of their bodies again, and delete their sites."""
+    free = unique_namer(site.name for site in spec.sites)
+    for equality in spec.equalities:
+        if equality.type not in PINS or not equality.name1.startswith(MARK):
+            continue
+        first, second = spec.site(equality.name1), spec.site(equality.name2)
+        a, b, own = data.site(first.name), data.site(second.name), np.array(equality.data)
+        together = np.allclose(a.xpos, b.xpos, 0.0, _TOGETHER)
+        if equality.type == _E.mjEQ_WELD:
+            own[:3] = second.pos
+            if own[6:10].any() or not (together and np.allclose(a.xmat, b.xmat, 0.0, _TOGETHER)):
+                own[3:6] = first.pos
+                own[6:10] = product(orientation(spec, first), inverse(orientation(spec, second)))
+        elif together:
+            own[:3] = first.pos
+        else:  # One that is switched off, and open: only sites can state both places.
+            for end, site in enumerate((first, second), 1):
+                site.name = free(f"{equality.name or 'pin'}_{end}")
+            equality.name1, equality.name2 = first.name, second.name
+            continue
+        equality.data, equality.objtype = own, _O.mjOBJ_BODY
+        equality.name1, equality.name2 = (
+            site.parent.name if site.parent.parent is not None else "" for site in (first, second)
+        )
+    for site in [site for site in spec.sites if site.name.startswith(MARK)]:
+        spec.delete(site)
+
+
+def _posed(model: mujoco.MjModel) -> mujoco.MjData:
+    """Return data in the model's own pose, with the rows of its equalities alone."""
+    model.opt.disableflags |= int(_WITHOUT)
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(model)
+    mujoco.mj_fwdPosition(model, data)
+    return data
+
+
+def _keys(spec: mujoco.MjSpec) -> list[Element]:
+    """Return a key of each equality that edits keep: its kind and the first that it names."""
+    return [(COUPLINGS.get(e.type, e.objtype), e.name1) for e in spec.equalities]
+
+
+def _residuals(spec: mujoco.MjSpec, data: mujoco.MjData) -> dict[Element, float]:
+    """Return by how much each active equality is open, m or rad."""
+    found: dict[Element, float] = {}
+    keys = _keys(spec)
+    for row in range(data.ne):
+        key = keys[int(data.efc_id[row])]
+        found[key] = max(found.get(key, 0.0), float(abs(data.efc_pos[row])))
     return found
+
+
+def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Move the joints to the nearest pose in which the equalities hold; return whether there is."""
+    kinds = model.jnt_type
+    # Whatever measures the turn of a ball would measure it from the new pose.
+    measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
+    driven = model.actuator_trnid[np.isin(model.actuator_trntype, _DRIVES), 0]
+    measured |= np.isin(np.arange(model.njnt), driven)
+    still = (kinds == _FREE) | ((kinds == _BALL) & measured)
+    movable = ~still[model.dof_jntid]
+    scalar = np.flatnonzero(kinds > _BALL)
+    places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
+    low, high = np.where(model.jnt_limited[scalar], model.jnt_range[scalar].T, _UNLIMITED)
+    low, high = np.minimum(low, model.qpos0[places]), np.maximum(high, model.qpos0[places])
+    at_limit = np.zeros(model.nv, bool)
+    for _ in range(_MOST_STEPS):
+        residual = data.efc_pos[: data.ne]
+        if not residual.size or np.abs(residual).max() <= _CLOSED:
+            return True
+        jacobian = data.efc_J.reshape(-1, model.nv)[: data.ne]
+        step = np.zeros(model.nv)
+        turning = movable & ~at_limit
+        step[turning] = -np.linalg.pinv(jacobian[:, turning], _SINGULAR) @ residual
+        step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max(initial=0.0)), _LONGEST_STEP))
+        pose = data.qpos.copy()
+        mujoco.mj_integratePos(model, pose, step, 1.0)
+        clipped = np.clip(pose[places], low, high)
+        # A joint at its limit is left out of the next step, which the others must make.
+        at_limit[dofs] = clipped != pose[places]
+        pose[places] = clipped
+        data.qpos[:] = pose
+        mujoco.mj_fwdPosition(model, data)
+    return False
+
+
+def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float]) -> None:
+    """Keep the meaning of a coupling if references have moved, by these changes, rad or m."""
+    kind = COUPLINGS.get(equality.type, _O.mjOBJ_UNKNOWN)
+    by_follower = changes.get((kind, equality.name1), 0.0)
+    by_leader = changes.get((kind, equality.name2), 0.0)
+    if by_follower or by_leader:
+        data = np.array(equality.data)
+        if not equality.name2:
+            data[1:5] = 0.0
+        # p(x + d) from p(x), by its Taylor series.
+        polynomial = np.polynomial.Polynomial(data[:5])
+        data[:5] = [polynomial.deriv(n)(by_leader) / math.factorial(n) for n in range(5)]
+        data[0] -= by_follower
+        equality.data = data

@@ -10,6 +10,7 @@ import numpy as np
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.geometry import (
     ALONG,
+    LONG,
     Array,
     Point,
     anchor,
@@ -17,14 +18,12 @@ from shapechanger.morphology.spec.geometry import (
     far_end,
     has_ends,
     held_at,
-    keep_density,
     orientation,
     place_of,
     rotation,
-    volume,
+    same_density,
 )
 
-_G: Final = mujoco.mjtGeom
 # Shares of a length that differ by less are the same; rounding must not decide on which side of a
 # cut a point lies.
 _SAME: Final = 1e-9
@@ -66,10 +65,13 @@ class Plane:
         self.along = far_end(spec, body) - self._held
         self.place = self._held + part * self.along
 
-    def is_beyond(self, point: Array) -> bool:
+    def _share(self, point: Array) -> float:
+        """Return the position of a point along the segment as a share of its length."""
+        return float((point - self._held) @ self.along) / float(self.along @ self.along)
+
+    def _is_beyond(self, point: Array) -> bool:
         """Return whether a point of the body's frame, m, lies farther out than the plane."""
-        reach = (self._part + _SAME) * float(self.along @ self.along)
-        return float((point - self._held) @ self.along) > reach
+        return self._share(point) > self._part + _SAME
 
     def is_at_end(self, point: Point) -> bool:
         """Return whether a point of the segment is at its far end or past it."""
@@ -77,12 +79,12 @@ class Plane:
 
     def children_beyond(self) -> list[mujoco.MjsBody]:
         """Return the bodies that are attached farther out than the plane."""
-        return [c for c in self._body.bodies if self.is_beyond(held_at(self._spec, c))]
+        return [c for c in self._body.bodies if self._is_beyond(held_at(self._spec, c))]
 
     def points_beyond(self) -> list[Point]:
         """Return the sites, cameras and lights of the segment farther out than the plane."""
         points = (*self._body.sites, *self._body.cameras, *self._body.lights)
-        return [point for point in points if self.is_beyond(place_of(point))]
+        return [point for point in points if self._is_beyond(place_of(point))]
 
     def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
         """Return the part of a geom of the segment on the near side.
@@ -93,52 +95,42 @@ class Plane:
             MorphologyError: If the plane cuts a box that lies oblique to it.
         """
         ends, axis = self._ends(geom)
-        if ends is not None:
-            shares = [self._share(end) for end in ends]
-            if shares[0] > shares[1]:
-                ends, shares = ends[::-1], shares[::-1]
-            inner, outer = shares
-            if outer <= self._part + _SAME:
-                return NearPart(ends[0], 1.0, axis)
-            if inner >= self._part - _SAME:
-                return NearPart(ends[0], 0.0, axis)
-            # Exact for a geom that spans the segment.
-            near = self._held if np.allclose(ends[0], self._held, 0.0, _SAME) else ends[0]
-            inner = 0.0 if near is self._held else inner
-            outer = 1.0 if abs(outer - 1.0) < _SAME else outer
-            return NearPart(near, (self._part - inner) / (outer - inner), axis)
-        if geom.type == _G.mjGEOM_BOX:
-            self._require_one_side(geom)
-        return NearPart(place_of(geom), 0.0 if self.is_beyond(place_of(geom)) else 1.0, axis)
-
-    def _share(self, point: Array) -> float:
-        """Return the position of a point along the segment as a share of its length."""
-        return float((point - self._held) @ self.along) / float(self.along @ self.along)
+        if ends is None:
+            return NearPart(place_of(geom), float(not self._is_beyond(place_of(geom))), axis)
+        inner, outer = (self._share(end) for end in ends)
+        near = ends[0]
+        if inner > outer:
+            near, inner, outer = ends[1], outer, inner
+        if outer <= self._part + _SAME or inner >= self._part - _SAME:
+            return NearPart(near, float(outer <= self._part + _SAME), axis)
+        # Exact for a geom that spans the segment.
+        if np.allclose(near, self._held, 0.0, _SAME):
+            near, inner = self._held, 0.0
+        outer = 1.0 if abs(outer - 1.0) < _SAME else outer
+        return NearPart(near, (self._part - inner) / (outer - inner), axis)
 
     def _ends(self, geom: mujoco.MjsGeom) -> tuple[tuple[Array, Array] | None, int]:
         """Return both ends of a geom's length, and the index of the half-size that it is."""
-        if geom.type in (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER):
+        if geom.type in LONG:
             return axis_ends(self._spec, geom), 1
-        if geom.type != _G.mjGEOM_BOX:
+        if geom.type != mujoco.mjtGeom.mjGEOM_BOX:
             return None, 0
         if has_ends(geom):
             return (np.array(geom.fromto[:3]), np.array(geom.fromto[3:])), 2
         axes = rotation(orientation(self._spec, geom))
         along = np.abs(self.along @ axes) / float(np.linalg.norm(self.along))
         axis = int(np.argmax(along))
-        half = axes[:, axis] * geom.size[axis]
-        return (None if along[axis] < ALONG else (geom.pos - half, geom.pos + half)), axis
-
-    def _require_one_side(self, box: mujoco.MjsGeom) -> None:
-        """Refuse a box whose corners lie on both sides."""
-        axes = rotation(orientation(self._spec, box)) * box.size
+        if along[axis] >= ALONG:
+            half = axes[:, axis] * geom.size[axis]
+            return (geom.pos - half, geom.pos + half), axis
         signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8)
-        sides = {self.is_beyond(box.pos + corner) for corner in (axes @ signs).T}
-        if len(sides) == 2:
+        corners = ((axes * geom.size) @ signs).T
+        if len({self._is_beyond(geom.pos + corner) for corner in corners}) == 2:
             raise MorphologyError(
-                f"{box.name!r} lies oblique to the plane that would cut it in two: cut "
+                f"{geom.name!r} lies oblique to the plane that would cut it in two: cut "
                 f"{self._body.name!r} elsewhere."
             )
+        return None, axis
 
 
 def shorten(
@@ -146,19 +138,13 @@ def shorten(
 ) -> None:
     """Shorten a geom to a share of its length, at the same thickness and density.
 
-    Args:
-        spec: Specification that contains it.
-        geom: The geom.
-        held: End of its axis that stays, in the body's frame, shape (3,), m.
-        share: New length over the old one.
-        axis: Index of the half-size that is its length.
+    The end `held` of its axis stays; `axis` is the index of the half-size that is its length.
     """
-    before = volume(spec, geom)
-    if has_ends(geom):
-        geom.fromto = (held + share * (geom.fromto.reshape(2, 3) - held)).ravel()
-    else:
-        size = np.array(geom.size)
-        size[axis] *= share
-        geom.size = size
-        geom.pos = held + share * (geom.pos - held)
-    keep_density(spec, geom, before)
+    with same_density(spec, geom):
+        if has_ends(geom):
+            geom.fromto = (held + share * (geom.fromto.reshape(2, 3) - held)).ravel()
+        else:
+            size = np.array(geom.size)
+            size[axis] *= share
+            geom.size = size
+            geom.pos = held + share * (geom.pos - held)

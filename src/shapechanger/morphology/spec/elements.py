@@ -1,24 +1,37 @@
-"""Find elements of a model by name or glob, and name those that have no name."""
+"""Find elements of a model, name them, and make explicit what the compiler would derive.
+
+Edits change numbers in place. An element without a name cannot be selected, a pose relative to a
+frame has other axes than its body, and a size, mass or inertia that the compiler sets undoes any
+change.
+"""
 
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final, NamedTuple, TypeVar
 
 import mujoco
+import numpy as np
 
 from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology.spec.geometry import (
+    UPRIGHT,
+    Array,
+    has_ends,
+    orientation,
+    product,
+    rotation,
+    scale_mass,
+    set_orientation,
+)
+from shapechanger.morphology.spec.references import kind_of
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+LEAST_MASS: Final = 1e-14
+"""Ten times the mass and the inertia of a body that MuJoCo refuses, kg and kg·m²."""
 
 
-class _Named(Protocol):
-    name: str
-
-
-_N = TypeVar("_N", bound=_Named)
+_N = TypeVar("_N", bound=Any)
 
 
 def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
@@ -40,35 +53,29 @@ def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
     return found
 
 
-def limbs_and_trunks(spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
-    """Return all bodies except the world."""
-    return [body for body in spec.bodies if body.parent is not None]
+def select_limbs(spec: mujoco.MjSpec, pattern: str, change: str) -> Iterator[mujoco.MjsBody]:
+    """Yield the bodies that match and are there still, since a change may remove others.
 
-
-def require_limb(body: mujoco.MjsBody, what: str) -> None:
-    """Refuse to cut a trunk: a body attached to the world that carries the whole robot.
-
-    Args:
-        body: The body to cut.
-        what: The edit, for the message.
+    The change, such as "cut", is for the message.
 
     Raises:
-        MorphologyError: If `body` is a trunk.
+        UnknownName: If none matches.
+        MorphologyError: If one is a trunk: a body on the world, which carries the whole robot.
     """
-    if body.parent.parent is None:
-        raise MorphologyError(
-            f"{body.name!r} is the trunk that carries all limbs, so it cannot be {what}; "
-            f"its limbs can: {', '.join(child.name for child in body.bodies) or 'it has none'}."
-        )
+    for name in [body.name for body in select("body", pattern, spec.bodies[1:])]:
+        body = spec.body(name)
+        if body is None:
+            continue
+        if body.parent.parent is None:
+            raise MorphologyError(
+                f"{name!r} is the trunk that carries all limbs, so it cannot be {change}; "
+                f"its limbs can: {', '.join(child.name for child in body.bodies) or 'it has none'}."
+            )
+        yield body
 
 
 def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
-    """Refuse a name that an element of the kind already has.
-
-    Args:
-        spec: The specification.
-        kind: Kind of element, such as "body".
-        name: The name.
+    """Refuse a name that an element of the kind, such as "body", already has.
 
     Raises:
         MorphologyError: If `name` is empty or taken.
@@ -76,13 +83,6 @@ def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
     elements = getattr(spec, {"body": "bodies", "equality": "equalities"}.get(kind, f"{kind}s"))
     if not name or any(element.name == name for element in elements):
         raise MorphologyError(f"A new {kind} needs an unused name, got {name!r}.")
-
-
-def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
-    """Yield a body and its descendants, parents first."""
-    yield body
-    for child in body.bodies:
-        yield from subtree(child)
 
 
 def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None = None) -> None:
@@ -97,20 +97,14 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
     """
     chosen = bodies_by_joint or {}
     body_name = unique_namer(body.name for body in spec.bodies)
-    for body in limbs_and_trunks(spec):
+    for body in spec.bodies[1:]:
         if not body.name:
             joint = next((j.name for j in body.joints if j.name), "")
             body.name = body_name(chosen.get(joint, joint or f"{body.parent.name}_part"))
-    for kind, elements in (
-        ("joint", spec.joints),
-        ("geom", spec.geoms),
-        ("site", spec.sites),
-        ("camera", spec.cameras),
-        ("light", spec.lights),
-    ):
+    for elements in (spec.joints, spec.geoms, spec.sites, spec.cameras, spec.lights):
         free = unique_namer(element.name for element in elements)
         for element in elements:
-            element.name = element.name or free(f"{element.parent.name}_{kind}")
+            element.name = element.name or free(f"{element.parent.name}_{kind_of(element)}")
     free = unique_namer(actuator.name for actuator in spec.actuators)
     for actuator in spec.actuators:
         actuator.name = actuator.name or free(actuator.target)
@@ -137,11 +131,140 @@ def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str],
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a copy in which every body stands for itself, in its own frame.
-
-    Args:
-        spec: The specification; not changed.
-    """
+    """Compile a copy in which every body stands for itself, in its own frame."""
     copy = spec.copy()
     copy.compiler.fusestatic = copy.compiler.alignfree = copy.compiler.discardvisual = False
     return copy.compile()
+
+
+# --- What the compiler would derive again ------------------------------------------------------
+
+
+def make_explicit(spec: mujoco.MjSpec) -> None:
+    """Name every element, and write out whatever the compiler would derive again, in place.
+
+    These are frames, a total mass, least masses and inertias, and primitives that are fitted to
+    meshes. The physics does not change.
+
+    Raises:
+        MorphologyError: If a frame scales its elements, or a least mass cannot be written out.
+    """
+    name_elements(spec)
+    resolve_frames(spec)
+    if spec.compiler.settotalmass > 0.0:
+        total = spec.compiler.settotalmass
+        spec.compiler.settotalmass = -1.0
+        factor = total / float(spec.copy().compile().body_mass.sum())
+        for body in spec.bodies[1:]:
+            scale_mass(body, factor)
+    _write_out_bounds(spec)
+    meshes = (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF)
+    fitted = [e for e in (*spec.geoms, *spec.sites) if e.meshname and e.type not in meshes]
+    model: Any = compiled(spec) if fitted else None
+    for element in fitted:
+        kind = model.geom if isinstance(element, mujoco.MjsGeom) else model.site
+        final = kind(element.name)
+        element.meshname = ""
+        element.size, element.pos = final.size, final.pos
+        set_orientation(element, final.quat)
+
+
+def _write_out_bounds(spec: mujoco.MjSpec) -> None:
+    """Give the bodies that the compiler makes heavier their final inertia, and drop the bounds."""
+    compiler = spec.compiler
+    if max(compiler.boundmass, compiler.boundinertia) <= LEAST_MASS:
+        return
+    bounded = compiled(spec)
+    compiler.boundmass = min(compiler.boundmass, LEAST_MASS)
+    compiler.boundinertia = min(compiler.boundinertia, LEAST_MASS)
+    free = compiled(spec)
+    for body in spec.bodies[1:]:
+        final, own = bounded.body(body.name), free.body(body.name)
+        if final.mass == own.mass and np.array_equal(final.inertia, own.inertia):
+            continue
+        if compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+            raise MorphologyError(
+                f"The least mass or inertia of the compiler raises that of {body.name!r}, which "
+                "would undo an edit: give the body a denser geom, or drop boundmass and "
+                "boundinertia."
+            )
+        body.explicitinertial = True
+        body.mass, body.ipos, body.iquat = final.mass[0], final.ipos, final.iquat
+        body.inertia, body.fullinertia = final.inertia, np.full(6, np.nan)
+        body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def resolve_frames(spec: mujoco.MjSpec) -> None:
+    """Express every pose relative to its body, and reset the frames.
+
+    Raises:
+        MorphologyError: If a frame scales its elements.
+    """
+    for frame in spec.frames:
+        if np.any(frame.scale != 1.0) or frame.massscale:
+            raise MorphologyError(
+                f"The frame {frame.name!r} scales its elements: write the sizes out instead."
+            )
+    frames = [frame for frame in spec.frames if not _is_trivial(frame)]
+    if not frames:
+        return
+    for element in (*spec.bodies[1:], *spec.geoms, *spec.sites, *spec.cameras):
+        if pose := _pose_of_frames(spec, element.frame):
+            _resolve(spec, element, pose)
+    for joint in spec.joints:
+        if pose := _pose_of_frames(spec, joint.frame):
+            joint.pos = pose.seen(joint.pos)
+            joint.axis = rotation(pose.turn) @ joint.axis
+    for light in spec.lights:
+        if pose := _pose_of_frames(spec, light.frame):
+            light.pos = pose.seen(light.pos)
+            light.dir = rotation(pose.turn) @ light.dir
+    for frame in frames:
+        frame.pos = np.zeros(3)
+        set_orientation(frame, UPRIGHT)
+
+
+def _is_trivial(frame: mujoco.MjsFrame) -> bool:
+    """Return whether a frame neither moves nor turns its elements."""
+    written = frame.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
+    return written and not np.any(frame.pos) and np.array_equal(frame.quat, UPRIGHT)
+
+
+class _Pose(NamedTuple):
+    """Pose of frames in their body's frame: quaternion (w, x, y, z) and position, m."""
+
+    turn: Array
+    shift: Array
+
+    def seen(self, point: Array) -> Array:
+        """Return a point of a frame relative to the body, m."""
+        return self.shift + rotation(self.turn) @ point
+
+
+def _resolve(spec: mujoco.MjSpec, element: Any, pose: _Pose) -> None:
+    """Express the pose of a body, geom, site or camera relative to its body."""
+    if has_ends(element):
+        first, last = element.fromto.reshape(2, 3)
+        if element.type != mujoco.mjtGeom.mjGEOM_BOX:
+            element.fromto = np.concatenate([pose.seen(first), pose.seen(last)])
+            return
+        # The turn of a box about its axis follows from the frame: write its pose, as MuJoCo does.
+        length, upwards = float(np.linalg.norm(first - last)), np.empty(4)
+        mujoco.mju_quatZ2Vec(upwards, (first - last) / length)
+        element.pos, element.quat = 0.5 * (first + last), upwards
+        element.size = [element.size[0], element.size[0], 0.5 * length]
+        element.fromto = np.full(6, np.nan)
+    element.pos = pose.seen(element.pos)
+    set_orientation(element, product(pose.turn, orientation(spec, element)))
+
+
+def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> _Pose | None:
+    """Return the pose of nested frames relative to the body; None without a frame."""
+    pose = None
+    while frame is not None:
+        around = _Pose(orientation(spec, frame), np.array(frame.pos))
+        if pose is not None:
+            around = _Pose(product(around.turn, pose.turn), around.seen(pose.shift))
+        pose = around
+        frame = frame.frame
+    return pose

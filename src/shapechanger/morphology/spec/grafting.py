@@ -1,4 +1,4 @@
-"""Copy and move limbs, geoms and sites within a model, and copy what names them."""
+"""Copy, move and resize limbs, geoms and sites within a model, and copy what names them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,32 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.elements import require_free_name, subtree
-from shapechanger.morphology.spec.explicit import resolve_frames
-from shapechanger.morphology.spec.geometry import Point, has_ends, orientation, rotation
+from shapechanger.morphology.spec.elements import require_free_name, resolve_frames
+from shapechanger.morphology.spec.geometry import (
+    Point,
+    anchor,
+    carry_outwards,
+    has_ends,
+    orientation,
+    product,
+    require_geometry,
+    resize_geom,
+    rotation,
+)
+from shapechanger.morphology.spec.joints import scale_resistance, scale_strength
 from shapechanger.morphology.spec.references import (
     COUPLINGS,
     Element,
     elements_of,
+    elements_on,
+    key_of,
+    kind_of,
+    moves_only,
+    path_elements,
     path_of,
     references,
     release_drawings,
+    subtree,
 )
 
 _O: Final = mujoco.mjtObj
@@ -31,7 +47,6 @@ _APART: Final = frozenset(
     {"name", "alt", "ialt", "quat", "iquat", "classname", "childclass", "info"}
 )
 _IN_DEGREES: Final = ("range", "ref", "springref")
-_POINTS: Final = ("joint", "geom", "site", "camera", "light")
 
 
 def copy_limb(
@@ -67,57 +82,27 @@ def copy_limb(
 def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody) -> mujoco.MjsBody:
     """Attach a limb to another body, at the same pose in its frame; what names it still does.
 
-    Args:
-        spec: Specification that contains it.
-        limb: First body of the limb.
-        parent: The body to attach it to.
-
     Returns:
-        The limb, which is another object now.
+        The new body; the old handle is invalid.
     """
     # References are by name: under another name the old elements go without them.
     for body in subtree(limb):
-        body.name += _OLD
-        for kind in _POINTS:
-            for element in getattr(body, f"{kind}s"):
-                element.name += _OLD
+        for element in (body, *elements_on(body)):
+            element.name += _OLD
     moved = _copy_body(spec, limb, parent, lambda name: name.removesuffix(_OLD))
     spec.delete(limb)
     return moved
 
 
-def copy_geom(
-    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody, name: str
-) -> mujoco.MjsGeom:
-    """Add a copy of a geom to another body, at the same pose in its frame.
-
-    Args:
-        spec: Specification that contains it.
-        geom: The geom to copy.
-        body: Body of the copy.
-        name: Name of the copy.
-
-    Raises:
-        MorphologyError: If the name is taken.
-    """
-    require_free_name(spec, "geom", name)
-    return _copy_point(spec, geom, body, name)
-
-
 def move_point(spec: mujoco.MjSpec, point: Point, body: mujoco.MjsBody) -> Any:
     """Move a site, geom, camera or light to another body, to the same pose in its frame.
 
-    Args:
-        spec: Specification that contains it.
-        point: The site, geom, camera or light.
-        body: Its new body.
-
     Returns:
-        The element, which is another object now.
+        The new element; the old handle is invalid.
     """
     name = point.name
     point.name = name + _OLD  # References are by name.
-    moved = _copy_point(spec, point, body, name)
+    moved = copy_element(spec, point, body, name)
     spec.delete(point)
     return moved
 
@@ -129,46 +114,46 @@ def _copy_body(
     renamed: Callable[[str], str],
 ) -> mujoco.MjsBody:
     """Copy a body with all that hangs on it."""
-    copy = place.add_body()
-    _copy_fields(spec, body, copy)
-    copy.name = renamed(body.name)
-    for kind in _POINTS:
-        for element in getattr(body, f"{kind}s"):
-            _copy_point(spec, element, copy, element.name and renamed(element.name))
+    copy = copy_element(spec, body, place, renamed(body.name))
+    for element in elements_on(body):
+        copy_element(spec, element, copy, element.name and renamed(element.name))
     for child in body.bodies:
         _copy_body(spec, child, copy, renamed)
     return copy
 
 
-def _copy_point(spec: mujoco.MjSpec, point: Any, body: mujoco.MjsBody, name: str) -> Any:
-    """Copy an element that is on a body."""
-    kind = type(point).__name__.removeprefix("Mjs").lower()
-    copy = getattr(body, f"add_{kind}")()
-    _copy_fields(spec, point, copy)
-    copy.name = name
-    return copy
+def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> Any:
+    """Add a copy of one element, which names the same others.
 
-
-def _copy_fields(spec: mujoco.MjSpec, old: Any, new: Any) -> None:
-    """Copy all but the name of an element to a new one of its kind.
+    Args:
+        spec: Specification that contains it.
+        element: The element; a body is copied without what hangs on it, a tendon without its path.
+        place: The body or frame that the copy is added to, or `spec` for an element on no body.
+        name: Name of the copy; empty for none.
 
     Raises:
-        MorphologyError: If a plugin drives the element.
+        MorphologyError: If the name is taken, or a plugin drives the element.
     """
-    if hasattr(old, "plugin") and old.plugin.active:
-        raise MorphologyError(f"{old.name!r} is driven by a plugin, so it cannot be copied.")
-    for field in _fields_of(old.__class__):
-        setattr(new, field, getattr(old, field))
-    if hasattr(old, "quat"):
-        new.quat = orientation(spec, old)
-    if isinstance(old, mujoco.MjsBody):
-        new.iquat = orientation(spec, old, old.ialt, old.iquat)
+    kind = kind_of(element)
+    if name:
+        require_free_name(spec, kind, name)
+    if hasattr(element, "plugin") and element.plugin.active:
+        raise MorphologyError(f"{element.name!r} is driven by a plugin, so it cannot be copied.")
+    copy = getattr(place, f"add_{kind}")()
+    for field in _fields_of(element.__class__):
+        setattr(copy, field, getattr(element, field))
+    if hasattr(element, "quat"):
+        copy.quat = orientation(spec, element)
+    if isinstance(element, mujoco.MjsBody):
+        copy.iquat = orientation(spec, element, of_inertia=True)
     # Limits of attached models can have other units than those of elements that are added.
-    turns = isinstance(old, mujoco.MjsJoint) and old.type != mujoco.mjtJoint.mjJNT_SLIDE
-    if turns and old.compiler.degree != new.compiler.degree:
-        convert = np.rad2deg if new.compiler.degree else np.deg2rad
+    turns = isinstance(element, mujoco.MjsJoint) and element.type != mujoco.mjtJoint.mjJNT_SLIDE
+    if turns and element.compiler.degree != copy.compiler.degree:
+        convert = np.rad2deg if copy.compiler.degree else np.deg2rad
         for field in _IN_DEGREES:
-            setattr(new, field, convert(getattr(old, field)))
+            setattr(copy, field, convert(getattr(element, field)))
+    copy.name = name
+    return copy
 
 
 @functools.cache
@@ -178,19 +163,44 @@ def _fields_of(kind: type) -> tuple[str, ...]:
     return tuple(name for name in settable if name not in _APART)
 
 
+def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
+    """Scale a limb in size and strength, in place, with everything attached to it.
+
+    Raises:
+        MorphologyError: If a body of it cannot be reshaped, or an actuator cannot be scaled.
+    """
+    for body in subtree(limb):
+        require_geometry(spec, body)
+        held = anchor(body)
+        for geom in body.geoms:
+            resize_geom(spec, geom, held, factor)
+        carry_outwards(spec, body, held, factor)
+        for joint in body.joints:
+            scale_resistance(joint, factor)
+    elements = elements_of(limb)
+    release_drawings(spec, elements)
+    for tendon in spec.tendons:
+        path = {*path_elements(tendon)}
+        if path.isdisjoint(elements) or not moves_only(spec, tendon, elements):
+            continue
+        elements.add(key_of(tendon))
+        scale_resistance(tendon, factor)
+        if path <= elements and _O.mjOBJ_JOINT not in {kind for kind, _ in path}:
+            tendon.range = tendon.range * factor
+            # A negative length stands for the length in the reference pose.
+            lengths = np.array(tendon.springlength)
+            tendon.springlength = np.where(lengths > 0.0, lengths * factor, lengths)
+    for mention in references(spec, "actuator"):
+        strong = mention.element[0] in (_O.mjOBJ_JOINT, _O.mjOBJ_TENDON)
+        if strong and mention.element in elements:
+            scale_strength(mention.holder, factor)
+
+
 # --- Elements that name others -----------------------------------------------------------------
 
 
 class _Copies:
-    """Copies of all that names the elements of a limb.
-
-    Args:
-        spec: Specification that contains it.
-        limb: First body of the limb.
-        suffix: Appended to the names of all copied elements.
-        turn: Turn of the copy about its parent, quaternion (w, x, y, z).
-        inside: The elements of the limb; the tendons and actuators that are copied are added.
-    """
+    """Copies of all that names the elements of a limb, with the arguments of `copy_limb`."""
 
     def __init__(
         self,
@@ -201,6 +211,7 @@ class _Copies:
         inside: set[Element],
     ) -> None:
         self._spec, self._suffix, self._turn = spec, suffix, turn
+        # The elements of the limb; those that are copied with it are added.
         self._parent, self._inside = limb.parent, inside
         # Points of the parent that have been copied and turned.
         self._turned: set[Element] = set()
@@ -212,26 +223,21 @@ class _Copies:
         spec, inside = self._spec, self._inside
         for tendon in [each for each in spec.tendons if self._names_inside(each)]:
             self._copy_tendon(tendon)
-            inside.add((_O.mjOBJ_TENDON, tendon.name))
+            inside.add(key_of(tendon))
         for equality in spec.equalities:
             self._require_own_follower(equality)
-        for elements, kind, fields in (
-            (spec.equalities, "equality", ()),
-            (spec.excludes, "exclude", ()),
-            (spec.pairs, "pair", ()),
-            # One whose other end alone is on the limb moves another limb.
-            (spec.actuators, "actuator", ("target", "slidersite")),
-            (spec.sensors, "sensor", ()),
-        ):
-            for holder in [each for each in elements if self._names_inside(each, *fields)]:
-                self._copy_holder(holder, kind)
-                if kind == "actuator":
-                    inside.add((_O.mjOBJ_ACTUATOR, holder.name))
-        holders = {"camera": _O.mjOBJ_CAMERA, "light": _O.mjOBJ_LIGHT}
+        # Sensors last: they may name the others.
+        holders = (*spec.equalities, *spec.excludes, *spec.pairs, *spec.actuators, *spec.sensors)
+        for holder in holders:
+            # An actuator whose other end alone is on the limb moves another limb.
+            moves = isinstance(holder, mujoco.MjsActuator)
+            if self._names_inside(holder, *(("target", "slidersite") if moves else ())):
+                self._copy_holder(holder)
+                inside.add(key_of(holder))
         for mention in self._references:
-            name = mention.holder.name
-            if (holders.get(mention.kind), name) in inside and mention.element in inside:
-                copy = getattr(spec, mention.kind)(name + self._suffix)
+            aims = mention.kind in ("camera", "light") and key_of(mention.holder) in inside
+            if aims and mention.element in inside:
+                copy = getattr(spec, mention.kind)(mention.holder.name + self._suffix)
                 copy.targetbody = mention.element[1] + self._suffix
 
     def _names_inside(self, holder: Any, *fields: str) -> bool:
@@ -253,19 +259,21 @@ class _Copies:
                 "too: copy a limb that holds both."
             )
 
-    def _copy_holder(self, holder: Any, kind: str) -> None:
-        """Copy an element that names one of the limb."""
-        copy = copy_holder(self._spec, holder, kind, self._suffix)
-        for mention in (each for each in self._references if each.holder == holder):
-            if kind in ("equality", "actuator"):
-                name = self._name(*mention.element)
-            else:
-                name = mention.element[1] + self._suffix * (mention.element in self._inside)
-            setattr(copy, mention.field, name)
+    def _copy_holder(self, holder: Any) -> Any:
+        """Copy an element that names one of the limb, without the path of a tendon."""
+        name = holder.name and holder.name + self._suffix
+        copy = copy_element(self._spec, holder, self._spec, name)
+        tied = isinstance(holder, mujoco.MjsEquality | mujoco.MjsActuator)
+        for mention in self._references:
+            if mention.holder == holder and mention.kind != "tendon":
+                own = self._suffix if mention.element in self._inside else ""
+                new = self._name(*mention.element) if tied else mention.element[1] + own
+                setattr(copy, mention.field, new)
+        return copy
 
     def _copy_tendon(self, tendon: mujoco.MjsTendon) -> None:
         """Copy a tendon, with the points of its path outside of the limb turned."""
-        copy = copy_holder(self._spec, tendon, "tendon", self._suffix)
+        copy = self._copy_holder(tendon)
         kinds = mujoco.mjtWrap
         for wrap in path_of(tendon):
             if wrap.type == kinds.mjWRAP_PULLEY:
@@ -293,39 +301,16 @@ class _Copies:
         point = finders[kind](name) if kind in finders else None
         if point is None or point.parent != self._parent or self._parent.parent is None:
             return name
-        require_free_name(self._spec, "site" if kind == _O.mjOBJ_SITE else "geom", new)
-        copy = _copy_point(self._spec, point, self._parent, new)
+        copy = copy_element(self._spec, point, self._parent, new)
         matrix = rotation(self._turn)
         if has_ends(copy):
             copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
         copy.pos = matrix @ copy.pos
-        turned = np.empty(4)
-        mujoco.mju_mulQuat(turned, self._turn, copy.quat)
-        copy.quat = turned
+        copy.quat = product(self._turn, copy.quat)
         if isinstance(copy, mujoco.MjsGeom):  # A tendon bends around it; that needs no second mass.
             copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
         self._turned.add((kind, name))
         return new
-
-
-def copy_holder(spec: mujoco.MjSpec, holder: Any, kind: str, suffix: str) -> Any:
-    """Add a copy of an element that names others; it names the same ones.
-
-    Args:
-        spec: Specification that contains it.
-        holder: A tendon without its path, an exclusion, contact pair, equality, actuator or sensor.
-        kind: Its kind, as in `MjSpec.add_...`.
-        suffix: Appended to its name, if it has one.
-
-    Raises:
-        MorphologyError: If the new name is taken, or the element cannot be copied.
-    """
-    if holder.name:
-        require_free_name(spec, kind, holder.name + suffix)
-    copy = getattr(spec, f"add_{kind}")()
-    _copy_fields(spec, holder, copy)
-    copy.name = holder.name and holder.name + suffix
-    return copy
 
 
 def share_contacts(
@@ -333,17 +318,11 @@ def share_contacts(
 ) -> None:
     """Give the farther part of a segment the exclusions and contact pairs of the whole.
 
-    Args:
-        spec: Specification that contains it.
-        body: The segment, now its nearer part.
-        part: Its farther part.
-        cut: Names of the farther parts of geoms that were cut in two, by those of the nearer ones.
+    `cut` has the names of the farther halves of geoms by the names of the nearer ones.
     """
-    halves = {(_O.mjOBJ_BODY, body.name): part.name}
+    halves = {key_of(body): part.name}
     halves |= {(_O.mjOBJ_GEOM, near): far for near, far in cut.items()}
     for mention in references(spec, "exclusion", "contact pair"):
-        far = halves.get(mention.element)
-        if far:
-            kind = "exclude" if mention.kind == "exclusion" else "pair"
-            copy = copy_holder(spec, mention.holder, kind, f"_of_{part.name}")
-            setattr(copy, mention.field, far)
+        if far := halves.get(mention.element):
+            name = mention.holder.name and f"{mention.holder.name}_of_{part.name}"
+            setattr(copy_element(spec, mention.holder, spec, name), mention.field, far)

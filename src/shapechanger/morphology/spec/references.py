@@ -8,14 +8,13 @@ meanwhile, and keyframes are kept by name (`loops`, `carried`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.elements import subtree
 
 _O: Final = mujoco.mjtObj
 _T: Final = mujoco.mjtTrn
@@ -26,6 +25,7 @@ Element = tuple[mujoco.mjtObj, str]
 """Kind and name of an element."""
 
 OF_JOINTS: Final = (_T.mjTRN_JOINT, _T.mjTRN_JOINTINPARENT)
+PINS: Final = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
 COUPLINGS: Final = {_E.mjEQ_JOINT: _O.mjOBJ_JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 """Equalities y - y0 = p(x - x0) of a follower y and a leader x, and the kind of both."""
 
@@ -46,13 +46,6 @@ _WRAPS: Final = {
     _W.mjWRAP_SPHERE: _O.mjOBJ_GEOM,
     _W.mjWRAP_CYLINDER: _O.mjOBJ_GEOM,
 }
-_ON_BODIES: Final = {
-    _O.mjOBJ_JOINT: "joints",
-    _O.mjOBJ_GEOM: "geoms",
-    _O.mjOBJ_SITE: "sites",
-    _O.mjOBJ_CAMERA: "cameras",
-    _O.mjOBJ_LIGHT: "lights",
-}
 # Sensors of all geoms of a body, so of both parts after a split.
 _OF_ALL_GEOMS: Final = (
     *(mujoco.mjtSensor.mjSENS_GEOMDIST, mujoco.mjtSensor.mjSENS_GEOMNORMAL),
@@ -65,7 +58,7 @@ class Mention(NamedTuple):
 
     Attributes:
         holder: The element that names.
-        kind: Its kind, for messages and for `copies`.
+        kind: Its kind, for messages.
         field: Its field that holds the name; `path` of a tendon.
         element: The named element.
     """
@@ -76,12 +69,37 @@ class Mention(NamedTuple):
     element: Element
 
     def __str__(self) -> str:
+        if self.holder.name:
+            return f"the {self.kind} {self.holder.name!r}"
         name = self.element[1]
-        if not self.holder.name and name.startswith(MARK):
-            return f"the {self.kind}"
-        return f"the {self.kind} " + (
-            f"{self.holder.name!r}" if self.holder.name else f"of {name!r}"
-        )
+        return f"the {self.kind}" if name.startswith(MARK) else f"the {self.kind} of {name!r}"
+
+
+def kind_of(element: Any) -> str:
+    """Return the kind of an element, such as "body"."""
+    return type(element).__name__.removeprefix("Mjs").lower()
+
+
+def key_of(element: Any) -> Element:
+    """Return the kind and name of an element."""
+    return getattr(_O, f"mjOBJ_{kind_of(element).upper()}"), element.name
+
+
+def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
+    """Yield a body and its descendants, parents first."""
+    yield body
+    for child in body.bodies:
+        yield from subtree(child)
+
+
+def elements_on(body: mujoco.MjsBody) -> list[Any]:
+    """Return the joints, geoms, sites, cameras and lights of a body."""
+    return [*body.joints, *body.geoms, *body.sites, *body.cameras, *body.lights]
+
+
+def elements_of(limb: mujoco.MjsBody) -> set[Element]:
+    """Return all elements of a limb."""
+    return {key_of(each) for body in subtree(limb) for each in (body, *elements_on(body))}
 
 
 def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
@@ -101,10 +119,9 @@ def path_of(tendon: mujoco.MjsTendon) -> list[Any]:
 
 
 def _bound(equality: mujoco.MjsEquality) -> mujoco.mjtObj:
-    pins = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
-    return (
-        equality.objtype if equality.type in pins else COUPLINGS.get(equality.type, _O.mjOBJ_FLEX)
-    )
+    if equality.type in PINS:
+        return equality.objtype
+    return COUPLINGS.get(equality.type, _O.mjOBJ_FLEX)
 
 
 def _driven(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
@@ -134,11 +151,8 @@ _HOLDERS: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
 def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
-    Keyframes refer to joints and actuators by their order; see `carried`.
-
-    Args:
-        spec: The specification.
-        *kinds: Kinds of holders, such as "actuator"; all by default.
+    Keyframes refer to joints and actuators by their order; see `carried`. The kinds of holders,
+    such as "actuator", are all by default.
     """
     found = [
         Mention(tendon, "tendon", "path", element)
@@ -150,9 +164,8 @@ def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
             for field, of in fields.items():
                 value: str | list[str] = getattr(holder, field)
                 names = [value] if isinstance(value, str) else list(value)
-                target: Any = of(holder) if callable(of) else of
-                if isinstance(of, str):
-                    target = getattr(holder, of)
+                target: Any = getattr(holder, of) if isinstance(of, str) else of
+                target = target(holder) if callable(target) else target
                 # A tuple has one kind for each name.
                 targets = [target] * len(names) if isinstance(target, _O) else list(target)
                 for named, name in zip(targets, names, strict=True):
@@ -165,26 +178,11 @@ def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
     return _O.mjOBJ_BODY if kind == _O.mjOBJ_XBODY else kind
 
 
-def elements_of(limb: mujoco.MjsBody) -> set[Element]:
-    """Return all elements of a limb."""
-    found: set[Element] = set()
-    for body in subtree(limb):
-        found.add((_O.mjOBJ_BODY, body.name))
-        for kind, elements in _ON_BODIES.items():
-            found |= {(kind, element.name) for element in getattr(body, elements)}
-    return found
-
-
 # --- Elements that change their shape ---------------------------------------------------------
 
 
 def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool = True) -> None:
     """Remove the skins over bodies that change; they have no physical effect.
-
-    Args:
-        spec: Specification that contains them.
-        touched: Elements that are reshaped, removed or copied.
-        skins: False to keep the skins.
 
     Raises:
         MorphologyError: If one of the bodies carries a part of a flex.
@@ -204,13 +202,9 @@ def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool 
 
 
 def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str) -> None:
-    """Refuse an edit that would leave a reference to an element without its meaning.
+    """Refuse to change an element that another names, by some kinds of references or by any.
 
-    Args:
-        spec: Specification that contains it.
-        element: The element.
-        why: The reason, as the end of a sentence, such as "lies beyond the cut".
-        *kinds: Kinds of references to refuse; all by default.
+    `why` ends the sentence on the element, such as "lies beyond the cut".
 
     Raises:
         MorphologyError: If anything names the element.
@@ -229,10 +223,6 @@ def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
 
     Motors, sensors, exclusions, contact pairs, pins and followers go with the limb, and so do the
     tendons that move it alone. Cameras and lights that aim at it aim at the body that carried it.
-
-    Args:
-        spec: Specification that contains it.
-        limb: First body of the limb.
 
     Raises:
         MorphologyError: If an element elsewhere would lose what moves it.
@@ -257,23 +247,19 @@ def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
 def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
     """Refuse to remove a limb without which an element elsewhere would lose what moves it.
 
-    Args:
-        spec: Specification that contains it.
-        limb: First body of the limb.
-
     Raises:
         MorphologyError: If a tendon, coupling or actuator ties it to what stays.
     """
     gone = elements_of(limb)
     for tendon in spec.tendons:
-        crosses = not gone.isdisjoint(path_elements(tendon))
-        if crosses and not moves_only(spec, tendon, gone) and _does_something(spec, tendon):
+        if gone.isdisjoint(path_elements(tendon)):
+            continue
+        if not moves_only(spec, tendon, gone) and _does_something(spec, tendon):
             raise MorphologyError(
                 f"The tendon {tendon.name!r} also moves what stays when {limb.name!r} is removed: "
                 "remove or reroute the tendon first."
             )
-        if crosses:
-            gone.add((_O.mjOBJ_TENDON, tendon.name))
+        gone.add(key_of(tendon))
     for equality in spec.equalities:
         kind = COUPLINGS.get(equality.type)
         if kind and (kind, equality.name2) in gone and (kind, equality.name1) not in gone:
@@ -292,13 +278,7 @@ def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
 
 
 def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Element]) -> bool:
-    """Return whether a tendon moves nothing but a limb.
-
-    Args:
-        spec: Specification that contains it.
-        tendon: The tendon.
-        elements: The elements of the limb.
-    """
+    """Return whether a tendon moves nothing but the limb with these elements."""
     staying = {*path_elements(tendon)} - elements
     if any(kind == _O.mjOBJ_JOINT for kind, _ in staying):
         return False
@@ -321,7 +301,7 @@ def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
     acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
     if tendon.limited == mujoco.mjtLimited.mjLIMITED_TRUE or automatic or acts or tendon.armature:
         return True
-    return any(each.element == (_O.mjOBJ_TENDON, tendon.name) for each in references(spec))
+    return any(each.element == key_of(tendon) for each in references(spec))
 
 
 # --- Joints that are locked -------------------------------------------------------------------
@@ -335,20 +315,15 @@ def remove_joint(
 ) -> None:
     """Remove a locked joint; what is coupled to it is held where the coupling puts it.
 
-    Its motor and its sensors go with it, and so does a tendon whose joints are all locked.
-
-    Args:
-        spec: Specification that contains it.
-        joint: The joint.
-        displacements: Position relative to the reference, rad or m, of each joint that is being
-            locked, this one included.
+    Its motor and its sensors go with it, and so does a tendon whose joints are all locked, at these
+    displacements from their references, rad or m.
 
     Raises:
         MorphologyError: If a tendon ties the joint to others, or a coupling contradicts the lock.
     """
     name = joint.name
     _hold(spec, _E.mjEQ_JOINT, name, displacements[name])
-    gone: set[Element] = {(_O.mjOBJ_JOINT, name)}
+    gone = {key_of(joint)}
     for tendon in list(spec.tendons):
         coefficients = {
             wrap.target.name: float(wrap.coef)
@@ -360,7 +335,7 @@ def remove_joint(
         if coefficients.keys() <= displacements.keys():
             length = sum(coefficients[j] * displacements[j] for j in coefficients)
             _hold(spec, _E.mjEQ_TENDON, tendon.name, length)
-            gone.add((_O.mjOBJ_TENDON, tendon.name))
+            gone.add(key_of(tendon))
         elif _does_something(spec, tendon):
             raise MorphologyError(
                 f"{name!r} is tied to other joints by the tendon {tendon.name!r}, so it cannot "
@@ -369,7 +344,7 @@ def remove_joint(
         spec.delete(tendon)
     for actuator in list(spec.actuators):
         if (_TARGETS.get(actuator.trntype), actuator.target) in gone:
-            gone.add((_O.mjOBJ_ACTUATOR, actuator.name))
+            gone.add(key_of(actuator))
             spec.delete(actuator)
     for sensor in list(spec.sensors):
         if (sensor.objtype, sensor.objname) in gone:
@@ -378,14 +353,7 @@ def remove_joint(
 
 
 def _hold(spec: mujoco.MjSpec, kind: mujoco.mjtEq, name: str, locked: float) -> None:
-    """Hold what is coupled to an element that no longer moves.
-
-    Args:
-        spec: Specification that contains it.
-        kind: Kind of coupling.
-        name: Name of the joint or tendon.
-        locked: Its value relative to that of the reference pose, rad or m.
-    """
+    """Hold what is coupled to a joint or tendon that is `locked`, rad or m, from its reference."""
     for equality in [e for e in spec.equalities if e.type == kind]:
         polynomial = np.array(equality.data[:5])
         if equality.name2 == name:
@@ -425,11 +393,6 @@ def _set_constant(equality: mujoco.MjsEquality, name: str, held: float) -> None:
 def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[str]) -> None:
     """Refuse to divide what names a whole segment, or a geom that would be cut in two.
 
-    Args:
-        spec: Specification that contains it.
-        body: The segment.
-        cut: Names of its geoms that would be cut in two.
-
     Raises:
         MorphologyError: If a reference would mean one of the parts only.
     """
@@ -437,7 +400,7 @@ def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[s
         require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", "tendon", "sensor")
     for mention in references(spec, "actuator", "sensor"):
         whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
-        if whole and mention.element == (_O.mjOBJ_BODY, body.name):
+        if whole and mention.element == key_of(body):
             raise MorphologyError(
                 f"{body.name!r} cannot be split: {mention} is about all of its geoms."
             )

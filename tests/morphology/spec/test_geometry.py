@@ -1,4 +1,4 @@
-"""Geoms: volume, orientation and size."""
+"""Geoms and segments: volume, orientation and size, and what moves along."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import Radius, Stretch
-from shapechanger.morphology.spec.geometry import (
-    axis_ends,
-    orientation,
-    rotation,
-)
-from tests.morphology.models import built, limb, mass, spec_of
+from shapechanger.morphology import Cut, Radius, Stretch
+from shapechanger.morphology.spec.geometry import axis_ends, orientation, rotation
+from tests.morphology.models import built, gantry, leg, limb, mass, spec_of
 
 _PRIMITIVES = {
     "sphere": 'type="sphere" size=".2"',
@@ -119,3 +115,63 @@ def test_oblique_ends_are_stretched_along_an_axis() -> None:
 def test_the_longest_side_is_the_length(content: str, sizes: list[float]) -> None:
     """`Radius` scales the other two half-sizes."""
     np.testing.assert_allclose(_sizes(content, Radius("link", 3.0)), sizes)
+
+
+# --- Segments ----------------------------------------------------------------------------------
+
+_MESH = """
+<mujoco>
+  <asset>
+    <mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/>
+    <hfield name="hill" nrow="2" ncol="2" size="1 1 .1 .1"/>
+  </asset>
+  <worldbody>
+    <body name="trunk"><geom name="trunk" size=".1"/>
+      <body name="link" pos="0 0 1"><joint name="link"/>
+        <geom name="horn" type="mesh" mesh="wedge"/>
+        <geom type="capsule" size=".1 .2"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+_WRITTEN_OUT = """
+<inertial pos=".1 0 0" mass="2" diaginertia=".1 .2 .25"/>
+<geom name="link" type="capsule" size=".1 .2"/>
+"""
+
+
+def test_children_move_along_with_a_stretch() -> None:
+    """Bodies move by their anchors, sites and further joints by their positions."""
+    model = built(leg(), Stretch("thigh", 2.0))
+    np.testing.assert_allclose(model.site("scar").pos, [0.0, 0.0, -0.12])
+    # The knee, 5 cm below the shin's origin, stays at the end of the thigh.
+    np.testing.assert_allclose(model.body("shin").pos + model.joint("knee").pos, [0.0, 0.0, -0.6])
+    np.testing.assert_array_equal(model.joint("knee").pos, [0.0, 0.0, -0.05])
+    rig = built(gantry(), Stretch("rig", 2.0))
+    held = np.array([0.3, 0.1, 0.0])
+    np.testing.assert_allclose(rig.joint("yaw").pos, held)
+    np.testing.assert_allclose(rig.joint("pitch").pos, held + 2.0 * ([0.0, 0.2, 0.1] - held))
+
+
+def test_sites_with_ends_are_stretched_too() -> None:
+    spec = limb(
+        '<geom type="capsule" size=".1 .2"/>'
+        '<site name="s" type="capsule" size=".01" fromto="0 0 0 0 0 .4"/>'
+    )
+    model = built(spec, Stretch("link", 2.0))
+    np.testing.assert_allclose(model.site("s").pos, [0.0, 0.0, 0.4])
+    assert model.site("s").size[1] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("edit", [Stretch("link", 2.0), Radius("link", 2.0), Cut("link", 0.5)])
+def test_meshes_and_explicit_inertias_prevent_reshaping(edit: Stretch | Radius | Cut) -> None:
+    with pytest.raises(MorphologyError, match="'link' holds 'horn', a mesh; only spheres, caps"):
+        built(spec_of(_MESH), edit)
+    with pytest.raises(MorphologyError, match="'link' has its inertia written out, so it would n"):
+        built(limb(_WRITTEN_OUT), edit)
+
+
+def test_inertiafromgeom_allows_reshaping() -> None:
+    spec = limb(_WRITTEN_OUT, 'inertiafromgeom="true"')
+    assert mass(built(spec, Radius("link", 2.0)), "link") > 2.0
