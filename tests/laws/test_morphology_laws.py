@@ -189,16 +189,6 @@ def test_a_locked_joint_keeps_its_position(lock: str, positions: dict[str, float
     np.testing.assert_allclose(b.site_xpos, a.site_xpos, atol=1e-12)
 
 
-@law
-@given(hip=st.floats(-1.0, 0.5), knee=st.floats(-1.5, 0.0))
-def test_locked_legs_reach_where_free_ones_do(hip: float, knee: float) -> None:
-    """All joints locked at once, in a model written in degrees."""
-    locked = built(leg(), Lock("knee", knee), Lock("hip", hip))
-    np.testing.assert_allclose(
-        tip(locked, "toe"), tip(built(leg()), "toe", {"hip": hip, "knee": knee}), atol=1e-12
-    )
-
-
 # --- Limbs -------------------------------------------------------------------------------------
 
 

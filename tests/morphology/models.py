@@ -93,6 +93,37 @@ URDF = """
 </robot>
 """
 
+# An arm of two segments, with places for more elements.
+ARM = """
+<mujoco>
+  <compiler angle="radian"/>
+  {top}
+  <worldbody>
+    <site name="wall" pos="0 0 1"/>
+    <body name="trunk" pos="0 0 1">{root}<geom name="trunk" size=".1"/>
+      <site name="shoulder" pos=".1 0 0"/><geom name="ball" size=".02" pos=".1 .1 0"/>
+      {trunk}
+      <body name="upper" pos=".1 0 0"><joint name="upper" axis="0 1 0" range="-1 1" {joint}/>
+        <geom name="upper" type="capsule" fromto="0 0 0 .4 0 0" size=".02"/>
+        <site name="middle" pos=".2 0 0"/>
+        {upper}
+        <body name="lower" pos=".4 0 0"><joint name="lower" axis="0 1 0" range="-1 1"/>
+          <geom name="lower" type="capsule" fromto="0 0 0 .4 0 0" size=".02"/>
+          <site name="hand" pos=".3 0 0"/>
+          {lower}
+        </body>
+      </body>
+      <body name="other" pos="0 .3 0"><joint name="other" axis="0 1 0" range="-1 1"/>
+        <geom name="other" type="capsule" fromto="0 0 0 .4 0 0" size=".02"/>
+        <site name="other" pos=".4 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+  {rest}
+</mujoco>
+"""
+ROPE = '<site site="shoulder"/><site site="hand"/>'
+
 
 def spec_of(text: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(text)
@@ -130,6 +161,17 @@ def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
     )
 
 
+def arm(rest: str = "", **more: str) -> mujoco.MjSpec:
+    """Return the arm with more elements."""
+    parts = dict.fromkeys(("top", "root", "trunk", "joint", "upper", "lower"), "")
+    return spec_of(ARM.format(rest=rest, **{**parts, **more}))
+
+
+def spatial(path: str, more: str = "") -> str:
+    """Return a spatial tendon, `rope`."""
+    return f'<tendon><spatial name="rope" {more}>{path}</spatial></tendon>'
+
+
 def built(spec: mujoco.MjSpec, *edits: Edit) -> mujoco.MjModel:
     return compile_body(spec, edits)
 
@@ -160,6 +202,14 @@ def posed(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> mujo
         data.joint(joint).qpos[:] = position
     mujoco.mj_kinematics(model, data)
     return data
+
+
+def check_at_rest(model: mujoco.MjModel) -> None:
+    """Check that all equalities hold in the model's own pose."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    rows = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    np.testing.assert_allclose(data.efc_pos[rows], 0.0, atol=1e-8)
 
 
 def tip(model: mujoco.MjModel, site: str, angles: dict[str, float] | None = None) -> Array:

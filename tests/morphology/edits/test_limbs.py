@@ -20,7 +20,18 @@ from shapechanger.morphology import (
     Split,
     Stretch,
 )
-from tests.morphology.models import ant, built, capsule_mass, leg, limb, mass, posed, spec_of, tip
+from tests.morphology.models import (
+    ant,
+    arm,
+    built,
+    capsule_mass,
+    leg,
+    limb,
+    mass,
+    posed,
+    spec_of,
+    tip,
+)
 from tests.morphology.scenes import asset_spec
 
 _MESH_LIMB = """
@@ -41,12 +52,6 @@ def _bodies(model: mujoco.MjModel) -> list[str]:
 
 
 # --- Cut ---------------------------------------------------------------------------------------
-
-
-def test_a_cut_keeps_the_near_part() -> None:
-    model = built(ant(), Cut("shank_4", 0.25))
-    assert model.geom("fourth_ankle_geom").size[1] == pytest.approx(0.05 * math.sqrt(2.0))
-    np.testing.assert_array_equal(model.body("shank_4").pos, built(ant()).body("shank_4").pos)
 
 
 def test_children_beyond_a_cut_are_removed() -> None:
@@ -76,17 +81,25 @@ def test_a_partial_cut_shrinks_the_rest() -> None:
     assert mass(last, "shin") == pytest.approx(1e-6 * mass(before, "shin"))
 
 
+def test_a_cut_leaves_something() -> None:
+    """A segment whose geoms all lie beyond the cut would have no mass."""
+    spec = arm()
+    spec.geom("lower").fromto = [0.3, 0.0, 0.0, 0.4, 0.0, 0.0]
+    with pytest.raises(MorphologyError, match=r"No geom of 'lower' lies nearer than 0\.5 of its"):
+        built(spec, Cut("lower", 0.5))
+
+
+def test_a_partial_cut_shrinks_what_goes() -> None:
+    """Geoms beyond it become small, and points at the end are pulled in by a part of the way."""
+    spec = arm(lower='<geom name="far" size=".01" pos=".35 0 0"/><site name="end" pos=".4 0 0"/>')
+    half = built(spec, Cut("lower", 0.5).partly(0.5))
+    assert half.geom("far").size[0] == pytest.approx(0.005)
+    np.testing.assert_allclose(half.geom("far").pos, [0.35, 0.0, 0.0])
+    np.testing.assert_allclose(half.site("end").pos, [0.3, 0.0, 0.0])
+    np.testing.assert_allclose(half.site("hand").pos, [0.3, 0.0, 0.0])
+
+
 # --- Remove ------------------------------------------------------------------------------------
-
-
-def test_a_limb_is_removed_with_its_children() -> None:
-    """Joints and motors are removed too; the order of the others stays."""
-    model = built(ant(), Remove("aux_1"))
-    assert not {"aux_1", "shank_1"} & {*_bodies(model)}
-    assert [model.actuator(i).name for i in range(model.nu)] == [
-        *("hip_4", "ankle_4", "hip_2", "ankle_2", "hip_3", "ankle_3")
-    ]
-    assert model.nq == 13
 
 
 def test_a_glob_removes_parents_and_children_once() -> None:
@@ -154,6 +167,45 @@ def test_a_split_divides_an_explicit_mass() -> None:
         first = built(limb(geom), Split("link", "far", at=0.3).partly(1e-9))
         assert mass(first, "link", "far") == pytest.approx(mass(built(limb(geom)), "link"))
         assert mass(first, "far") > mass(first, "link")
+
+
+@pytest.mark.parametrize("turned", ['euler="0 0 0"', 'euler="0 0 1.5707963267948966"'])
+@pytest.mark.parametrize("written", ["size", "ends"])
+def test_a_box_is_cut_along_the_segment(turned: str, written: str) -> None:
+    """Whichever of its half-sizes lies along it, and however it is written."""
+    sides = ".1 .02 .02" if "1.57" not in turned else ".02 .1 .02"
+    box = f'type="box" size="{sides}" pos=".2 0 0" {turned}'
+    if written == "ends":
+        box = 'type="box" size=".02" fromto=".1 0 0 .3 0 0"'
+    spec = arm(
+        lower=f'<geom name="box" {box}/><geom name="side" type="box" size=".01 .01 .01" '
+        'pos=".05 0 0" euler="0 .5 0"/>'
+    )
+    whole = mass(built(spec), "lower")
+    model = built(spec, Split("lower", "far", 0.375))
+    data = posed(model)
+    for name, middle, half in (("box", 0.625, 0.025), ("box_of_far", 0.725, 0.075)):
+        assert data.geom(name).xpos[0] == pytest.approx(middle)
+        assert sorted(model.geom(name).size)[-1] == pytest.approx(max(half, 0.02))
+    assert model.geom("side").bodyid[0] == model.body("lower").id
+    assert mass(model, "lower", "far") > whole - 1e-9
+    away = spec.copy()
+    away.geom("lower").fromto = [0.1, 0.0, 0.0, 0.4, 0.0, 0.0]
+    parts = built(away, Split("lower", "far", 0.625))
+    ends = posed(parts)
+    assert ends.geom("lower").xpos[0] == pytest.approx(0.5 + 0.175)
+    assert ends.geom("lower_of_far").xpos[0] == pytest.approx(0.5 + 0.325)
+
+
+def test_a_geom_beside_the_axis_is_divided_where_it_is() -> None:
+    """Its farther half stays in line with the nearer one."""
+    spec = arm(lower='<geom name="rib" type="capsule" fromto="0 .05 0 .3 .05 0" size=".01"/>')
+    data = posed(built(spec, Split("lower", "far", 0.25)))
+    np.testing.assert_allclose(data.geom("rib").xpos, [0.55, 0.05, 1.0], atol=1e-12)
+    np.testing.assert_allclose(data.geom("rib_of_far").xpos, [0.7, 0.05, 1.0], atol=1e-12)
+    whole = arm(lower='<geom name="tip" type="capsule" fromto=".3 0 0 .4 0 0" size=".01"/>')
+    model = built(whole, Split("lower", "far", 0.5))
+    assert model.geom("tip").bodyid[0] == model.body("far").id
 
 
 @pytest.mark.parametrize("name", ["shin", "hip", "knee", "", "shin_1"])

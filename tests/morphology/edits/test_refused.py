@@ -38,7 +38,7 @@ from shapechanger.morphology import (
     Stretch,
     TotalMass,
 )
-from tests.morphology.models import ant, built, gantry, leg, limb, spec_of
+from tests.morphology.models import ant, arm, built, gantry, leg, limb, spec_of
 
 _VALUES: list[Any] = [Mass, Density, Gear, Damping, Stiffness, Friction]
 _RATIO = (0.0, -1.0, 1e-3, 1e3)
@@ -230,3 +230,24 @@ def test_what_a_model_cannot_have_is_refused_when_the_edit_is_applied(
     """The sentence names the element, and the way out."""
     with pytest.raises((MorphologyError, UnknownName), match=message):
         built(load(), edit)
+
+
+@pytest.mark.parametrize(
+    ("flag", "edit", "what"),
+    [
+        ("gravity", Gravity((0.0, 0.0, -1.0)), "gravity"),
+        ("damper", Damping("*", to=1.0), "dampers"),
+        ("spring", Stiffness("*", to=1.0), "springs"),
+        ("actuation", AddMotor("*", 1.0), "actuators"),
+        ("limit", JointRange("lower", 0.0, 1.0), "limits of joints"),
+        ("contact", Friction("*", to=0.5), "contacts"),
+    ],
+)
+def test_an_edit_of_what_is_switched_off_is_refused(flag: str, edit: Edit, what: str) -> None:
+    spec = arm(top=f'<option><flag {flag}="disable"/></option>')
+    with pytest.raises(MorphologyError, match=f"would change nothing, .* switches {what} off"):
+        built(spec, edit)
+    if what == "contacts":
+        override = arm(top='<option><flag override="enable"/></option>')
+        with pytest.raises(MorphologyError, match="overrides the parameters of all contacts"):
+            built(override, edit)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -16,12 +17,11 @@ from shapechanger.morphology import (
     Gear,
     Gravity,
     Mass,
-    Radius,
     Remove,
     Stiffness,
     Stretch,
 )
-from tests.morphology.models import ant, built, leg, limb, mass, pendulum, spec_of, tip
+from tests.morphology.models import ant, arm, built, leg, limb, mass, pendulum, spec_of, tip
 
 _MOTORS = """
 <mujoco>
@@ -132,13 +132,6 @@ def test_a_pole_keeps_its_lean_along_an_axis() -> None:
     np.testing.assert_allclose(2.0 * model.geom("cpole").pos, [0.001, 0.0, 1.2])
 
 
-def test_partial_factors_are_linear() -> None:
-    half, twice = Stretch("thigh", 3.0).partly(0.5), Stretch("thigh", 2.0)
-    np.testing.assert_array_equal(built(leg(), half).body_pos, built(leg(), twice).body_pos)
-    half, twice = Radius("thigh", 3.0).partly(0.5), Radius("thigh", 2.0)
-    np.testing.assert_array_equal(built(leg(), half).body_mass, built(leg(), twice).body_mass)
-
-
 def test_gravity_is_set() -> None:
     """All components are set, or interpolated for partial edits."""
     moon = Gravity((0.0, 0.0, -1.62))
@@ -147,3 +140,43 @@ def test_gravity_is_set() -> None:
         built(leg(), Gravity((2.0, 0.0, -9.81)).partly(0.5)).opt.gravity, [1.0, 0.0, -9.81]
     )
     np.testing.assert_array_equal(built(leg(), Gravity((0.0, 0.0, 0.0))).opt.gravity, np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        *('<position name="a" joint="lower" kp="3" kv=".2" forcerange="-2 4"/>',),
+        *('<velocity name="a" joint="lower" kv="3"/>', '<motor name="a" joint="lower" gear="3"/>'),
+        *('<intvelocity name="a" joint="lower" kp="3" kv="1" actrange="-1 1"/>',),
+        *('<damper name="a" joint="lower" kv="3" ctrlrange="0 1"/>',),
+        *('<cylinder name="a" joint="lower" area="3" bias="1 2 3" timeconst=".1"/>',),
+        *('<muscle name="a" joint="lower" lengthrange="-1 1" force="3"/>',),
+        *('<muscle name="a" joint="lower" lengthrange="-1 1" scale="3"/>',),
+        *('<general name="a" joint="lower" gainprm="3" biastype="affine" biasprm="1 2 3"/>',),
+    ],
+)
+def test_gear_scales_the_force_of_any_actuator(actuator: str) -> None:
+    """In any state and for any control, so a servo keeps its targets."""
+    spec = arm(f"<actuator>{actuator}</actuator>")
+    old, new = built(spec), built(spec, Gear("a", scale=0.4))
+    for seed in range(3):
+        forces: list[Any] = []
+        for model in (old, new):
+            rng, data = np.random.default_rng(seed), mujoco.MjData(model)
+            data.qpos[:], data.qvel[:] = rng.uniform(-1.0, 1.0, (2, model.nv))
+            data.ctrl[:] = rng.uniform(0.0, 1.0, model.nu)
+            data.act[:] = rng.uniform(0.0, 1.0, model.na)
+            mujoco.mj_forward(model, data)
+            forces.append(data.qfrc_actuator.copy())
+        np.testing.assert_allclose(forces[1], 0.4 * forces[0], rtol=1e-9, atol=1e-12)
+        assert np.any(forces[0])
+
+
+def test_a_largest_force_scales_with_all_of_its_motors() -> None:
+    """Else a stronger motor would change nothing; one of two does not change it."""
+    motors = '<actuator><motor name="a" joint="upper"/><motor name="b" joint="upper"/></actuator>'
+    spec = arm(motors, joint='actuatorfrcrange="-2 2"')
+    for pattern, largest in (("*", 6.0), ("a", 2.0)):
+        model = built(spec, Gear(pattern, scale=3.0))
+        limits = model.jnt_actfrcrange[model.joint("upper").id]
+        np.testing.assert_array_equal(limits, [-largest, largest])

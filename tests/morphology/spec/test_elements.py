@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from shapechanger.morphology.spec.elements import (
     resolve_frames,
     select,
 )
-from tests.morphology.models import ant, built, differing, leg, mass, posed, spec_of
+from tests.morphology.models import ant, arm, built, differing, leg, mass, posed, spec_of
 from tests.morphology.scenes import asset_spec
 
 _NAMELESS = """
@@ -206,3 +207,28 @@ def test_a_model_without_edits_is_unchanged() -> None:
     spec = spec_of(_FRAMES)
     assert any(np.any(frame.pos) for frame in reshape(spec, ()).frames)
     assert any(np.any(f.pos) for f in reshape(spec, [Stretch("limb", 2.0, amount=0.0)]).frames)
+
+
+def test_least_masses_do_not_swallow_an_edit() -> None:
+    """They are written out, and bind nothing any more."""
+    spec = arm(top='<compiler boundmass="1" boundinertia=".1"/>')
+    before = built(spec)
+    after = built(spec, Mass("other", to=0.3))
+    assert mass(before, "other") == 1.0
+    assert mass(after, "other") == pytest.approx(0.3)
+    for body in ("upper", "lower"):
+        assert mass(after, body) == mass(before, body)
+        np.testing.assert_allclose(after.body(body).inertia, before.body(body).inertia)
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    with pytest.raises(MorphologyError, match="The least mass or inertia of the compiler raises"):
+        built(spec, Mass("other", to=0.3))
+
+
+def test_bodies_that_the_compiler_merges_can_be_weighed() -> None:
+    spec = arm(
+        top='<compiler fusestatic="true"/>',
+        lower='<body name="cap" pos=".4 0 0"><geom name="cap" size=".01"/></body>',
+    )
+    before = mass(built(spec))
+    weight = mass(built(spec, Mass("cap", to=0.5)))
+    assert weight == pytest.approx(before - 1000.0 * 4.0 / 3.0 * math.pi * 0.01**3 + 0.5)

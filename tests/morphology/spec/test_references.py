@@ -1,14 +1,206 @@
-"""Elements that are removed with a joint."""
+"""What edits carry along or refuse, one reference at a time; `tests/laws` has them all at once."""
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology import Lock
-from tests.morphology.models import built, gantry, spec_of
+from shapechanger.morphology import (
+    AddLimb,
+    Cut,
+    Damping,
+    Edit,
+    Gear,
+    Lock,
+    PlaceGeom,
+    Radius,
+    Remove,
+    Split,
+    Stiffness,
+    Stretch,
+)
+from tests.morphology.models import (
+    ROPE,
+    arm,
+    built,
+    check_at_rest,
+    gantry,
+    spatial,
+    spec_of,
+)
 from tests.morphology.scenes import asset_spec
+
+
+def _equal(ends: str) -> str:
+    return f"<equality>{ends}</equality>"
+
+
+def _sensor(sensor: str) -> str:
+    return f"<sensor>{sensor}</sensor>"
+
+
+_THREE = '<site site="shoulder"/><site site="middle"/><site site="hand"/>'
+_SUM = '<joint joint="lower" coef="1"/><joint joint="other" coef="1"/>'
+_FAR = '<geom name="far" size=".01" pos=".35 0 0"/>'
+_PLATE = '<geom name="plate" type="box" size=".1 .02 .02" pos=".2 0 0" euler="0 .5 0"/>'
+_AROUND = '<site site="shoulder"/><geom geom="ball" sidesite="out"/><site site="hand"/>'
+_OUT = '<site name="out" pos=".1 .13 0"/>'
+_TIP = '<geom type="capsule" fromto=".3 0 0 .4 0 0" size=".01"/>'
+_SPRING = 'springdamper=".1 1"'
+# What the arm has, the edit, and the sentence that refuses it; none where it is made.
+_REFUSED: list[tuple[mujoco.MjSpec, Edit, str]] = [
+    (arm(spatial(ROPE, 'stiffness="1"')), Remove("lower"), ""),
+    (arm(lower=_FAR), Cut("lower", 0.5), ""),
+    (arm(lower=_TIP), Cut("lower", 0.5), ""),
+    (
+        arm(spatial(_THREE, 'damping="1"')),
+        Remove("lower"),
+        "The tendon 'rope' also moves what stays when 'lower' is removed",
+    ),
+    (
+        arm(f'<tendon><fixed name="sum" stiffness="1">{_SUM}</fixed></tendon>'),
+        Remove("lower"),
+        "The tendon 'sum' also moves what stays",
+    ),
+    (
+        arm(_equal('<joint joint1="other" joint2="lower"/>')),
+        Remove("upper"),
+        "'other' follows 'lower', which would be removed: lock one of them first",
+    ),
+    (
+        arm('<actuator><motor name="jet" site="other" refsite="hand"/></actuator>'),
+        Remove("lower"),
+        "The actuator 'jet' acts relative to 'hand', which would be removed",
+    ),
+    (
+        arm(_sensor('<touch site="hand"/>')),
+        Cut("lower", 0.5),
+        "'hand' lies beyond the cut, but the sensor of 'hand' names it",
+    ),
+    (
+        arm(_equal('<connect body1="lower" body2="other" anchor=".3 0 0"/>')),
+        Cut("lower", 0.5),
+        "A pin lies beyond the cut, but the equality names it",
+    ),
+    (
+        arm('<contact><pair geom1="far" geom2="trunk"/></contact>', lower=_FAR),
+        Cut("lower", 0.5),
+        "'far' lies beyond the cut, but the contact pair of 'far' names it",
+    ),
+    (
+        arm(_sensor('<distance name="gap" geom1="lower" geom2="trunk"/>')),
+        Split("lower", "far"),
+        "'lower' would be cut in two, but the sensor 'gap' names it",
+    ),
+    (
+        arm(_sensor('<distance name="gap" body1="lower" body2="trunk"/>')),
+        Split("lower", "far"),
+        "'lower' cannot be split: the sensor 'gap' is about all of its geoms",
+    ),
+    (
+        arm(_equal('<joint joint1="lower" joint2="upper" polycoef="0 1 1 0 0"/>')),
+        Lock("lower", 0.1),
+        "'lower' follows 'upper' by a curve, so it cannot be locked: lock 'upper' instead",
+    ),
+    (
+        arm(_equal('<joint joint1="lower" polycoef=".2 0 0 0 0"/>')),
+        Lock("lower", 0.1),
+        "'lower' is held 0.2 from its reference by a coupling, so it cannot be locked 0.1",
+    ),
+    (
+        arm(_equal('<joint joint1="lower" joint2="upper" polycoef="0 3 0 0 0"/>')),
+        Lock("upper", 0.5),
+        "leave the coupling of 'lower' open by .* no position of its joints within their",
+    ),
+    (
+        arm(lower=_PLATE),
+        Split("lower", "far"),
+        "'plate' lies oblique to the plane that would cut it in two: cut 'lower' elsewhere",
+    ),
+    (
+        arm(spatial(ROPE, 'limited="true" range="0 .75"')),
+        Stretch("upper", 1.5),
+        "The tendon 'rope' would start 0.9 long, outside of its limits",
+    ),
+    (
+        arm(spatial(_AROUND), trunk=_OUT),
+        PlaceGeom("ball", radius=0.05),
+        "The tendon 'rope' would pass a geom on its other side",
+    ),
+    (
+        arm('<actuator><orientation name="a" site="hand" refsite="wall" kp="1"/></actuator>'),
+        Gear("a", scale=2.0),
+        "'a' is an actuator whose gains have no common scale",
+    ),
+    (
+        arm('<actuator><position name="servo" joint="lower" kp="3"/></actuator>'),
+        Gear("servo", to=2.0),
+        "'servo' is no motor, so its gear is not its strength: give a scale",
+    ),
+    (arm(joint=_SPRING), Damping("upper", to=1.0), "takes its damping from"),
+    (arm(joint=_SPRING), Stiffness("*", scale=2.0), "its stiffness from its"),
+]
+
+
+@pytest.mark.parametrize(("spec", "edit", "message"), _REFUSED)
+def test_an_edit_refuses_what_it_cannot_carry(
+    spec: mujoco.MjSpec, edit: Edit, message: str
+) -> None:
+    """In a sentence that names the holder of the reference; without one the edit is made."""
+    if not message:
+        built(spec, edit)
+        return
+    with pytest.raises(MorphologyError, match=message):
+        built(spec, edit)
+
+
+# --- Joints that are locked --------------------------------------------------------------------
+
+_TWO_SUMS = """
+<tendon>
+  <fixed name="a"><joint joint="upper" coef="2"/></fixed>
+  <fixed name="b"><joint joint="other" coef="1"/></fixed>
+</tendon>
+<equality><tendon name="tie" tendon1="b" tendon2="a"/></equality>
+<actuator><motor name="a" tendon="a"/></actuator>
+<sensor><tendonpos tendon="a"/></sensor>
+"""
+
+
+def test_a_tendon_goes_with_all_of_its_joints() -> None:
+    """With its motor and its sensor; what is coupled to it is held."""
+    model = built(arm(_TWO_SUMS), Lock("upper", 0.2))
+    assert (model.ntendon, model.nu, model.nsensor, model.neq) == (1, 0, 0, 1)
+    assert model.qpos0[model.joint("other").qposadr[0]] == pytest.approx(0.4)
+    check_at_rest(model)
+
+
+@pytest.mark.parametrize("locked", ["upper", "lower"])
+@pytest.mark.parametrize("refs", [0.0, 0.3])
+def test_coupled_joints_are_held_at_the_polynomial(locked: str, refs: float) -> None:
+    """A leader holds its follower, and a follower its leader, in a chain of couplings."""
+    chain = """<equality>
+      <joint joint1="lower" joint2="upper" polycoef="0 .5 0 0 0"/>
+      <joint joint1="other" joint2="lower" polycoef="0 -1 .25 0 0"/>
+    </equality>"""
+    spec = arm(chain)
+    for joint in spec.joints:
+        joint.ref = refs
+    model = built(spec, Lock(locked, refs + 0.2))
+    lower = 0.2 if locked == "lower" else 0.1
+    expected = {"lower": lower, "upper": 2.0 * lower, "other": -lower + 0.25 * lower**2}
+    for joint in {"upper", "lower", "other"} - {locked}:
+        start = model.qpos0[model.joint(joint).qposadr[0]]
+        assert start == pytest.approx(refs + expected[joint], abs=1e-9)
+    check_at_rest(model)
+    if locked == "lower":
+        both = built(spec, Lock(locked, refs + 0.2), Lock("other", refs + expected["other"]))
+        assert (both.neq, both.njnt) == (1, 1)
+    with pytest.raises(MorphologyError, match="'other' follows 'lower' by a curve"):
+        built(spec, Lock("other", refs + 0.1))
+
 
 _TIED = """
 <mujoco>
@@ -73,3 +265,35 @@ def test_tendons_over_sites_do_not_tie_joints() -> None:
     rest = '<actuator><motor tendon="rope"/></actuator><sensor><tendonpos tendon="rope"/></sensor>'
     model = built(spec_of(_TIED.format(tendon="", rest=rest)), Lock("b", 0.1))
     assert (model.ntendon, model.nu, model.nsensor) == (1, 1, 1)
+
+
+# --- Flexes and tuples -------------------------------------------------------------------------
+
+_CLOTH = """<deformable><flex name="cloth" dim="1" body="lower other" vertex="0 0 0 0 0 0"
+  element="0 1"/></deformable>"""
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [Stretch("lower", 1.5), Radius("other", 2.0), Remove("upper"), AddLimb("lower", "_2", 1.0)],
+)
+def test_a_flex_is_not_torn(edit: Edit) -> None:
+    """Its vertices belong to several bodies."""
+    with pytest.raises(MorphologyError, match=r"carries a part of the flex 'cloth', which would"):
+        built(arm(_CLOTH), edit)
+
+
+def test_equalities_of_a_flex_are_kept() -> None:
+    """They name no body."""
+    tied = _CLOTH + '<equality><flex flex="cloth"/></equality>'
+    assert built(arm(tied), Stretch("upper", 1.1)).neq == 1
+
+
+def test_a_tuple_loses_what_is_removed() -> None:
+    """And keeps the rest."""
+    text = """<custom><tuple name="both"><element objtype="body" objname="lower" prm="1"/>
+      <element objtype="body" objname="other" prm="2"/></tuple></custom>"""
+    model = built(arm(text), Remove("lower"))
+    assert [model.body(int(i)).name for i in model.tuple_objid] == ["other"]
+    assert model.tuple_objprm.tolist() == [2.0]
+    assert built(arm(text), Remove("lower"), Remove("other")).ntuple == 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import re
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar, cast
 
 import msgspec
 import mujoco
@@ -87,9 +87,9 @@ class Edit(
         for field in _fields(type(self)):
             value: Any = getattr(self, field.name)
             if isinstance(value, np.generic | np.ndarray):
-                value = value.tolist()
+                value = cast("Any", value).tolist()
             if isinstance(value, list):
-                value = tuple(value)
+                value = tuple(cast("list[Any]", value))
             force_setattr(self, field.name, value)
             try:
                 msgspec.convert(value, field.type)
@@ -145,7 +145,7 @@ def _fields(kind: type[Edit]) -> tuple[FieldInfo, ...]:
 
 
 def _is_finite(value: Any) -> bool:
-    numbers: Any = value if isinstance(value, tuple) else (value,)
+    numbers = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
     return all(math.isfinite(number) for number in numbers if isinstance(number, float))
 
 
