@@ -32,7 +32,7 @@ from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.shrinking import ShrunkFrames
 from shapechanger.demos.dataset import Dataset, load_dataset
-from shapechanger.demos.drivers import DriverDecision, ExpertPilot, record_steps
+from shapechanger.demos.drivers import DriverDecision, Pilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
@@ -399,7 +399,7 @@ def taught_source(name: str, seed: int) -> CameraPolicy:
     return policy
 
 
-class _Watched(ExpertPilot):
+class _Watched(Pilot):
     """Expert that drives by steering, and the waypoints on its path.
 
     Args:
@@ -411,7 +411,7 @@ class _Watched(ExpertPilot):
     """
 
     def __init__(self, env: VehicleEnv, seed: int) -> None:
-        super().__init__(env.demonstrator(seed))
+        super().__init__(env, None, env.demonstrator(seed))
         self._path = waypoint_demonstrator(env.world, seed)
         self.waypoints: list[NDArray[np.float32]] = []
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import codecs
 import os
 import re
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
-from shapechanger.errors import CorruptStudy, OutputError, UnknownName, translate_errors
+from shapechanger.errors import CorruptStudy, OutputError, UnknownName
 
 _T = TypeVar("_T")
 
@@ -89,7 +91,7 @@ def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
     Raises:
         OutputError: If it cannot be written, for instance because the disk is full.
     """
-    with translate_errors(OSError, to=lambda error: cannot_write(path, error)):
+    with writing(path):
         if mode is None and path.exists():
             mode = path.stat().st_mode & 0o7777
         _write(path, content, mode)
@@ -161,11 +163,8 @@ def append_line(path: Path, value: Any) -> None:
     Raises:
         OutputError: If it cannot be written.
     """
-    try:
-        with path.open("ab") as file:
-            file.write(msgspec.json.encode(value) + b"\n")
-    except OSError as error:
-        raise cannot_write(path, error) from error
+    with writing(path), path.open("ab") as file:
+        file.write(msgspec.json.encode(value) + b"\n")
 
 
 def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
@@ -193,6 +192,21 @@ def from_builtins(kind: Any, value: Any) -> Any:
         value: What JSON holds.
     """
     return kind.from_builtins(value)
+
+
+@contextmanager
+def writing(path: Path) -> Generator[None]:
+    """Raise the OSErrors of a block as OutputErrors that name a file or folder.
+
+    Args:
+        path: The file or folder that the block writes.
+    """
+    try:
+        yield
+    except OutputError:  # A sentence already, and a subclass of OSError.
+        raise
+    except OSError as error:
+        raise cannot_write(path, error) from error
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:

@@ -12,7 +12,6 @@ this module repeats one of another package, which might hold the token.
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -20,7 +19,7 @@ from importlib import import_module
 from importlib.metadata import version
 from multiprocessing.pool import ThreadPool
 from pathlib import Path
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, Literal
 
 import msgspec
 
@@ -46,8 +45,6 @@ _NAMES: Final[dict[Kind, re.Pattern[str]]] = {
 }
 _MAX_LIST_BYTES: Final = 64 << 20
 _TRANSFERS: Final = 8  # At once, as huggingface_hub does.
-_UNAUTHORIZED: Final = 401
-_FORBIDDEN: Final = 403
 _LOG_IN: Final = "log in with `hf auth login`, or set HF_TOKEN"
 
 
@@ -61,9 +58,9 @@ class _File(msgspec.Struct):
 class _Listed(msgspec.Struct):
     """Content of `shapechanger.json`."""
 
-    kind: str
-    files: dict[str, _File]
-    format: int = _FORMAT
+    kind: str = ""
+    files: dict[str, _File] = {}
+    format: int = 0
     version: str = ""
 
 
@@ -97,7 +94,7 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
         for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
-    listed = _Listed(kind, files, version=version("shapechanger"))
+    listed = _Listed(kind, files, _FORMAT, version("shapechanger"))
     (folder / _CARD).write_bytes(card.encode(errors="replace"))
     (folder / _LIST).write_bytes(msgspec.json.format(msgspec.json.encode(listed), indent=1))
     with _answers(repo, kind):
@@ -190,16 +187,11 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
 def _listed(content: bytes, repo: str, kind: Kind) -> dict[str, _File]:
     """Return the size and the SHA-256 of each file that a repository lists."""
     try:
-        plain = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise HubError(f"{_LIST} of {repo} is not valid JSON.") from error
-    fields = cast("dict[str, Any]", plain) if isinstance(plain, dict) else {}
-    if fields.get("format") != _FORMAT:
-        raise HubError(f"{repo} was pushed by another version of Shapechanger.")
-    try:
-        listed = msgspec.convert(fields, _Listed)
-    except msgspec.ValidationError as error:
+        listed = msgspec.json.decode(content, type=_Listed)
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise HubError(f"{_LIST} of {repo} does not list its files.") from error
+    if listed.format != _FORMAT:
+        raise HubError(f"{repo} was pushed by another version of Shapechanger.")
     if listed.kind != kind:
         raise HubError(f"{repo} holds {listed.kind[:40]!r}, and not {kind!r}.")
     for name in listed.files:
@@ -246,13 +238,12 @@ def _answers(repo: str, kind: Kind) -> Generator[None]:
         ) from error
     except errors.HfHubHTTPError as error:
         code = getattr(error.response, "status_code", 0)
-        if code == _UNAUTHORIZED:
-            raise HubError(f"The Hub wants to know who asks for {repo}: {_LOG_IN}.") from error
-        if code == _FORBIDDEN:
-            raise HubError(
-                f"The Hub forbids this for {repo}: use a token that may write to it."
-            ) from error
-        raise HubError(f"The Hub answered {code} for {repo}: try again later.") from error
+        sentences = {
+            401: f"The Hub wants to know who asks for {repo}: {_LOG_IN}.",
+            403: f"The Hub forbids this for {repo}: use a token that may write to it.",
+        }
+        other = f"The Hub answered {code} for {repo}: try again later."
+        raise HubError(sentences.get(code, other)) from error
     except PermissionError as error:
         raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
     except Exception as error:  # Of the transport, whose package differs between versions.

@@ -52,10 +52,8 @@ def served() -> Iterator[FakeHub]:
 
 @pytest.fixture
 def hub(served: FakeHub) -> FakeHub:
-    served.repositories.clear()
-    served.requests.clear()
-    served.cut.clear()
-    served.stalled.clear()
+    for state in (served.repositories, served.requests, served.cut, served.stalled):
+        state.clear()
     served.stalling.clear()
     served.released.clear()
     return served
@@ -132,10 +130,8 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
     assert out.read_bytes() == file.read_bytes()
     assert next(reversed(repository.commits)) in output
     assert not any("evil" in request for request in hub.requests)
-    pinned = tmp_path / "folder" / "pinned.safetensors"
-    assert first in run(
-        "policies", "pull", "ada/reach", "--out", pinned, "--revision", first
-    )[1]  # fmt: skip
+    pinned = ("--out", tmp_path / "folder" / "pinned.safetensors", "--revision", first)
+    assert first in run("policies", "pull", "ada/reach", *pinned)[1]
     assert "exists already" in refused(run("policies", "pull", "ada/reach", "--out", out))
 
 
@@ -188,11 +184,14 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_hub(environment: dict[str, str], tmp_path: Path) -> None:
+def test_no_hub_and_a_cut_transfer(
+    run: Run, hub: FakeHub, environment: dict[str, str], tmp_path: Path
+) -> None:
+    pull = ("policies", "pull", "ada/x", "--out", tmp_path / "out")
     with serve_hub() as gone:
         address = gone.address
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, "policies", "pull", "ada/x", "--out", tmp_path / "out"],
+        [sys.executable, "-c", PROGRAM, *pull],
         env=environment | {"HF_ENDPOINT": address},
         capture_output=True,
         text=True,
@@ -200,6 +199,12 @@ def test_no_hub(environment: dict[str, str], tmp_path: Path) -> None:
     )
     answer = refused((done.returncode, done.stdout, done.stderr))
     assert "The connection to the Hub failed" in answer
+    repository = hub.repositories["models/ada/x"] = Repository()
+    content = POLICY.read_bytes()
+    repository.commit({NAME: content, "shapechanger.json": listing({NAME: (len(content), ZERO)})})
+    hub.cut[NAME] = 1000
+    assert "connection to the Hub failed" in refused(run(*pull))
+    assert not (tmp_path / "out").exists()
 
 
 def listing(files: dict[str, tuple[int, str]], kind: str = "policy") -> bytes:
@@ -224,7 +229,7 @@ ZERO = "0" * 64
         (b"abc", listing({}), "does not list its files"),
         (b"abc", listing({NAME: (3, ZERO)}, "demonstrations"), "and not 'policy'"),
         (b"abc", b'{"format": 2}', "another version"),
-        (b"abc", b"[" * 10**6, "not valid JSON"),
+        (b"abc", b"[" * 10**6, "does not list its files"),
         (
             b"abc",
             listing({
@@ -245,21 +250,6 @@ def test_files_that_are_refused(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_cut_transfer(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    repository = hub.repositories["models/ada/x"] = Repository()
-    content = POLICY.read_bytes()
-    repository.commit({NAME: content, "shapechanger.json": listing({NAME: (len(content), ZERO)})})
-    hub.cut[NAME] = 1000
-    pull = ("policies", "pull", "ada/x", "--out", tmp_path / "out")
-    assert "connection to the Hub failed" in refused(run(*pull))
-    assert not (tmp_path / "out").exists()
-
-
-def digest(content: bytes) -> tuple[int, str]:
-    """Return size and SHA-256."""
-    return len(content), hashlib.sha256(content).hexdigest()
-
-
 @pytest.mark.parametrize(
     ("files", "listed", "message"),
     [
@@ -275,7 +265,8 @@ def test_episodes_that_are_refused(
     run: Run, hub: FakeHub, tmp_path: Path, files: list[str], listed: list[str], message: str
 ) -> None:
     """A repository holds the files of episodes that it lists, and nothing else."""
-    about = listing({f"episodes/{name}": digest(b"x") for name in listed}, "demonstrations")
+    digest = 1, hashlib.sha256(b"x").hexdigest()
+    about = listing({f"episodes/{name}": digest for name in listed}, "demonstrations")
     repository = hub.repositories["datasets/ada/x"] = Repository()
     held = {f"episodes/{name}": b"x" for name in files}
     repository.commit({**held, "shapechanger.json": about})
@@ -283,21 +274,15 @@ def test_episodes_that_are_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_recording_that_is_too_large(run: Run, hub: FakeHub, tmp_path: Path) -> None:
+def test_a_pull_that_is_too_large_or_interrupted_leaves_nothing(
+    run: Run, hub: FakeHub, environment: dict[str, str], tmp_path: Path
+) -> None:
     drive(tmp_path / "data", 3)
     assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
     hub.requests.clear()
     pull = ("demos", "pull", "ada/drive", "--out", tmp_path / "out", "--max-gib", "1e-9")
     assert "more than the limit of 1" in refused(run(*pull))
     assert not any("episodes" in request for request in hub.requests)
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_interrupted_pull_leaves_nothing(
-    run: Run, hub: FakeHub, environment: dict[str, str], tmp_path: Path
-) -> None:
-    drive(tmp_path / "data", 3)
-    assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
     hub.stalled.update(
         name for name in hub.repositories["datasets/ada/drive"].files if name.endswith(".jsonl")
     )

@@ -5,9 +5,11 @@ episodes/      the format on disk; standard library only, because robots record 
 recording.py   record any Gymnasium env
 drivers.py     who drives while recording: an expert, a policy, or a policy with corrections
 dataset.py     episodes as NumPy arrays
-statistics.py  summaries and distributions for reports
+statistics.py  how far the rate of a recording varies
+report.py      the page of a recording
+replay.py      play an episode in an env, or as a film
 merging.py     copy episodes of several recordings into one
-overlay.py     draw an action below its picture
+jpeg.py        images, and actions drawn below them
 exchange/      import and export: csv, minari, tub, lerobot, mcap
 cloning/       behaviour cloning
 ```

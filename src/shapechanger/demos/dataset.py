@@ -26,6 +26,9 @@ from shapechanger.layout import Layout
 
 _NS_PER_S: Final = 1e9
 
+DEMONSTRATORS: Final = ("person", "expert")
+"""Drivers from whose steps policies learn."""
+
 Shrink = Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]]
 """Function that reduces an image of an episode, shape (H, W, 3), to save memory."""
 
@@ -73,7 +76,7 @@ class Dataset:
 def load_dataset(
     data: Path,
     *,
-    drivers: Collection[str] = ("person", "expert"),
+    drivers: Collection[str] = DEMONSTRATORS,
     shrink: Shrink | None = None,
 ) -> Dataset:
     """Read demonstrations in any supported format.
@@ -96,11 +99,12 @@ def load_dataset(
     parts = [part for part in _parts(data, drivers, shrink) if part.steps]
     if not parts:
         raise DemosError(f"There is no step of {' or '.join(sorted(drivers))} in {data}.")
-    _require_same(parts)
-    first = parts[0]
+    for part in parts[1:]:
+        _require_same(part, parts[0])
+    header = parts[0].header
     pictures = [picture for part in parts for picture in part.pictures]
     steps = [step for part in parts for step in part.steps]
-    layout = first.header.state_layout
+    layout = Layout.from_json(header.state_layout) if header.state_layout else None
     periods_s: list[float] = []
     for part in parts:
         if all(step.captured_ns is not None for step in part.steps):
@@ -113,22 +117,17 @@ def load_dataset(
         episodes=tuple(len(part.steps) for part in parts),
         times_s=np.concatenate([part.times_s() for part in parts]),
         files=tuple(f"{part.name}, step {step.index}" for part in parts for step in part.steps),
-        action_layout=Layout.from_json(first.header.action_layout),
-        state_layout=Layout.from_json(layout) if layout else None,
-        control_hz=first.header.control_hz,
-        body=first.header.body,
-        rate_jitter=rate_jitter(periods_s, first.header.control_hz),
+        action_layout=Layout.from_json(header.action_layout),
+        state_layout=layout,
+        control_hz=header.control_hz,
+        body=header.body,
+        rate_jitter=rate_jitter(periods_s, header.control_hz),
     )
 
 
-def count_steps(data: Path, *, drivers: Collection[str] = ("person", "expert")) -> int:
-    """Count the steps that `load_dataset` would load, without decoding any image.
-
-    Args:
-        data: As in `load_dataset`.
-        drivers: As in `load_dataset`.
-    """
-    return sum(step.driver in drivers for _, _, steps in _episodes(data) for step, _ in steps)
+def count_steps(data: Path) -> int:
+    """Count the steps that `load_dataset` would load by default, without decoding any image."""
+    return sum(step.driver in DEMONSTRATORS for _, _, steps in _episodes(data) for step, _ in steps)
 
 
 class _Part(NamedTuple):
@@ -159,19 +158,24 @@ def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Itera
     """Yield each episode, in order."""
     for name, header, steps in _episodes(data):
         part = _Part(name, header, [], [])
-        newest: bytes | None = None
-        decoded: bytes | None = None
+        newest = decoded = None
         pixels = np.empty((0, 0, 3), np.uint8)
         for step, jpeg in steps:
             newest = jpeg or newest
             if step.driver not in drivers:
                 continue
             part.steps.append(step)
-            if newest is not None:
-                if newest is not decoded and newest != decoded:
-                    pixels = _pixels(part, newest, f"{name}/{step.frame or step.index}", shrink)
-                    decoded = newest
-                part.pictures.append(pixels)
+            if newest is None:
+                continue
+            if newest is not decoded and newest != decoded:
+                decoded, where = newest, f"{name}/{step.frame or step.index}"
+                pixels = decode_picture(newest, where)
+                size, expected = (pixels.shape[1], pixels.shape[0]), header.image_size
+                if expected and expected != size:
+                    text = "{} has {} x {} pixels, but the other images {} x {}."
+                    raise DemosError(text.format(where, *size, *expected))
+                pixels = pixels if shrink is None else shrink(pixels, header)
+            part.pictures.append(pixels)
         if len(part.pictures) not in {0, len(part.steps)}:
             raise DemosError(f"Only some steps of {name} have images.")
         yield part
@@ -193,30 +197,17 @@ def _episodes(
         yield f"{data}, episode {number}", header, iter(steps)
 
 
-def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDArray[np.uint8]:
-    """Decode an image, and reduce it."""
-    pixels = decode_picture(jpeg, where)
-    size = pixels.shape[1], pixels.shape[0]
-    if part.header.image_size not in {None, size}:
-        wide, high = part.header.image_size or size
+def _require_same(part: _Part, first: _Part) -> None:
+    """Refuse an episode that differs in layout, image size or rate."""
+    one, other = part.header, first.header
+    same = {
+        "actions": one.action_layout == other.action_layout,
+        "states": one.state_layout == other.state_layout,
+        "pictures": one.image_size == other.image_size
+        and bool(part.pictures) == bool(first.pictures),
+        "steps a second": is_same_rate(one.control_hz, other.control_hz),
+    }
+    if kind := next((kind for kind, is_same in same.items() if not is_same), ""):
         raise DemosError(
-            f"{where} has {size[0]} x {size[1]} pixels, but the other images {wide} x {high}."
+            f"{part.name} has other {kind} than {first.name}: learn from one kind at a time."
         )
-    return pixels if shrink is None else shrink(pixels, part.header)
-
-
-def _require_same(parts: list[_Part]) -> None:
-    """Refuse episodes that differ in layout, image size or rate."""
-    first = parts[0]
-    for part in parts[1:]:
-        same = {
-            "actions": part.header.action_layout == first.header.action_layout,
-            "states": part.header.state_layout == first.header.state_layout,
-            "pictures": part.header.image_size == first.header.image_size
-            and bool(part.pictures) == bool(first.pictures),
-            "steps a second": is_same_rate(part.header.control_hz, first.header.control_hz),
-        }
-        if other := next((what for what, is_same in same.items() if not is_same), ""):
-            raise DemosError(
-                f"{part.name} has other {other} than {first.name}: learn from one kind at a time."
-            )

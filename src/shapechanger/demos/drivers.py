@@ -8,140 +8,44 @@ when to intervene; here a rule with fixed thresholds does.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from pathlib import Path
+from typing import Any, Final, cast
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import HasDemonstrator, TaskDemonstrator, layouts_of
 from shapechanger.demos.episodes import Driver
-from shapechanger.demos.recording import RecordEpisodes
+from shapechanger.demos.recording import QUALITY, ObservationEncoder, RecordEpisodes, name_of
 from shapechanger.errors import DemosError
+from shapechanger.policy import kind_of, load_policy
 
 EXPERT: Final = "expert"
 """Name of the expert of an env as a driver."""
 
-_ROUNDING: Final = 1e-9
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GateRule:
-    """When the expert takes over, and when it hands back.
-
-    A policy is corrected where it is dangerous, not where it is slow: of a value such as the
-    throttle, everything from rest to the expert's value counts as agreement.
-
-    Attributes:
-        apart: Take over when any value of the two actions, such as the steering, has differed by
-            more than this,
-        apart_s: for this long without interruption, s; at least one step.
-        near_s: Take over at once when an obstacle ahead would be reached within this time at the
-            present speed, s, and the policy does not brake.
-        still_s: Take over when the vehicle has stood still for this long, s, because nothing is
-            learned from that.
-        agree: Hand back when no value has differed by more than this,
-        agree_s: for this long without interruption, s, with no obstacle near; at least one step.
-    """
-
-    apart: float = 0.6
-    apart_s: float = 0.3
-    near_s: float = 0.4
-    still_s: float = 2.0
-    agree: float = 0.3
-    agree_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Refuse contradictory thresholds."""
-        if not 0.0 < self.agree <= self.apart:
-            raise DemosError(
-                f"agree must be positive and at most apart, got {self.agree} and {self.apart}."
-            )
-        if min(self.apart_s, self.near_s, self.still_s, self.agree_s) < 0.0:
-            raise DemosError("apart_s, near_s, still_s and agree_s must not be negative.")
-
-
-class Gate:
-    """State machine that decides at each step who drives.
-
-    Args:
-        rule: The thresholds.
-        period_s: Time between steps, s.
-        rests: For each value of an action, the value at which it is slowest; None for those, such
-            as the steering, that are not slow. Empty for none.
-
-    Attributes:
-        corrects: Whether the expert drives.
-    """
-
-    def __init__(self, rule: GateRule, period_s: float, rests: Sequence[float | None] = ()) -> None:
-        self._rule = rule
-        self._rests = tuple(rests)
-        self._steps_apart = _steps(rule.apart_s, period_s)
-        self._steps_agreed = _steps(rule.agree_s, period_s)
-        self.begin()
-
-    def begin(self) -> None:
-        """Start an episode: the policy drives."""
-        self.corrects = False
-        self._lasted = 0
-
-    def watch(self, wanted: NDArray[np.float32], right: NDArray[np.float32], danger: str) -> str:
-        """Process one step.
-
-        Args:
-            wanted: Action of the policy, shape (n,).
-            right: Action of the expert, shape (n,).
-            danger: Imminent danger, in words; "" for none.
-
-        Returns:
-            Why the driver changes at this step, in words; "" if it does not change.
-        """
-        rule, gap = self._rule, self._gap(wanted, right)
-        if self.corrects:
-            fine = gap <= rule.agree and not danger
-            self._lasted = self._lasted + 1 if fine else 0
-            if self._lasted >= self._steps_agreed:
-                self.corrects, self._lasted = False, 0
-                return "the policy drives on"
-            return ""
-        self._lasted = self._lasted + 1 if gap > rule.apart else 0
-        why = danger
-        if not why and self._lasted >= self._steps_apart:
-            why = f"the policy is off by {gap:.1f}"
-        if not why:
-            return ""
-        self.corrects, self._lasted = True, 0
-        return f"the expert takes over: {why}"
-
-    def _gap(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> float:
-        """Return the largest difference of two actions that is not slowness."""
-        slowest = right.copy()
-        for i, rest in enumerate(self._rests):
-            slowest[i] = right[i] if rest is None else rest
-        agreed = np.clip(wanted, np.minimum(slowest, right), np.maximum(slowest, right))
-        return float(np.abs(wanted - agreed).max())
-
-
-def _steps(seconds: float, period_s: float) -> int:
-    """Return how many steps a duration takes, at least one; robust to rounding."""
-    return max(1, math.ceil(seconds / period_s - _ROUNDING))
-
-
 Act = Callable[[Any], NDArray[np.float32]]
 """A policy: maps an observation to an action, shape (n,)."""
 
-
-class TaskExpert(Protocol):
-    """An expert for the task of an env, as `env.unwrapped.demonstrator(seed)` returns one."""
-
-    def begin(self) -> None:
-        """Start an episode."""
-        ...
-
-    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the intended action, which is learned, and the action to carry out."""
-        ...
+# The expert takes over where any value of the two actions, such as the steering, has differed by
+# more than this, for so many seconds without interruption;
+_APART: Final = 0.6
+_APART_S: Final = 0.3
+# at once where an obstacle ahead would be reached within this time at the present speed, s, and the
+# policy does not brake;
+_NEAR_S: Final = 0.4
+# and where the vehicle has stood still for this long, s, because nothing is learned from that.
+_STILL_S: Final = 2.0
+# It hands back where no value has differed by more than this, for so many seconds without
+# interruption, with no obstacle near.
+_AGREE: Final = 0.3
+_AGREE_S: Final = 1.0
+_ROUNDING: Final = 1e-9
+# Values of the actions of vehicles at which they are slowest.
+_RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}
+_CRAWLS_MPS: Final = 0.05  # Below this speed a vehicle does not collide.
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,91 +68,177 @@ class DriverDecision:
     remark: str = ""
 
 
-class ExpertPilot:
-    """An expert drives.
+class Pilot:
+    """Who drives while recording: an expert, a policy, or a policy that an expert corrects.
 
-    The intended action is recorded as decided. The expert errs on purpose now and then, so that a
-    learner sees recoveries; the erroneous action is what the outputs carry out.
-    """
+    The intended action of an expert is recorded as decided. It errs on purpose now and then, so
+    that a learner sees recoveries; the erroneous action is what the outputs carry out. While it
+    corrects a policy, it makes no mistakes.
 
-    def __init__(self, expert: TaskExpert) -> None:
-        self._expert = expert
-
-    def begin(self) -> None:
-        """Start an episode."""
-        self._expert.begin()
-
-    def decide(self, observation: Any) -> DriverDecision:
-        """Return the expert's decision; the observation is ignored."""
-        meant, done = self._expert.act()
-        return DriverDecision(done, meant, "expert")
-
-
-class PolicyPilot:
-    """A policy drives."""
-
-    def __init__(self, act: Act) -> None:
-        self._act = act
-
-    def begin(self) -> None:
-        """Start an episode."""
-
-    def decide(self, observation: Any) -> DriverDecision:
-        """Return the policy's decision for an observation."""
-        action = self._act(observation)
-        return DriverDecision(action, action, "policy")
-
-
-class CorrectedPilot:
-    """A policy drives, and an expert takes over where it would go wrong.
+    A policy is corrected where it is dangerous, not where it is slow: of a value such as the
+    throttle, everything from rest to the expert's value counts as agreement.
 
     Args:
-        act: The policy.
-        expert: The expert; its intended actions, without mistakes, are carried out.
-        gate: Decides who drives.
-        danger: Returns the imminent danger of an action, in words; "" for none.
+        env: The env; dangers are seen in its `world`, if it has one.
+        act: The policy; None to let the expert drive.
+        expert: The expert; None to let the policy drive uncorrected.
 
     Attributes:
-        steps: Number of decisions.
+        steps: Number of decisions of a corrected policy and its expert.
         corrected: Number of those that were the expert's.
         takeovers: How often the expert took over.
     """
 
     def __init__(
-        self,
-        act: Act,
-        expert: TaskExpert,
-        gate: Gate,
-        danger: Callable[[NDArray[np.float32]], str] = lambda action: "",
+        self, env: gym.Env[Any, Any], act: Act | None, expert: TaskDemonstrator | None
     ) -> None:
-        self._act, self._expert, self._gate, self._danger = act, expert, gate, danger
+        self._act, self._expert = act, expert
+        self._period_s = 1.0 / float(env.metadata.get("render_fps") or 20.0)
+        self._world = getattr(env.unwrapped, "world", None)
+        # Where each value of an action is slowest; None if it has no speed, such as the steering.
+        self._rests = [_RESTS.get(name) for name in layouts_of(env)[1].names]
+        self._corrects, self._lasted = False, 0
+        self._placed, self._still_s = -1, 0.0
         self.steps = self.corrected = self.takeovers = 0
 
     def begin(self) -> None:
-        """Start an episode: the policy drives."""
-        self._expert.begin()
-        self._gate.begin()
+        """Start an episode; with a policy, it drives."""
+        self._corrects, self._lasted = False, 0
+        if self._expert is not None:
+            self._expert.begin()
 
     def decide(self, observation: Any) -> DriverDecision:
         """Return the decision for an observation."""
-        wanted, right = self._act(observation), self._expert.act()[0]
-        drove = self._gate.corrects
-        remark = self._gate.watch(wanted, right, self._danger(wanted))
+        act, expert = self._act, self._expert
+        if act is None:
+            if expert is None:
+                raise DemosError("Nobody drives: give a policy, an expert, or both.")
+            meant, done = expert.act()
+            return DriverDecision(done, meant, "expert")
+        wanted = act(observation)
+        if expert is None:
+            return DriverDecision(wanted, wanted, "policy")
+        right, _ = expert.act()
+        remark = self._change(wanted, right)
         self.steps += 1
-        if self._gate.corrects:
+        if self._corrects:
             self.corrected += 1
-            self.takeovers += not drove
+            self.takeovers += bool(remark)
             return DriverDecision(right, right, "expert", wanted, remark)
         return DriverDecision(wanted, wanted, "policy", None, remark)
 
+    def _change(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> str:
+        """Change the driver where it is time; return why, or "" without a change."""
+        gap, danger = self._gap(wanted, right), self._danger(wanted)
+        if self._corrects:
+            is_time, least_s = gap <= _AGREE and not danger, _AGREE_S
+        else:
+            is_time, least_s = gap > _APART, _APART_S
+        self._lasted = self._lasted + 1 if is_time else 0
+        least = max(1, math.ceil(least_s / self._period_s - _ROUNDING))
+        if self._lasted < least and (self._corrects or not danger):
+            return ""
+        self._corrects, self._lasted = not self._corrects, 0
+        if not self._corrects:
+            return "the policy drives on"
+        return f"the expert takes over: {danger or f'the policy is off by {gap:.1f}'}"
 
-EpisodeDriver = ExpertPilot | PolicyPilot | CorrectedPilot
-"""Who drives while recording."""
+    def _gap(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> float:
+        """Return the largest difference of two actions that is not slowness."""
+        slowest = right.copy()
+        for i, rest in enumerate(self._rests):
+            slowest[i] = right[i] if rest is None else rest
+        agreed = np.clip(wanted, np.minimum(slowest, right), np.maximum(slowest, right))
+        return float(np.abs(wanted - agreed).max())
+
+    def _danger(self, action: NDArray[np.float32]) -> str:
+        """Return the danger of an action in the env's world, in words; "" for none."""
+        world = self._world
+        if world is None:
+            return ""
+        speed, ahead_m = world.inputs().speed, world.distance_m()
+        if world.placed != self._placed or abs(speed) > _CRAWLS_MPS:
+            self._placed, self._still_s = world.placed, 0.0
+        self._still_s += self._period_s
+        if world.touches:
+            return "it touches something"
+        drives_on = speed > _CRAWLS_MPS and action[-1] > (self._rests[-1] or 0.0)
+        if drives_on and ahead_m < speed * _NEAR_S:
+            return f"{ahead_m:.1f} m to what is ahead"
+        return "it stands still" if self._still_s > _STILL_S else ""
+
+
+def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> Pilot:
+    """Return the requested driver.
+
+    Args:
+        env: The env to drive in.
+        driver: `EXPERT`, or the file of a policy.
+        corrected_by: `EXPERT` to let it take over where the policy would go wrong; "" for nobody.
+        seed: Seed of the expert's mistakes.
+
+    Raises:
+        DemosError: If the env has no expert, or the policy does not fit it.
+    """
+    if corrected_by not in ("", EXPERT):
+        raise DemosError(f"A policy is corrected by {EXPERT}, and not by {corrected_by!r}.")
+    if driver == EXPERT and corrected_by:
+        raise DemosError("The expert needs no correction: give a policy as the driver.")
+    if driver != EXPERT and not Path(driver).is_file():
+        raise DemosError(f"There is no driver {driver!r}: it is {EXPERT}, or the file of a policy.")
+    act = None if driver == EXPERT else _policy(Path(driver), env)
+    if act is not None and not corrected_by:
+        return Pilot(env, act, None)
+    inner = env.unwrapped
+    if not isinstance(inner, HasDemonstrator):
+        raise DemosError(
+            f"{name_of(env)} has no expert: let a policy drive with `--driver FILE`, or drive a "
+            "robot yourself with `shapechanger robot drive`."
+        )
+    return Pilot(env, act, inner.demonstrator(seed))
+
+
+def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
+    """Load a policy and check that its observations and actions fit the env."""
+    box = cast("gym.spaces.Box", env.action_space)
+
+    def fitting(actions: NDArray[Any]) -> NDArray[np.float32]:
+        return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
+
+    if kind_of(path) == "clone":
+        clone = _clone(path, env)
+        return lambda seen: fitting(clone(seen))
+    policy = load_policy(path)
+    if (policy.card.observation, policy.card.action) != layouts_of(env):
+        raise DemosError(
+            f"{path} was trained in {policy.card.env}, which senses or moves something else than "
+            f"{name_of(env)}."
+        )
+    return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))
+
+
+def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
+    """Load a clone, and check that it fits the env's frames, state and actions."""
+    from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
+
+    clone = CameraPolicy.load(path)
+    encoder = ObservationEncoder(env, QUALITY)
+    needs = {"image": clone.card.eyes != "none", "state": clone.card.state_layout is not None}
+    if needs["image"] and not encoder.has_picture:
+        raise DemosError(f"{path} drives by images, and {name_of(env)} shows none.")
+    clone.card.require_layouts(encoder.action_layout, encoder.state_layout)
+
+    def act(seen: Any) -> NDArray[Any]:
+        parts = encoder.parts(seen)
+        image, state = (np.asarray(parts[n])[np.newaxis] if needs[n] else None for n in needs)
+        return clone.predict_many(image, state)
+
+    return act
 
 
 def record_steps(
     env: RecordEpisodes,
-    pilot: EpisodeDriver,
+    pilot: Pilot,
     steps: int,
     seed: int,
     on_step: Callable[[int], object] = lambda steps: None,

@@ -6,6 +6,7 @@ simplejpeg is imported on first use, because recordings without images need no d
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -25,16 +26,15 @@ _GREY: Final = "Gray"
 _REMEDY: Final = "replace it with an intact copy, or remove it and its entry"
 
 
-def decode_picture(jpeg: bytes, name: str, *, grey: bool = False) -> NDArray[np.uint8]:
+def decode_picture(jpeg: bytes, name: str) -> NDArray[np.uint8]:
     """Decode a JPEG.
 
     Args:
         jpeg: Its bytes.
         name: How to name the image in errors.
-        grey: Whether to decode the brightness only.
 
     Returns:
-        Red, green and blue, shape (height, width, 3); shape (height, width) with `grey`.
+        Red, green and blue, shape (height, width, 3).
 
     Raises:
         DemosError: If the image is damaged, or larger than `MAX_PIXELS`.
@@ -43,10 +43,9 @@ def decode_picture(jpeg: bytes, name: str, *, grey: bool = False) -> NDArray[np.
     picture_size(jpeg, name)
     try:
         # Strict by default: a truncated image is an error, not filled up with grey.
-        pixels = _simplejpeg().decode_jpeg(jpeg, colorspace="GRAY" if grey else "RGB")
+        return _simplejpeg().decode_jpeg(jpeg, colorspace="RGB")
     except ValueError as error:
         raise DemosError(f"The image {name} is damaged ({error}): {_REMEDY}.") from error
-    return pixels[..., 0] if grey else pixels
 
 
 def encode_picture(pixels: NDArray[np.uint8], quality: int = 100) -> bytes:
@@ -123,7 +122,8 @@ COLOURS: Final[dict[Driver, tuple[int, int, int]]] = {
 
 _WIDTH: Final = 480  # Minimum width, pixels.
 _BAR: Final = 14  # Height of one bar, pixels.
-_BACKGROUND: Final = (24, 28, 34)
+BACKGROUND: Final = (24, 28, 34)
+"""Colour of the area below an image, and of episodes without a camera."""
 _MIDDLE: Final = (110, 118, 128)
 _WANTED: Final = (255, 255, 255)
 
@@ -148,45 +148,24 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
     large = large[: large.shape[0] - large.shape[0] % 2, :width]
     # The ends of the bars; for an unbounded value its magnitude, at least 1.
     reach = np.maximum(1.0, np.abs(step.action))
-    lows = np.where(np.isfinite(layout.low), layout.low, -reach).tolist()
-    highs = np.where(np.isfinite(layout.high), layout.high, reach).tolist()
-    strips = [
-        _strip(
-            width,
-            _share(value, low, high),
-            _share(min(max(0.0, low), high), low, high),
-            None if step.wanted is None else _share(step.wanted[place], low, high),
-            COLOURS[step.driver],
-        )
-        for place, (value, low, high) in enumerate(zip(step.action, lows, highs, strict=True))
-    ]
-    return np.concatenate([large, *strips])
+    lows = np.where(np.isfinite(layout.low), layout.low, -reach)
+    highs = np.where(np.isfinite(layout.high), layout.high, reach)
 
+    def columns(values: Sequence[float]) -> list[int]:
+        """Return the column of each value, from 0 to the last one."""
+        shares = np.full(len(lows), 0.5)
+        above = np.clip(np.nan_to_num(values), lows, highs) - lows
+        np.divide(above, highs - lows, out=shares, where=lows < highs)
+        return np.rint(shares * (width - 1)).astype(int).tolist()
 
-def blank(size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return an empty image, for episodes without a camera.
-
-    Args:
-        size: Width and height in pixels.
-    """
-    return np.full((size[1], size[0], 3), _BACKGROUND, np.uint8)
-
-
-def _share(value: float, low: float, high: float) -> float:
-    """Return the position of a value between two bounds, from 0 to 1."""
-    return 0.5 if not low < high else min(max((value - low) / (high - low), 0.0), 1.0)
-
-
-def _strip(
-    width: int, value: float, zero: float, wanted: float | None, colour: tuple[int, int, int]
-) -> NDArray[np.uint8]:
-    strip = np.full((_BAR, width, 3), _BACKGROUND, np.uint8)
-    last = width - 1
-    from_, to = sorted((round(zero * last), round(value * last)))
-    strip[2:-2, from_ : to + 1] = colour
-    middle = round(zero * last)
-    strip[:, middle : middle + 1] = _MIDDLE
-    if wanted is not None:
-        place = min(round(wanted * last), last - 1)
-        strip[1:-1, place : place + 2] = _WANTED
-    return strip
+    bars = np.full((len(lows), _BAR, width, 3), BACKGROUND, np.uint8)
+    for bar, zero, value in zip(
+        bars, columns([0.0] * len(lows)), columns(step.action), strict=True
+    ):
+        bar[2:-2, min(zero, value) : max(zero, value) + 1] = COLOURS[step.driver]
+        bar[:, zero] = _MIDDLE
+    if step.wanted is not None:
+        for bar, wanted in zip(bars, columns(step.wanted), strict=True):
+            place = min(wanted, width - 2)
+            bar[1:-1, place : place + 2] = _WANTED
+    return np.concatenate([large, *bars])

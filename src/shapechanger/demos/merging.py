@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
-from shapechanger.demos.episodes.files import free_path
+from shapechanger.demos.episodes.files import free_path, is_episode
 from shapechanger.errors import DemosError, OutputError
 
 
-@dataclass(frozen=True, slots=True)
-class Merged:
+class Merged(NamedTuple):
     """Result of a merge.
 
     Attributes:
@@ -47,7 +46,11 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
     if not sources:
         raise DemosError("There is nothing to merge: give at least one recording.")
     episodes = [read_episode(path) for source in sources for path in episodes_of(source)]
-    there = [read_episode(path) for path in _episodes_in(out)]
+    there: list[Episode] = []
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        if is_episode(out):
+            raise DemosError(f"{out} is an episode, but a recording is a folder of episodes.")
+        there = [read_episode(path) for path in episodes_of(out)]
     known = {_identity(episode): episode.path for episode in there}
     for episode in episodes:
         if not episode.closed:
@@ -55,32 +58,17 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
                 f"{episode.path} is not closed: wait until its recording ends, or run "
                 f"`shapechanger demos repair {episode.path}` if the recorder has crashed."
             )
-        identity = _identity(episode)
-        if identity in known:
-            raise DemosError(f"{episode.path} and {known[identity]} are the same episode.")
-        known[identity] = episode.path
+        if same := known.get(_identity(episode)):
+            raise DemosError(f"{episode.path} and {same} are the same episode.")
+        known[_identity(episode)] = episode.path
         # A link would copy a file or a folder of another place into the recording.
         if link := next((path for path in episode.path.rglob("*") if path.is_symlink()), None):
             raise DemosError(f"{link} is a link, but an episode has only files: remove it.")
     headers = [episode.header for episode in [*there, *episodes]]
     layouts = {(header.action_layout, header.state_layout) for header in headers}
-    pairs: list[tuple[Path, Path]] = []
-    copied = 0
-    for episode in episodes:
-        target = _copied(episode.path, out)
-        pairs.append((episode.path, target))
-        copied += sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
-    return Merged(tuple(pairs), len(layouts), copied)
-
-
-def _episodes_in(out: Path) -> tuple[Path, ...]:
-    """Return the episodes that are already in the target recording."""
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
-        return ()
-    found = episodes_of(out)
-    if found == (out,):
-        raise DemosError(f"{out} is an episode, but a recording is a folder of episodes.")
-    return found
+    pairs = tuple((episode.path, _copied(episode.path, out)) for episode in episodes)
+    files = (file for _, target in pairs for file in target.rglob("*") if file.is_file())
+    return Merged(pairs, len(layouts), sum(file.stat().st_size for file in files))
 
 
 def _identity(episode: Episode) -> tuple[object, ...]:

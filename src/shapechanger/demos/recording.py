@@ -12,15 +12,16 @@ import json
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import layouts_of
 from shapechanger.demos.episodes import Driver, EpisodeHeader, EpisodeWriter, Step
 from shapechanger.demos.episodes.writer import SPARE_BYTES
 from shapechanger.demos.jpeg import encode_picture, picture_size
@@ -31,8 +32,7 @@ _PICTURE_DIMENSIONS: Final = 3
 _CHANNELS: Final = 3
 
 
-@dataclass(frozen=True, slots=True)
-class EncodedObservation:
+class EncodedObservation(NamedTuple):
     """An observation in the form in which it is recorded.
 
     Attributes:
@@ -67,41 +67,36 @@ class ObservationEncoder:
         if not 1 <= quality <= 100:  # Percent.
             raise DemosError(f"quality must be from 1 to 100 percent, got {quality}.")
         self._env, self._quality = env, quality
-        name = env.spec.id if env.spec else type(env.unwrapped).__name__
         space = env.observation_space
-        self._is_dict = isinstance(space, spaces.Dict)
-        parts: Mapping[str, gym.Space[Any]] = (
-            cast("Any", space).spaces
-            if self._is_dict
-            else {"image" if _is_picture(space) else "state": space}
-        )
-        picture, state = parts.get("image"), parts.get("state")
-        if (
-            not parts
-            or not parts.keys() <= {"image", "state"}
-            or (picture is not None and not _is_picture(picture))
-            or (state is not None and not _is_row(state))
-        ):
+        is_dict = isinstance(space, spaces.Dict)
+        self._alone = "" if is_dict else "image" if _is_picture(space) else "state"
+        parts: Mapping[str, gym.Space[Any]]
+        parts = cast("Any", space).spaces if is_dict else {self._alone: space}
+        kinds = {"image": _is_picture, "state": _is_row}
+        if not parts or not all(n in kinds and kinds[n](part) for n, part in parts.items()):
             raise DemosError(
-                f"{name} has the observation space {space}, which cannot be recorded: it must be "
-                "an image (uint8, height x width x 3), a vector, or a Dict of both as `image` and "
-                "`state`."
+                f"{name_of(env)} has the observation space {space}, which cannot be recorded: it "
+                "must be an image (uint8, height x width x 3), a vector, or a Dict of both as "
+                "`image` and `state`."
             )
-        self.has_picture, self._has_state = picture is not None, state is not None
-        seen, self.action_layout = (_layout(env, name, s) for s in ("observation", "action"))
+        self.has_picture = "image" in parts
+        seen, self.action_layout = layouts_of(env)
         numbers = tuple(f for f in seen if len(f.shape) != _PICTURE_DIMENSIONS)
-        self.state_layout = Layout(numbers) if state is not None else None
+        self.state_layout = Layout(numbers) if "state" in parts else None
         self._places = self.state_layout.slices if self.state_layout else {}
-        for what, part, layout in (
-            ("state", state, self.state_layout),
+        for kind, part, layout in (
+            ("state", parts.get("state"), self.state_layout),
             ("action", env.action_space, self.action_layout),
         ):
-            if part is None or layout is None:
-                continue
-            if not _is_row(part) or part.shape != (layout.size,):
+            if layout is not None and not (_is_row(part) and part.shape == (layout.size,)):
                 raise DemosError(
-                    f"{name}: the {what} space is {part}, but its layout has {layout.size} values."
+                    f"{name_of(env)}: the {kind} space is {part}, but its layout has {layout.size} "
+                    "values."
                 )
+
+    def parts(self, observation: Any) -> Mapping[str, Any]:
+        """Return the `image` and the `state` of an observation."""
+        return {self._alone: observation} if self._alone else observation
 
     def encode(self, observation: Any, info: Mapping[str, Any]) -> EncodedObservation:
         """Return an observation as it is recorded.
@@ -110,25 +105,21 @@ class ObservationEncoder:
             observation: Observation of the env.
             info: The info that came with it.
         """
-        return EncodedObservation(
-            self._jpeg(observation["image"] if self._is_dict else observation)
-            if self.has_picture
-            else None,
-            self._state(observation, info) if self._has_state else (),
-            info.get("captured_ns"),
-        )
-
-    def _jpeg(self, picture: NDArray[np.uint8]) -> bytes:
-        given: bytes | None = getattr(self._env.unwrapped, "newest_jpeg", None)
-        return given if given is not None else encode_picture(picture, self._quality)
-
-    def _state(self, observation: Any, info: Mapping[str, Any]) -> tuple[float, ...]:
-        given = observation["state"] if self._is_dict else observation
-        state = np.array(given, np.float64).ravel()
+        parts = self.parts(observation)
+        jpeg: bytes | None = None
+        if self.has_picture:
+            given = getattr(self._env.unwrapped, "newest_jpeg", None)
+            jpeg = encode_picture(parts["image"], self._quality) if given is None else given
+        state = np.array(parts.get("state", ()), np.float64).ravel()
         for name in info.get("absent", ()):
             if name in self._places:
                 state[self._places[name]] = math.nan
-        return tuple(state.tolist())
+        return EncodedObservation(jpeg, tuple(state.tolist()), info.get("captured_ns"))
+
+
+def name_of(env: gym.Env[Any, Any]) -> str:
+    """Return the id of an env, or the name of its class."""
+    return env.spec.id if env.spec else type(env.unwrapped).__name__
 
 
 def _is_picture(space: gym.Space[Any]) -> bool:
@@ -140,18 +131,8 @@ def _is_picture(space: gym.Space[Any]) -> bool:
     )
 
 
-def _is_row(space: gym.Space[Any]) -> bool:
+def _is_row(space: gym.Space[Any] | None) -> bool:
     return isinstance(space, spaces.Box) and len(space.shape) == 1
-
-
-def _layout(env: gym.Env[Any, Any], name: str, side: str) -> Layout:
-    layout = getattr(env.unwrapped, f"{side}_layout", None)
-    if not isinstance(layout, Layout):
-        raise DemosError(
-            f"{name} has no {side}_layout, so the meaning of its values is unknown: add it to the "
-            "env, as a `shapechanger.Layout`."
-        )
-    return layout
 
 
 QUALITY: Final = 95
@@ -160,14 +141,6 @@ QUALITY: Final = 95
 _COLLISION: Final = "reward_collision"
 _SECRET: Final = frozenset({"key"})
 """Arguments of envs that must not leave this machine with a recording."""
-
-
-class _Decision(NamedTuple):
-    """The decision for the next step, where it differs from what is carried out."""
-
-    action: tuple[float, ...]
-    driver: Driver
-    wanted: tuple[float, ...] | None
 
 
 class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
@@ -194,7 +167,6 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         steps: Number of steps written, over all episodes.
         episodes: Number of episodes begun.
         seconds: Duration of the closed episodes, s.
-        outcome: Outcome of the newest closed episode.
 
     Raises:
         DemosError: If the env's observations or actions cannot be recorded.
@@ -219,12 +191,11 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self.steps = 0
         self.episodes = 0
         self.seconds = 0.0
-        self.outcome = ""
         self._writer: EpisodeWriter | None = None
         self._seen: EncodedObservation | None = None
         self._jpeg: bytes | None = None
         self._start: dict[str, Any] = {}
-        self._decision: _Decision | None = None
+        self._decision: Step | None = None
 
     @property
     def control_hz(self) -> float:
@@ -244,8 +215,11 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             driver: Who decided it.
             wanted: What a policy wanted while somebody else drives.
         """
-        asked = None if wanted is None else _numbers(wanted)
-        self._decision = _Decision(_numbers(action), driver, asked)
+        self._decision = Step(
+            action=_numbers(action),
+            driver=driver,
+            wanted=None if wanted is None else _numbers(wanted),
+        )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -284,10 +258,15 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             raise
         over = bool(terminated or truncated)
         try:
-            writer.add(
-                self._step(seen, action, float(reward), bool(terminated), bool(truncated), info),
-                seen.jpeg if seen.jpeg != self._jpeg else None,
+            step = msgspec.structs.replace(
+                self._decided(action, info),
+                state=seen.state,
+                captured_ns=seen.captured_ns,
+                reward=float(reward),
+                terminated=bool(terminated),
+                truncated=bool(truncated),
             )
+            writer.add(step, seen.jpeg if seen.jpeg != self._jpeg else None)
             self.steps += 1
             self._jpeg = seen.jpeg
             self._seen = None if over else self._encoder.encode(observation, info)
@@ -304,21 +283,9 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         Raises:
             DemosError: If no episode is being recorded.
         """
-        self._open().mark(text)
-
-    def undo(self, seconds: float = 5.0) -> int:
-        """Exclude the newest steps of this episode.
-
-        Args:
-            seconds: How far to go back, s; see `EpisodeWriter.undo`.
-
-        Returns:
-            Number of excluded steps.
-
-        Raises:
-            DemosError: If no episode is being recorded, or `seconds` is not positive and finite.
-        """
-        return self._open().undo(seconds)
+        if self._writer is None:
+            raise DemosError("No episode is being recorded: one begins with the first step.")
+        self._writer.mark(text)
 
     def end(self, outcome: str = "") -> None:
         """Close the episode, if one is open; the env goes on unrecorded until the next reset.
@@ -332,7 +299,6 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         writer, self._writer = self._writer, None
         self._seen = self._jpeg = self._decision = None
         if writer is not None:
-            self.outcome = outcome
             self.seconds += writer.seconds + 1.0 / self.control_hz
             writer.close(outcome)
 
@@ -366,11 +332,9 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             notes["reset_options"] = _plain(self._start["options"])
         kwargs = spec.kwargs if spec else {}
         robot = getattr(inner, "welcome", None)  # Of a robot on the network, or an emulated one.
-        fields: dict[str, Any] = {
-            "robot": getattr(robot, "robot", ""),
-            "body": getattr(robot, "body", ""),
-            "camera_pitch_deg": getattr(robot, "camera_pitch_deg", None),
-            "camera_fovy_deg": getattr(robot, "camera_fovy_deg", None),
+        facts = ("robot", "body", "camera_pitch_deg", "camera_fovy_deg")
+        fields: dict[str, Any] = {n: getattr(robot, n) for n in facts if hasattr(robot, n)}
+        fields |= {
             "action_layout": self._encoder.action_layout.to_json(),
             "state_layout": layout.to_json() if layout else "",
             "image_size": picture_size(seen.jpeg, "from the env") if seen.jpeg else None,
@@ -384,34 +348,19 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         fields |= {**self._about, "notes": notes}
         return EpisodeHeader(**fields)
 
-    def _step(
-        self,
-        seen: EncodedObservation,
-        action: Any,
-        reward: float,
-        terminated: bool,
-        truncated: bool,
-        info: Mapping[str, Any],
-    ) -> Step:
-        passed = _numbers(action)
-        decision, self._decision = self._decision, None
-        decided = decision or _Decision(passed, self._by_default, None)
+    def _decided(self, action: Any, info: Mapping[str, Any]) -> Step:
+        """Return a step with the decision for it, and what the env did with that."""
+        passed, applied = _numbers(action), info.get("action_applied")
+        decided = self._decision or Step(action=passed, driver=self._by_default)
         if (by_person := info.get("intervene_action")) is not None:
-            decided = _Decision(_numbers(by_person), "person", passed)
-        applied = info.get("action_applied")
-        return Step(
-            action=decided.action,
-            driver=decided.driver,
-            wanted=decided.wanted,
+            decided = Step(action=_numbers(by_person), driver="person", wanted=passed)
+        self._decision = None
+        return msgspec.structs.replace(
+            decided,
             applied=None if applied is None else _numbers(applied),
-            state=seen.state,
-            captured_ns=seen.captured_ns,
             decided_ns=info.get("decided_ns"),
             wall_ns=time.time_ns(),
-            reward=reward,
             terms={name: float(value) for name, value in _terms(info).items()},
-            terminated=terminated,
-            truncated=truncated,
             stop_reason=str(info.get("stop_reason", "")),
         )
 
@@ -429,11 +378,6 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             self.end("failed")
         except ShapechangerError as error:
             why.add_note(str(error))
-
-    def _open(self) -> EpisodeWriter:
-        if self._writer is None:
-            raise DemosError("No episode is being recorded: one begins with the first step.")
-        return self._writer
 
 
 def _numbers(values: Any) -> tuple[float, ...]:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.episodes import Episode, Step
-from shapechanger.demos.jpeg import blank, decode_picture, overlay
-from shapechanger.demos.recording import EncodedObservation, ObservationEncoder
+from shapechanger.demos.episodes import Episode
+from shapechanger.demos.jpeg import BACKGROUND, decode_picture, overlay
+from shapechanger.demos.recording import QUALITY, ObservationEncoder
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from shapechanger.reports.films import require_film, write_film
@@ -24,14 +24,15 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
     The applied actions are replayed where they are known, because the frames follow from them; the
     expert's intended actions may differ.
     """
-    header = episode.header
-    kept = episode.kept
-    apart = _Apart()
+    header, kept = episode.header, episode.kept
+    gaps: list[NDArray[np.float64]] = []
+    picture_gaps: list[float] = []
+    rewards: list[tuple[float, float]] = []
     # With the recorded arguments if it is the recorded env.
     kwargs = header.env_kwargs if ref.id == header.env else {}
     made = EnvRef(ref.id, {**kwargs, **ref.kwargs}).make(max_episode_steps=-1)
     with closing(made) as env:
-        encoder = ObservationEncoder(env, 95)
+        encoder = ObservationEncoder(env, QUALITY)
         recorded = Layout.from_json(header.action_layout)
         if [(f.name, f.unit, f.shape) for f in encoder.action_layout] != [
             (f.name, f.unit, f.shape) for f in recorded
@@ -41,26 +42,39 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
                 f"was recorded with {', '.join(recorded.names)}."
             )
         states = encoder.state_layout
-        compares = states is not None and states.to_json() == header.state_layout
+        if states is not None and states.to_json() != header.state_layout:
+            states = None  # States that differ in meaning are not compared.
         observation, info = env.reset(
             seed=header.seed, options=cast("Any", header.notes.get("reset_options"))
         )
         played, ended = 0, ""
         for step in kept:
-            apart.look(episode, step, encoder.encode(observation, info), states=compares)
+            seen = encoder.encode(observation, info)
+            if states is not None:
+                gaps.append(np.abs(np.array(seen.state) - np.array(step.state)))
+            if (jpeg := episode.jpeg(step)) is not None and seen.jpeg is not None:
+                old = decode_picture(jpeg, step.frame)
+                new = decode_picture(seen.jpeg, "the env's image")
+                if old.shape == new.shape:
+                    picture_gaps.append(float(np.abs(old.astype(float) - new).mean()))
             values = step.action if step.applied is None else step.applied
             observation, reward, terminated, truncated, info = env.step(
                 np.array(values, np.float32)
             )
             played += 1
-            apart.earn(step, float(reward))
+            if step.reward is not None:
+                rewards.append((step.reward, float(reward)))
             if terminated or truncated:
                 ended = "; the episode ended there" if played < len(kept) else ""
                 break
+    lines = _picture_lines(picture_gaps) + _state_lines(np.array(gaps), states)
+    if rewards:
+        then, now = np.sum(rewards, axis=0)
+        lines.append(f"return {then:.2f} when recorded, {now:.2f} now")
     return [
         f"played {played} of {len(kept)} steps in {ref}{ended}",
         *_caveats(episode),
-        *apart.lines(states if compares else None),
+        *(lines or ["nothing to compare"]),
     ]
 
 
@@ -77,58 +91,31 @@ def _caveats(episode: Episode) -> list[str]:
     return caveats
 
 
-class _Apart:
-    """Differences between a replay and its recording."""
-
-    def __init__(self) -> None:
-        self._states: list[NDArray[np.float64]] = []
-        self._pictures: list[float] = []
-        self._rewards: list[tuple[float, float]] = []
-
-    def look(self, episode: Episode, step: Step, seen: EncodedObservation, *, states: bool) -> None:
-        """Compare the observation before a step with the recorded one."""
-        if states:
-            self._states.append(np.abs(np.array(seen.state) - np.array(step.state)))
-        jpeg = episode.jpeg(step)
-        if jpeg is None or seen.jpeg is None:
-            return
-        old, new = decode_picture(jpeg, step.frame), decode_picture(seen.jpeg, "the env's image")
-        if old.shape == new.shape:
-            self._pictures.append(float(np.abs(old.astype(float) - new).mean()))
-
-    def earn(self, step: Step, reward: float) -> None:
-        """Compare the reward of a step with the recorded one."""
-        if step.reward is not None:
-            self._rewards.append((step.reward, reward))
-
-    def lines(self, layout: Layout | None) -> list[str]:
-        """Describe the differences, one per line."""
-        lines: list[str] = []
-        if self._pictures and not any(self._pictures):
-            lines.append("the images are the same in every step")
-        elif self._pictures:
-            lines.append(
-                f"images differ by {np.mean(self._pictures):.1f} of 255 on average, "
-                f"{self._pictures[-1]:.1f} at the end"
-            )
-        if layout is not None and self._states:
-            gaps = np.array(self._states)
-            if not np.nanmax(gaps, initial=0.0):
-                lines.append("the state is the same in every step")
-            for name, place in layout.slices.items():
-                of_one = gaps[:, place]
-                if np.nanmax(of_one, initial=0.0):
-                    lines.append(
-                        f"{layout[name]} differs by {np.nanmean(of_one):.3g} on average, "
-                        f"{np.nanmax(of_one):.3g} at most"
-                    )
-        if self._rewards:
-            then, now = np.sum(self._rewards, axis=0)
-            lines.append(f"return {then:.2f} when recorded, {now:.2f} now")
-        return lines or ["nothing to compare"]
+def _picture_lines(gaps: list[float]) -> list[str]:
+    """Describe the mean differences of images, of 255."""
+    if not gaps:
+        return []
+    if not any(gaps):
+        return ["the images are the same in every step"]
+    mean = f"images differ by {np.mean(gaps):.1f} of 255 on average"
+    return [f"{mean}, {gaps[-1]:.1f} at the end"]
 
 
-_WITHOUT_CAMERA: Final = (480, 40)
+def _state_lines(gaps: NDArray[np.float64], layout: Layout | None) -> list[str]:
+    """Describe the differences of states, shape (n, size of the layout)."""
+    if layout is None or not gaps.size:
+        return []
+    if not np.nanmax(gaps, initial=0.0):
+        return ["the state is the same in every step"]
+    return [
+        f"{layout[name]} differs by {np.nanmean(of_one):.3g} on average, "
+        f"{np.nanmax(of_one):.3g} at most"
+        for name, place in layout.slices.items()
+        if np.nanmax(of_one := gaps[:, place], initial=0.0)
+    ]
+
+
+_WITHOUT_CAMERA: Final = (40, 480, 3)
 
 
 def write_episode_film(episode: Episode, path: Path) -> str:
@@ -140,7 +127,7 @@ def write_episode_film(episode: Episode, path: Path) -> str:
     for step in episode.kept:
         jpeg = episode.jpeg(step)
         picture = (
-            blank(_WITHOUT_CAMERA)
+            np.full(_WITHOUT_CAMERA, BACKGROUND, np.uint8)
             if jpeg is None
             else decode_picture(jpeg, f"{episode.path}/frames/{step.frame}")
         )

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from itertools import accumulate, groupby
+from itertools import accumulate, groupby, pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import simplejpeg
+from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
+from shapechanger.demos.episodes.records import Keep
 from shapechanger.demos.jpeg import COLOURS, decode_picture
-from shapechanger.demos.statistics import Distribution, EpisodeStatistics, gaps_s, spread, summary
+from shapechanger.demos.statistics import gaps_s
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
@@ -35,40 +37,68 @@ _MAX_POINTS: Final = 1000
 # Numbers of a state that are shown; outputs are shown with the actions.
 _MEASURED: Final = ("speed", "distance", "battery")
 _MAX_ACTIONS: Final = 12
+_BINS: Final = 21  # Odd, so that 0 has its own bin in a symmetric range.
+_COLLISION: Final = "reward_collision"
 _MS: Final = 1e3
 
 
-def distributions(episodes: Sequence[Episode]) -> list[tuple[str, str, Distribution]]:
-    """Name, unit and distribution of actions, measurements and times between steps.
+class Distribution(NamedTuple):
+    """Numbers of the same name and unit.
+
+    Attributes:
+        name: What they are.
+        unit: Their unit.
+        values: The finite ones, shape (n,), at least one.
+        missing: Number of the others, NaN and infinities.
+        low: Lowest value that makes sense; minus infinity for none.
+        high: Highest value that makes sense; infinity for none.
+    """
+
+    name: str
+    unit: str
+    values: NDArray[np.float64]
+    missing: int
+    low: float
+    high: float
+
+
+def distributions(episodes: Sequence[Episode]) -> list[Distribution]:
+    """Return the distributions of actions, measurements and times between steps.
 
     Numbers of the same name and unit are pooled over episodes. Dropped steps do not count.
     """
     found: dict[tuple[str, str], tuple[list[float], float, float]] = {}
 
-    def add(name: str, unit: str, values: Iterable[float], low: float, high: float) -> None:
+    def add(
+        name: str,
+        unit: str,
+        values: Iterable[float],
+        low: float = -math.inf,
+        high: float = math.inf,
+    ) -> None:
         numbers, *_ = found.setdefault((name, unit), ([], low, high))
         numbers.extend(values)
 
     for episode in episodes:
-        actions = Layout.from_json(episode.header.action_layout)
-        for name, place in list(actions.slices.items())[:_MAX_ACTIONS]:
+        layout = Layout.from_json(episode.header.action_layout)
+        for name, place in list(layout.slices.items())[:_MAX_ACTIONS]:
             values = (v for step in episode.kept for v in step.action[place])
-            add(name, actions[name].unit, values, actions[name].low, actions[name].high)
+            add(name, layout[name].unit, values, layout[name].low, layout[name].high)
     for episode in episodes:
-        if not episode.header.state_layout:
-            continue
-        states = Layout.from_json(episode.header.state_layout)
-        for name in (n for n in _MEASURED if n in states):
-            place = states.slices[name]
+        states = episode.header.state_layout
+        layout = Layout.from_json(states) if states else Layout(())
+        for name in (n for n in _MEASURED if n in layout):
+            place = layout.slices[name]
             values = (v for step in episode.kept for v in step.state[place])
-            add(name, states[name].unit, values, -math.inf, math.inf)
+            add(name, layout[name].unit, values)
     for episode in episodes:
-        add("time between steps", "ms", (_MS * gap for gap in gaps_s(episode)), -math.inf, math.inf)
-    counted = [
-        (name, unit, spread(values, low, high))
-        for (name, unit), (values, low, high) in found.items()
-    ]
-    return [(name, unit, one) for name, unit, one in counted if one is not None]
+        add("time between steps", "ms", (_MS * gap for gap in gaps_s(episode)))
+    pooled: list[Distribution] = []
+    for (name, unit), (values, low, high) in found.items():
+        finite = np.array([value for value in values if math.isfinite(value)])
+        if len(finite):
+            pooled.append(Distribution(name, unit, finite, len(values) - len(finite), low, high))
+    return pooled
 
 
 def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str] = ()) -> str:
@@ -82,34 +112,34 @@ def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str]
     Raises:
         MissingExtra: If Jinja2 is not installed.
     """
-    statistics = [summary(episode) for episode in episodes]
     per_episode = _MAX_PICTURES // max(1, len(episodes))
     pictures = min(_MAX_PER_EPISODE, max(_MIN_PER_EPISODE, per_episode))
-    steps: Counter[str] = Counter()
-    for one in statistics:
-        steps.update(one.drivers)
-    total = sum(steps.values())
+    steps = Counter(step.driver for one in episodes for step in one.kept)
+    shown: dict[Driver, int] = {driver: steps[driver] for driver in DRIVERS if steps[driver]}
     return render(
         Path(__file__).with_name("recording.html"),
         title=name,
-        cards=_cards(statistics),
+        cards=_cards(episodes),
         broken=broken,
-        shares=shares_text({d: steps[d] for d in DRIVERS if steps[d]}) if total else "",
+        shares=shares_text(shown),
         drivers=[
             {
                 "name": driver,
                 "colour": _colour(driver),
-                "steps": steps[driver],
-                "percent": f"{100.0 * steps[driver] / total:.0f}",
+                "steps": count,
+                "percent": f"{100.0 * count / steps.total():.0f}",
             }
-            for driver in DRIVERS
-            if steps[driver]
+            for driver, count in shown.items()
         ],
         dropped_colour=_DROPPED,
-        histograms=[_histogram(*one) for one in distributions(episodes)],
+        histograms=[_histogram(one) for one in distributions(episodes)],
         episodes=[
-            _episode(episode, one, pictures)
-            for episode, one in zip(episodes, statistics, strict=True)
+            {
+                "episode": episode,
+                "timeline": _timeline(episode) if episode.steps else None,
+                "frames": _frames(episode, pictures),
+            }
+            for episode in episodes
         ],
         open_all=len(episodes) <= _MAX_OPEN_EPISODES,
     )
@@ -119,73 +149,46 @@ def _colour(driver: Driver) -> str:
     return "#{:02x}{:02x}{:02x}".format(*COLOURS[driver])
 
 
-def _cards(statistics: Sequence[EpisodeStatistics]) -> list[tuple[str, str, str]]:
+def _cards(episodes: Sequence[Episode]) -> list[tuple[str, str, str]]:
     """Label, value and note of each headline number."""
-    kept, steps = sum(one.kept for one in statistics), sum(one.steps for one in statistics)
-    rewards = [one.reward for one in statistics if one.reward is not None]
+    kept = [step for one in episodes for step in one.kept]
+    rewards = [one.reward for one in episodes if one.reward is not None]
+    collisions = sum(step.terms.get(_COLLISION, 0.0) < 0.0 for step in kept)
     cards = [
-        ("Episodes", str(len(statistics)), ""),
-        ("Length", duration_text(sum(one.seconds for one in statistics)), "of kept steps"),
-        ("Kept steps", str(kept), f"of {steps}"),
-        ("Collisions", str(sum(one.collisions for one in statistics)), "felt by the robot"),
+        ("Episodes", str(len(episodes)), ""),
+        ("Length", duration_text(sum(one.seconds for one in episodes)), "of kept steps"),
+        ("Kept steps", str(len(kept)), f"of {sum(len(one.steps) for one in episodes)}"),
+        ("Collisions", str(collisions), "felt by the robot"),
     ]
     if rewards:
         cards.append(("Reward", f"{sum(rewards):.1f}", "of kept steps"))
     return cards
 
 
-def _episode(episode: Episode, one: EpisodeStatistics, pictures: int) -> dict[str, Any]:
-    header = episode.header
-    outcome = one.outcome if one.closed else "not closed"
-    facts = [
-        ("began", header.created),
-        ("of", one.what),
-        ("driver", header.driver),
-        ("outcome", outcome),
-        ("seed", "" if header.seed is None else str(header.seed)),
-        ("recorded by", header.source),
-        ("marks", "; ".join(f"step {m.step}: {m.text or 'marked'}" for m in episode.marks)),
-    ]
-    return {
-        "name": one.name,
-        "heading": f"{one.name} · {duration_text(one.seconds)} · {one.outcome or 'just ended'}",
-        "cells": (
-            one.what,
-            f"{one.kept}" if one.kept == one.steps else f"{one.kept} of {one.steps}",
-            duration_text(one.seconds),
-            shares_text({str(d): n for d, n in one.drivers.items()}) if one.drivers else "",
-            one.marks or "",
-            "" if one.reward is None else f"{one.reward:.1f}",
-            outcome,
-        ),
-        "timeline": _timeline(episode) if episode.steps else None,
-        "frames": _frames(episode, pictures),
-        "facts": [(name, value) for name, value in facts if value],
-    }
-
-
-def _histogram(name: str, unit: str, found: Distribution) -> dict[str, Any]:
-    width = (found.high - found.low) / len(found.counts)
+def _histogram(found: Distribution) -> dict[str, Any]:
+    name, values = found.name, found.values
+    unit = "" if found.unit in ("", "1") else f" {found.unit}"
+    least, median, most = values.min(), np.median(values), values.max()
+    begin = found.low if math.isfinite(found.low) else least
+    end = found.high if math.isfinite(found.high) else most
+    if not begin < end:  # All values are equal.
+        begin, end = begin - 0.5, begin + 0.5
+    # Values outside the range are counted in the outer bins.
+    counts, edges = np.histogram(np.clip(values, begin, end), _BINS, (begin, end))
     bars: list[tuple[float, str]] = []
-    for place, count in enumerate(found.counts):
-        low = found.low + place * width
-        share = 100.0 * count / found.total
-        title = f"{low:.3g} to {low + width:.3g}{_unit(unit)}: {count} steps, {share:.1f} %"
-        bars.append((count / max(found.counts), title))
-    extent = f"{found.least:.3g} to {found.most:.3g}{_unit(unit)}"
+    for count, (low, high) in zip(counts, pairwise(edges), strict=True):
+        share = 100.0 * count / len(values)
+        title = f"{low:.3g} to {high:.3g}{unit}: {count} steps, {share:.1f} %"
+        bars.append((float(count / counts.max()), title))
     missing = f" · {found.missing} without a value" if found.missing else ""
     return {
-        "label": f"{name}: {extent}, median {found.median:.3g}",
+        "label": f"{name}: {least:.3g} to {most:.3g}{unit}, median {median:.3g}",
         "bars": bars,
-        "low": f"{found.low:.3g}",
-        "median": f"median {found.median:.3g}{_unit(unit)}",
-        "high": f"{found.high:.3g}",
-        "caption": f"{name}{_unit(unit, ' in ')}{missing}",
+        "low": f"{begin:.3g}",
+        "median": f"median {median:.3g}{unit}",
+        "high": f"{end:.3g}",
+        "caption": f"{name}{' in' if unit else ''}{unit}{missing}",
     }
-
-
-def _unit(unit: str, before: str = " ") -> str:
-    return "" if unit in ("", "1") else f"{before}{unit}"
 
 
 def _timeline(episode: Episode) -> dict[str, Any]:
@@ -251,9 +254,12 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
         seconds = since_start_s[step.index]
         caption = [f"step {step.index}", f"{seconds:.1f} s"]
         if step.index not in kept:
-            drops = [drop for drop in episode.drops if drop.first <= step.index <= drop.last]
-            whys = (drop.why for drop in reversed(drops) if not drop.keep and drop.why)
-            caption.append(next(whys, "dropped"))
+            whys = (
+                drop.why
+                for drop in reversed(episode.drops)
+                if drop.first <= step.index <= drop.last and not isinstance(drop, Keep)
+            )
+            caption.append(next(filter(None, whys), "dropped"))
         frames.append(
             {
                 "step": step.index,

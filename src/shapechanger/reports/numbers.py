@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+_Name = TypeVar("_Name", bound=str)
 
 UNDEFINED: Final = "undefined"
 CONFIDENCE: Final = 0.95
@@ -79,7 +81,7 @@ def duration_text(seconds: float) -> str:
     return f"{minutes}:{rest:02d} min"
 
 
-def shares_text(counts: Mapping[str, int]) -> str:
+def shares_text(counts: Mapping[_Name, int]) -> str:
     """Format each name's share of the total.
 
     >>> shares_text({"policy": 30, "expert": 10}), shares_text({"expert": 4})

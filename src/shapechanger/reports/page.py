@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra
-from shapechanger.reports.numbers import count
+from shapechanger.reports.numbers import count, duration_text, shares_text
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -43,7 +43,13 @@ def _environment(folder: Path) -> Environment:
         lstrip_blocks=True,
     )
     cast("Any", environment).filters.update(
-        count=count, decimal="{:.1f}".format, jpeg=jpeg_uri, png=png_uri, svg=svg_uri
+        count=count,
+        decimal="{:.1f}".format,
+        duration=duration_text,
+        jpeg=jpeg_uri,
+        png=png_uri,
+        shares=shares_text,
+        svg=svg_uri,
     )
     return environment
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import EpisodeWriter, read_episode, repair
-from shapechanger.errors import BrokenEpisode, DemosError
-from tests.demos.episodes.making import header, picture, recorded, step
+from shapechanger.demos.episodes import read_episode, repair
+from shapechanger.errors import BrokenEpisode
+from tests.demos.episodes.making import picture, recorded
 
 
 @settings(max_examples=40)
@@ -56,14 +56,7 @@ def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
     assert {p: p.read_bytes() for p in path.rglob("*") if p.is_file()} == before
 
 
-def test_a_frame_without_a_step_is_moved_to_lost(tmp_path: Path) -> None:
-    path = recorded(tmp_path, close=False)
-    (path / "frames" / "000005.jpg").write_bytes(picture(5)[:20])
-    assert repair(path).pictures == 1
-    assert (path / "lost" / "000005.jpg").read_bytes() == picture(5)[:20]
-
-
-def test_lost_pictures_with_one_name_are_all_kept(tmp_path: Path) -> None:
+def test_images_without_a_step_are_all_kept(tmp_path: Path) -> None:
     path = recorded(tmp_path, close=False)
     for size in (20, 30):
         (path / "frames" / "000005.jpg").write_bytes(picture(5)[:size])
@@ -80,10 +73,3 @@ def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
     assert done.kept == 4
     assert "000002.jpg is missing" in done.lost[0]
     assert [s.index for s in read_episode(path).steps] == [0, 1, 3, 4]
-
-
-def test_a_running_recording_is_refused(tmp_path: Path) -> None:
-    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        writer.add(step())
-        with pytest.raises(DemosError, match="is being recorded at this moment"):
-            repair(writer.path)

@@ -11,8 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, drop, keep, read_episode
-from shapechanger.demos.episodes.outline import read_outline
+from shapechanger.demos.episodes import (
+    EpisodeHeader,
+    EpisodeWriter,
+    Step,
+    drop,
+    keep,
+    read_episode,
+    read_outline,
+)
 from shapechanger.robot.daemon.library import (
     Answer,
     LineIndex,
@@ -124,7 +131,7 @@ def test_a_step_that_is_still_being_written_does_not_count(tmp_path: Path) -> No
     steps = record(tmp_path, 3) / "steps.jsonl"
     lines = [line for line in steps.read_bytes().splitlines() if b'"kind":"step"' in line]
     steps.write_bytes(b"\n".join(lines))  # The last line lacks its end.
-    assert read_outline(steps.parent).steps == 2
+    assert len(read_outline(steps.parent).steps) == 2
 
 
 def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:

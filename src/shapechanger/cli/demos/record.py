@@ -13,8 +13,7 @@ from gymnasium.wrappers import TimeLimit
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
 from shapechanger.cli.env_arguments import Body, EnvId, options_of, require_seed
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.drivers import EXPERT, CorrectedPilot, record_steps
-from shapechanger.demos.pilots import pilot_of
+from shapechanger.demos.drivers import EXPERT, pilot_of, record_steps
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.envs.naming import driven, env_ref
@@ -81,7 +80,7 @@ class RecordDemonstrations:
             ) from None
         finally:
             made.close()
-        if isinstance(pilot, CorrectedPilot):
+        if self.corrected_by:
             say(
                 f"the expert corrected {pilot.corrected / max(pilot.steps, 1):.0%} of the steps, "
                 f"{pilot.corrected} of {pilot.steps}, and took over "

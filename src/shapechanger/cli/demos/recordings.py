@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final
 
+import numpy as np
 import tyro
 from rich.table import Table
 
@@ -30,7 +31,6 @@ from shapechanger.demos.episodes import (
 from shapechanger.demos.exchange import export_recording, formats, import_recording
 from shapechanger.demos.merging import merge
 from shapechanger.demos.report import distributions, recording_html
-from shapechanger.demos.statistics import summary
 from shapechanger.errors import DemosError
 from shapechanger.files import require_file, write_atomic
 from shapechanger.reports.numbers import duration_text, shares_text
@@ -64,20 +64,21 @@ class ListEpisodes:
         paths = episodes_of(self.data)
         for path in paths:
             try:
-                one = summary(read_episode(path))
+                one = read_episode(path)
             except DemosError as error:
                 broken.append(str(error))
                 table.add_row(path.name, "", "", "", "", "", "", "cannot be read, see below")
                 continue
-            steps, kept, seconds = steps + one.steps, kept + one.kept, seconds + one.seconds
+            n, counted_n = len(one.steps), len(one.kept)
+            steps, kept, seconds = steps + n, kept + counted_n, seconds + one.seconds
             table.add_row(
-                one.name,
-                one.what,
-                one.created[:16].replace("T", " "),
-                str(one.steps) if one.kept == one.steps else f"{one.kept} of {one.steps}",
+                path.name,
+                one.origin,
+                one.header.created[:16].replace("T", " "),
+                str(n) if counted_n == n else f"{counted_n} of {n}",
                 duration_text(one.seconds),
-                shares_text({str(driver): count for driver, count in one.drivers.items()}),
-                str(one.marks or ""),
+                shares_text(one.drivers),
+                str(len(one.marks) or ""),
                 one.outcome if one.closed else "not closed",
             )
         console = plain_console()
@@ -114,9 +115,10 @@ class ShowEpisodes:
             require_file(self.out)
         for line in _overview(episodes):
             say(line)
-        for name, unit, found in distributions(episodes):
-            of = "" if unit == "1" else f" {unit}"
-            say(f"{name}: {found.least:.3g} to {found.most:.3g}{of}, median {found.median:.3g}")
+        for found in distributions(episodes):
+            of = "" if found.unit == "1" else f" {found.unit}"
+            extent = f"{found.values.min():.3g} to {found.values.max():.3g}{of}"
+            say(f"{found.name}: {extent}, median {np.median(found.values):.3g}")
         for sentence in broken:
             say(sentence)
         if self.out is None:

@@ -11,15 +11,14 @@ DATA/20261121T103005Z-0001/
 ```
 
 The lines of `steps.jsonl` are steps (`"kind": "step"`), marks (`"mark"`), and ranges of steps that
-are excluded or included again (`"drop"`, `"keep"`); recorded lines are never rewritten. This
-package needs the standard library only, because it also runs on robots.
+are excluded or included again (`"drop"`, `"keep"`); recorded lines are never rewritten. Robots
+write episodes, too, so this package needs few others.
 """
 
 from __future__ import annotations
 
 from shapechanger.demos.episodes.reader import (
     Episode,
-    EpisodeMark,
     Repair,
     drop,
     episode_at,
@@ -27,6 +26,7 @@ from shapechanger.demos.episodes.reader import (
     keep,
     mark,
     read_episode,
+    read_outline,
     repair,
 )
 from shapechanger.demos.episodes.records import DRIVERS, Driver, EpisodeHeader, Step
@@ -37,7 +37,6 @@ __all__ = [
     "Driver",
     "Episode",
     "EpisodeHeader",
-    "EpisodeMark",
     "EpisodeWriter",
     "Repair",
     "Step",
@@ -47,5 +46,6 @@ __all__ = [
     "keep",
     "mark",
     "read_episode",
+    "read_outline",
     "repair",
 ]

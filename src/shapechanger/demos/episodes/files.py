@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import errno
 import fcntl
-import json
 import os
 import re
 import stat
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from shapechanger.errors import DemosError, OutputError
-from shapechanger.files import cannot_write, write_atomic
+from shapechanger.files import writing
 
 HEADER: Final = "episode.json"
 STEPS: Final = "steps.jsonl"
@@ -88,18 +87,15 @@ def lock(path: Path, busy: str) -> int:
         DemosError: If another process holds the lock.
         OutputError: If the file cannot be opened for writing.
     """
-    try:
+    with writing(path):
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(fd)
-        raise DemosError(busy) from None
-    except OSError as error:
-        os.close(fd)
-        raise cannot_write(path, error) from error
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(fd)
+            if isinstance(error, BlockingIOError):
+                raise DemosError(busy) from None
+            raise
     return fd
 
 
@@ -121,9 +117,3 @@ def write_all(fd: int, data: bytes) -> None:
     except OSError:
         os.ftruncate(fd, before)
         raise
-
-
-def write_header(folder: Path, content: dict[str, Any]) -> None:
-    """Write the header of an episode atomically."""
-    text = json.dumps(content, indent=1, ensure_ascii=False)
-    write_atomic(folder / HEADER, f"{text}\n".encode())

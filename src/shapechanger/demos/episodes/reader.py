@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import json
 import math
 import os
-import re
 import stat
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, cast
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -26,119 +29,25 @@ from shapechanger.demos.episodes.files import (
     lock,
     read_file,
     write_all,
-    write_header,
 )
 from shapechanger.demos.episodes.records import (
+    DRIVERS,
+    Driver,
+    Drop,
+    Edit,
     EpisodeHeader,
+    EpisodeMark,
+    Keep,
     Step,
     StepPicture,
-    decode_line,
     durations_s,
     encode_line,
+    parse_line,
     split_lines,
 )
-from shapechanger.errors import BrokenEpisode, DemosError, OutputError, UnknownName
-from shapechanger.files import cannot_write, write_atomic
-
-# Such a name cannot lead out of the folder.
-_FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")
-
-
-class StepLine(NamedTuple):
-    """One line of `steps.jsonl`.
-
-    Attributes:
-        raw: Its bytes.
-        fields: The decoded object; empty if the line is damaged.
-        step: The step; None for a line of another kind.
-        wrong: Why the line is ignored, as part of a sentence; "" if it is valid.
-    """
-
-    raw: bytes
-    fields: dict[str, Any]
-    step: Step | None
-    wrong: str
-
-
-def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
-    """Check every line of an episode, and the image that it names."""
-    try:
-        content = read_file(path / STEPS, MAX_TEXT_BYTES)
-    except OSError as error:
-        raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
-    sizes = header.action_size, header.state_size
-    lines: list[StepLine] = []
-    seen: dict[StepPicture, str] = {}
-    newest = -1
-    for raw in split_lines(content):
-        try:
-            fields = decode_line(raw)
-            step = Step.from_json(fields) if fields.get("kind") == "step" else None
-        except ValueError as error:
-            lines.append(StepLine(raw, {}, None, str(error)))
-            continue
-        wrong = ""
-        if step is not None:
-            wrong = step.refusal(*sizes)
-            if not wrong and step.index <= newest:
-                wrong = f"it comes after step {newest}"
-            if not wrong and step.picture is not None:
-                if step.picture not in seen:
-                    seen[step.picture] = _wrong_with(path / FRAMES, step.picture, thorough=thorough)
-                wrong = seen[step.picture]
-            newest = max(newest, step.index)
-        lines.append(StepLine(raw, fields, step, wrong))
-    return lines
-
-
-def _wrong_with(frames: Path, picture: StepPicture, *, thorough: bool) -> str:
-    """Return what is wrong with the image of a step, as part of a sentence; "" for nothing."""
-    name, size = picture.name, picture.size
-    if not _FRAME_NAME.fullmatch(name):
-        return f"its image has the invalid name {name!r}"
-    try:
-        found = (frames / name).stat()
-        if not stat.S_ISREG(found.st_mode):
-            return f"its image {name} is not a regular file"
-        if found.st_size > MAX_PICTURE_BYTES:
-            return f"its image {name} has more than {MAX_PICTURE_BYTES} bytes"
-        if found.st_size != size:
-            return f"its image {name} has {found.st_size} bytes instead of {size}"
-        if thorough and not picture.fits(read_file(frames / name, MAX_PICTURE_BYTES)):
-            return f"its image {name} was changed"
-    except FileNotFoundError:
-        return f"its image {name} is missing"
-    except OSError as error:
-        return f"its image {name} cannot be read ({error.strerror})"
-    return ""
-
-
-class EpisodeMark(msgspec.Struct, frozen=True):
-    """A bookmark set by the operator, at the step with an index."""
-
-    step: int
-    text: str = ""
-
-
-class Drop(msgspec.Struct, frozen=True):
-    """A range of steps to exclude, or to include again.
-
-    Attributes:
-        first: Index of the first step.
-        last: Index of the last step, inclusive.
-        why: Such as "undo", "cut" or "bad".
-        kind: Whether the steps are excluded, or included again.
-    """
-
-    first: int
-    last: int
-    why: str = ""
-    kind: Literal["drop", "keep"] = "drop"
-
-    @property
-    def keep(self) -> bool:
-        """Whether the steps are included again."""
-        return self.kind == "keep"
+from shapechanger.demos.episodes.writer import write_header
+from shapechanger.errors import BrokenEpisode, DemosError, UnknownName, translate_errors
+from shapechanger.files import write_atomic, writing
 
 
 @dataclass(frozen=True)
@@ -150,7 +59,8 @@ class Episode:
         header: Its metadata.
         steps: All steps, including excluded ones.
         marks: In the order in which they were set.
-        drops: In the order in which they were written; later ones override earlier ones.
+        drops: Ranges of excluded and of included steps, in the order in which they were written;
+            later ones override earlier ones.
         closed: Whether the episode was closed properly.
         outcome: How it ended; "" if unspecified.
     """
@@ -170,7 +80,7 @@ class Episode:
         for drop in self.drops:
             # A line may name a range far beyond the steps that exist.
             reach = (s.index for s in self.steps if drop.first <= s.index <= drop.last)
-            (gone.difference_update if drop.keep else gone.update)(reach)
+            (gone.difference_update if isinstance(drop, Keep) else gone.update)(reach)
         return tuple(step for step in self.steps if step.index not in gone)
 
     @cached_property
@@ -186,6 +96,24 @@ class Episode:
         lasted = zip(self.steps, self.durations_s, strict=True)
         return math.fsum(seconds for step, seconds in lasted if step.index in kept)
 
+    @property
+    def origin(self) -> str:
+        """Name of its env or robot, as short as possible."""
+        header = self.header
+        return header.env.split("/")[-1] or header.robot or header.body or header.source
+
+    @cached_property
+    def drivers(self) -> dict[Driver, int]:
+        """Number of kept steps of each driver, most frequent first."""
+        counts = Counter(step.driver for step in self.kept)
+        return {d: counts[d] for d in sorted(DRIVERS, key=lambda d: -counts[d]) if counts[d]}
+
+    @property
+    def reward(self) -> float | None:
+        """Sum of the rewards of the kept steps; None if none has a reward."""
+        rewards = [step.reward for step in self.kept if step.reward is not None]
+        return sum(rewards) if rewards else None
+
     def jpeg(self, step: Step) -> bytes | None:
         """Return the image of a step as it was received; None for none.
 
@@ -194,10 +122,10 @@ class Episode:
         """
         if step.picture is None:
             return None
-        try:
+        with translate_errors(
+            OSError, to=lambda _: _broken(self.path, f"the image {step.frame} cannot be read")
+        ):
             data = read_file(self.path / FRAMES / step.frame, MAX_PICTURE_BYTES)
-        except OSError as error:
-            raise _broken(self.path, f"the image {step.frame} cannot be read") from error
         if not step.picture.fits(data):
             raise _broken(self.path, f"the image {step.frame} was changed")
         return data
@@ -210,38 +138,144 @@ def read_episode(path: Path) -> Episode:
         DemosError: If the folder is not an episode, or has another version of the format.
         BrokenEpisode: If a line or an image is damaged or missing.
     """
-    header, closed = read_header(path)
+    header, outcome = read_header(path)
     lines = _scan(path, header, thorough=False)
     for number, line in enumerate(lines, 1):
         if line.wrong:
             raise _broken(path, f"line {number} is invalid, because {line.wrong}")
-    return _assemble(path, header, closed, lines)
+    return _episode(path, header, outcome, (line.content for line in lines))
 
 
-def read_header(path: Path) -> tuple[EpisodeHeader, dict[str, Any] | None]:
-    """Read the header of an episode, and how it was closed; None if it was not.
+class _StepTimes(msgspec.Struct, tag_field="kind", tag="step"):
+    """The part of a step that a list of episodes needs; an hour has 72 000 steps."""
+
+    step: int
+    captured_ns: int | None = None
+    decided_ns: int | None = None
+
+
+_OUTLINES: Final = msgspec.json.Decoder(_StepTimes | Edit)
+
+
+def read_outline(path: Path) -> Episode:
+    """Read the times and edits of an episode quickly, without checks of lines and images.
+
+    Its steps lack all else, and lines that are incomplete or no valid JSON are left out.
+
+    Raises:
+        DemosError: If the header is missing or cannot be read.
+        OSError: If the steps cannot be read.
+    """
+    header, outcome = read_header(path)
+    steps: dict[int, Step] = {}
+    edits: list[Edit] = []
+    with (path / STEPS).open("rb") as lines:
+        for raw in lines:
+            with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
+                line = _OUTLINES.decode(raw)
+                if not isinstance(line, _StepTimes):
+                    edits.append(line)
+                elif raw.endswith(b"\n"):
+                    steps[line.step] = Step(
+                        index=line.step,
+                        driver="program",
+                        action=(),
+                        captured_ns=line.captured_ns,
+                        decided_ns=line.decided_ns,
+                    )
+    return _episode(path, header, outcome, [*steps.values(), *edits])
+
+
+def _episode(
+    path: Path, header: EpisodeHeader, outcome: str | None, lines: Iterable[Step | Edit | None]
+) -> Episode:
+    found = [*lines]
+    return Episode(
+        path=path,
+        header=header,
+        steps=tuple(line for line in found if isinstance(line, Step)),
+        marks=tuple(line for line in found if isinstance(line, EpisodeMark)),
+        drops=tuple(line for line in found if isinstance(line, Drop)),
+        closed=outcome is not None,
+        outcome=outcome or "",
+    )
+
+
+def read_header(path: Path) -> tuple[EpisodeHeader, str | None]:
+    """Read the header of an episode, and its outcome; None if the episode was not closed.
 
     Raises:
         DemosError: If the header is missing or cannot be read.
     """
-    file = path / HEADER
     try:
-        plain = json.loads(read_file(file, MAX_TEXT_BYTES).decode())
+        fields = json.loads(read_file(path / HEADER, MAX_TEXT_BYTES).decode())
+        if not isinstance(fields, dict):
+            raise DemosError("it is not a JSON object.")
+        header = EpisodeHeader.from_json(fields)
     except FileNotFoundError:
         raise DemosError(f"{path} is not an episode: it has no {HEADER}.") from None
-    except OSError as error:
-        raise DemosError(f"{file} cannot be read: {error.strerror or error}.") from error
-    except (ValueError, RecursionError) as error:
-        raise DemosError(f"{file} cannot be read: {error}.") from error
-    if not isinstance(plain, dict):
-        raise DemosError(f"{file} is not a JSON object.")
-    fields = cast("dict[str, Any]", plain)
-    closed = fields.get("closed")
+    except (OSError, ValueError, RecursionError) as error:
+        reason = str(getattr(error, "strerror", None) or error).rstrip(".")
+        raise DemosError(f"{path / HEADER} cannot be read: {reason}.") from error
+    match fields.get("closed"):
+        case dict() as closed:
+            return header, str(closed.get("outcome", ""))
+        case _:
+            return header, None
+
+
+class _ScannedLine(NamedTuple):
+    """A line of `steps.jsonl`, what it holds, and why it is invalid; "" if it is valid."""
+
+    raw: bytes
+    content: Step | Edit | None
+    wrong: str
+
+
+def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[_ScannedLine]:
+    """Check every line of an episode, and the image that it names."""
     try:
-        header = EpisodeHeader.from_json(fields)
-    except DemosError as error:
-        raise DemosError(f"{file}: {error}") from error
-    return header, cast("dict[str, Any]", closed) if isinstance(closed, dict) else None
+        content = read_file(path / STEPS, MAX_TEXT_BYTES)
+    except OSError as error:
+        raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
+    sizes = header.action_size, header.state_size
+    lines: list[_ScannedLine] = []
+    wrong_with = functools.cache(functools.partial(_wrong_with, path / FRAMES, thorough=thorough))
+    newest = -1
+    for raw in split_lines(content):
+        line, wrong = None, ""
+        try:
+            line = parse_line(raw)
+        except ValueError as error:
+            wrong = str(error)
+        if isinstance(line, Step):
+            wrong = line.refusal(*sizes)
+            if not wrong and line.index <= newest:
+                wrong = f"it comes after step {newest}"
+            wrong = wrong or wrong_with(line.picture)
+            newest = max(newest, line.index)
+        lines.append(_ScannedLine(raw, line, wrong))
+    return lines
+
+
+def _wrong_with(frames: Path, picture: StepPicture | None, *, thorough: bool) -> str:
+    """Return what is wrong with the image of a step, as part of a sentence; "" for nothing."""
+    if picture is None:
+        return ""
+    name = picture.name
+    try:
+        found = (frames / name).stat()
+        if not stat.S_ISREG(found.st_mode):
+            return f"its image {name} is not a regular file"
+        if found.st_size != picture.size:
+            return f"its image {name} has {found.st_size} bytes instead of {picture.size}"
+        if thorough and not picture.fits(read_file(frames / name, MAX_PICTURE_BYTES)):
+            return f"its image {name} was changed"
+    except FileNotFoundError:
+        return f"its image {name} is missing"
+    except OSError as error:
+        return f"its image {name} cannot be read ({error.strerror})"
+    return ""
 
 
 def episodes_of(data: Path) -> tuple[Path, ...]:
@@ -277,33 +311,6 @@ def episode_at(path: Path) -> Episode:
     if not episode.steps:
         raise DemosError(f"{episode.path} has no steps.")
     return episode
-
-
-def _assemble(
-    path: Path, header: EpisodeHeader, closed: dict[str, Any] | None, lines: list[StepLine]
-) -> Episode:
-    marks: list[EpisodeMark] = []
-    drops: list[Drop] = []
-    for line in lines:
-        try:
-            match line.fields.get("kind"):
-                case "mark":
-                    marks.append(msgspec.convert(line.fields, EpisodeMark))
-                case "drop" | "keep":
-                    drops.append(msgspec.convert(line.fields, Drop))
-                case _:  # A step, or a kind that a later version added.
-                    pass
-        except msgspec.ValidationError as error:
-            raise _broken(path, f"it has the invalid line {line.fields}") from error
-    return Episode(
-        path=path,
-        header=header,
-        steps=tuple(line.step for line in lines if line.step is not None),
-        marks=tuple(marks),
-        drops=tuple(drops),
-        closed=closed is not None,
-        outcome="" if closed is None else str(closed.get("outcome", "")),
-    )
 
 
 def _broken(path: Path, why: str) -> BrokenEpisode:
@@ -349,15 +356,16 @@ def repair(path: Path) -> Repair:
         DemosError: If the folder is not an episode, or is being recorded now.
         OutputError: If it cannot be written to; the episode is unchanged then.
     """
-    header, closed = read_header(path)
+    header, outcome = read_header(path)
     fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
     try:
         lines = _scan(path, header, thorough=True)
         good = [line for line in lines if not line.wrong]
         bad = [line for line in lines if line.wrong]
-        used = {line.step.frame for line in good if line.step is not None}
+        kept = [line.content for line in good if isinstance(line.content, Step)]
+        used = {step.frame for step in kept}
         strays = sorted(p for p in (path / FRAMES).glob("*") if p.name not in used)
-        try:
+        with writing(path):
             if bad or strays:
                 (path / LOST).mkdir(exist_ok=True)
             if bad:
@@ -366,17 +374,11 @@ def repair(path: Path) -> Repair:
                 write_atomic(path / STEPS, b"".join(line.raw for line in good))
             for stray in strays:
                 stray.rename(free_path(path / LOST, stray.stem, stray.suffix))
-        except OutputError:  # Already worded, and a subclass of OSError.
-            raise
-        except OSError as error:
-            raise cannot_write(path, error) from error
-        kept = sum(line.step is not None for line in good)
-        if closed is None:
-            ending = {"steps": kept, "outcome": _CUT_OFF}
-            write_header(path, header.to_json() | {"closed": ending})
+        if outcome is None:
+            write_header(path, header, {"steps": len(kept), "outcome": _CUT_OFF})
     finally:
         os.close(fd)
-    return Repair(kept, tuple(line.wrong for line in bad), len(strays), closed is not None)
+    return Repair(len(kept), tuple(line.wrong for line in bad), len(strays), outcome is not None)
 
 
 def drop(path: Path, first: int, last: int, why: str) -> None:
@@ -393,38 +395,20 @@ def drop(path: Path, first: int, last: int, why: str) -> None:
         BrokenEpisode: If the episode is damaged.
         OutputError: If it cannot be written to.
     """
-    _append(path, {"kind": "drop", "first": first, "last": last, "why": why}, first, last)
+    _append(path, Drop(first, last, why), first, last)
 
 
 def keep(path: Path, first: int, last: int, why: str = "") -> None:
-    """Include steps of an episode again; errors as in `drop`.
-
-    Args:
-        path: Folder of the episode.
-        first: Index of the first step.
-        last: Index of the last step, inclusive.
-        why: Free text.
-    """
-    _append(path, {"kind": "keep", "first": first, "last": last, "why": why}, first, last)
+    """Include steps of an episode again; arguments and errors as in `drop`."""
+    _append(path, Keep(first, last, why), first, last)
 
 
 def mark(path: Path, step: int, text: str = "") -> None:
-    """Mark a step of an episode.
-
-    Args:
-        path: Folder of the episode.
-        step: Index of the step.
-        text: Free text.
-
-    Raises:
-        DemosError: If there is no such step, or the episode is being recorded.
-        BrokenEpisode: If the episode is damaged.
-        OutputError: If it cannot be written to.
-    """
-    _append(path, {"kind": "mark", "step": step, "text": text}, step, step)
+    """Mark a step of an episode, with free text; errors as in `drop`."""
+    _append(path, EpisodeMark(step, text), step, step)
 
 
-def _append(path: Path, fields: dict[str, Any], first: int, last: int) -> None:
+def _append(path: Path, line: Edit, first: int, last: int) -> None:
     episode = read_episode(path)
     fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
     try:
@@ -433,8 +417,7 @@ def _append(path: Path, fields: dict[str, Any], first: int, last: int) -> None:
         least, most = episode.steps[0].index, episode.steps[-1].index
         if not least <= first <= last <= most:
             raise DemosError(f"{path} has the steps {least} to {most}, and not {first} to {last}.")
-        write_all(fd, encode_line(fields))
-    except OSError as error:
-        raise cannot_write(path / STEPS, error) from error
+        with writing(path / STEPS):
+            write_all(fd, encode_line(line))
     finally:
         os.close(fd)

@@ -5,14 +5,17 @@ from __future__ import annotations
 import binascii
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
-from typing import Any, Final, Literal, cast
+from typing import Annotated, Any, Final, Literal, cast
 
 import msgspec
+from msgspec import Meta
 
-from shapechanger.errors import DemosError
+from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
+from shapechanger.errors import DemosError, translate_errors
+from shapechanger.layout import Layout
 
 _FORMAT: Final = 1
 """Version of the format. Readers refuse any other version."""
@@ -20,10 +23,7 @@ _FORMAT: Final = 1
 Clock = Literal["real", "twin", "none"]
 """Source of the nanoseconds in steps: a robot's clock, the stepped clock of a twin, or none."""
 
-_CLOCKS: Final = ("real", "twin", "none")
-_IMAGE_SIZE: Final = 2
-_SLOWEST_HZ: Final = 1e-3
-_FASTEST_HZ: Final = 1e6
+_Pixels = Annotated[int, Meta(ge=1)]
 # A stack of four grey images of 84 x 84, as state, is 28 224 values.
 _MAX_VALUES: Final = 1 << 17
 _MAX_INTEGER: Final = 1 << 62  # Sums of two fit into the 64 bits of NumPy and of other formats.
@@ -55,13 +55,14 @@ class EpisodeHeader:
         format: Version of the format.
 
     Raises:
-        DemosError: If a field is invalid.
+        DemosError: If a layout has no action, or too many values.
+        LayoutError: If a layout is invalid.
     """
 
     action_layout: str
     state_layout: str = ""
-    image_size: tuple[int, int] | None = None
-    control_hz: float = 20.0
+    image_size: tuple[_Pixels, _Pixels] | None = None
+    control_hz: Annotated[float, Meta(ge=1e-3, le=1e6)] = 20.0
     robot: str = ""
     body: str = ""
     camera_pitch_deg: float | None = None
@@ -78,19 +79,6 @@ class EpisodeHeader:
     format: int = _FORMAT
 
     def __post_init__(self) -> None:
-        if not _SLOWEST_HZ <= self.control_hz <= _FASTEST_HZ:
-            raise DemosError(
-                f"control_hz must be from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g}, got "
-                f"{self.control_hz}."
-            )
-        if self.clock not in _CLOCKS:
-            raise DemosError(f"clock must be one of {', '.join(_CLOCKS)}, got {self.clock!r}.")
-        if self.image_size is not None and (
-            len(self.image_size) != _IMAGE_SIZE or min(self.image_size) < 1
-        ):
-            raise DemosError(
-                f"image_size must be a width and a height in pixels, got {self.image_size}."
-            )
         # A few bytes can describe more values than any memory holds.
         if not (1 <= self.action_size <= _MAX_VALUES and 0 <= self.state_size <= _MAX_VALUES):
             raise DemosError(
@@ -101,19 +89,18 @@ class EpisodeHeader:
     @property
     def action_size(self) -> int:
         """Number of values in an action."""
-        return _layout_size(self.action_layout)
+        return Layout.from_json(self.action_layout).size
 
     @property
     def state_size(self) -> int:
         """Number of values in a state; 0 without states."""
-        return _layout_size(self.state_layout) if self.state_layout else 0
+        return Layout.from_json(self.state_layout).size if self.state_layout else 0
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON can hold it, with the layouts expanded for readability."""
         plain = asdict(self)
         for name in ("action_layout", "state_layout"):
             plain[name] = json.loads(plain[name]) if plain[name] else None
-        plain["image_size"] = None if self.image_size is None else list(self.image_size)
         return plain
 
     @classmethod
@@ -125,28 +112,21 @@ class EpisodeHeader:
         """
         if plain.get("format") != _FORMAT:
             raise DemosError(
-                f"the episode has format {plain.get('format')}, but this version of Shapechanger "
+                f"The episode has format {plain.get('format')}, but this version of Shapechanger "
                 f"reads format {_FORMAT} only."
             )
-        layouts = {
-            # As `Layout.to_json` writes it.
-            name: json.dumps(layout, separators=(",", ":"), ensure_ascii=False) if layout else ""
-            for name in ("action_layout", "state_layout")
-            if (layout := plain.get(name)) is not None or name in plain
-        }
-        try:
-            return msgspec.convert(plain | layouts, cls)
-        except msgspec.ValidationError as error:
-            raise DemosError(f"the header is invalid ({error}).") from error
-
-
-def _layout_size(layout: str) -> int:
-    """Return the number of values of a layout, without importing NumPy."""
-    try:
-        features = cast("list[dict[str, Any]]", json.loads(layout)["features"])
-        return sum(math.prod(feature.get("shape", ())) for feature in features)
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise DemosError(f"Invalid layout: {layout[:80]!r}.") from error
+        known = dict(plain)
+        for name in ("action_layout", "state_layout"):
+            if name in plain:  # As `Layout.to_json` writes it; null is "".
+                layout = plain[name] or ""
+                known[name] = layout and json.dumps(
+                    layout, separators=(",", ":"), ensure_ascii=False
+                )
+        with translate_errors(
+            msgspec.ValidationError,
+            to=lambda error: DemosError(f"The header is invalid ({error})."),
+        ):
+            return msgspec.convert(known, cls)
 
 
 Driver = Literal["person", "policy", "expert", "program"]
@@ -160,8 +140,8 @@ _NS: Final = ("captured_ns", "decided_ns", "wall_ns")
 class StepPicture(msgspec.Struct, frozen=True, array_like=True):
     """The image of a step: file name, size in bytes, and CRC-32 as eight hexadecimal digits."""
 
-    name: str
-    size: int
+    name: Annotated[str, Meta(pattern=r"^[0-9]{6,}\.jpg\Z")]  # It never leads to another folder.
+    size: Annotated[int, Meta(le=MAX_PICTURE_BYTES)]
     crc: str
 
     @classmethod
@@ -252,7 +232,7 @@ class Step(
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON can hold it; empty fields are left out."""
         plain = msgspec.to_builtins(self, enc_hook=float).items()  # Of NumPy, too.
-        return {name: value if name == "frame" else _as_json(value) for name, value in plain}
+        return {n: value if n == "frame" else _mapped(_as_json, value) for n, value in plain}
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> Step:
@@ -261,40 +241,63 @@ class Step(
         Raises:
             ValueError: If a field is missing or invalid.
         """
-        known = {name: _from_json(value) for name, value in plain.items()}
+        known = {name: _mapped(_from_json, value) for name, value in plain.items()}
         try:
             return msgspec.convert(known, cls, strict=False)
         except msgspec.ValidationError as error:
             raise ValueError(f"it is not a valid step ({error})") from error
 
 
-def _as_json(value: Any) -> Any:
-    """Return numbers as JSON can hold them: null for NaN, strings for infinities."""
+def _mapped(change: Callable[[Any], Any], value: Any) -> Any:
+    """Change a value, or each one of a list or a dictionary."""
     match value:
-        case float():
-            return value if math.isfinite(value) else None if math.isnan(value) else str(value)
         case dict():
-            items = cast("dict[str, float]", value).items()
-            return {name: _as_json(number) for name, number in items}
+            items = cast("dict[str, Any]", value).items()
+            return {name: change(one) for name, one in items}
         case list() | tuple():
-            numbers = cast("Sequence[float]", value)
-            return [n if math.isfinite(n) else _as_json(n) for n in numbers]
+            return [change(one) for one in cast("Sequence[Any]", value)]
         case _:
-            return value
+            return change(value)
+
+
+def _as_json(value: Any) -> Any:
+    """Return a number as JSON can hold it: null for NaN, a string for an infinity."""
+    if not isinstance(value, float) or math.isfinite(value):
+        return value
+    return None if math.isnan(value) else str(value)
 
 
 def _from_json(value: Any) -> Any:
-    """Return NaN for null, also in lists and dictionaries."""
-    match value:
-        case None:
-            return math.nan
-        case dict():
-            items = cast("dict[str, Any]", value).items()
-            return {name: math.nan if number is None else number for name, number in items}
-        case list():
-            return [math.nan if n is None else n for n in cast("list[Any]", value)]
-        case _:
-            return value
+    return math.nan if value is None else value
+
+
+class EpisodeMark(msgspec.Struct, frozen=True, tag_field="kind", tag="mark"):
+    """A bookmark set by the operator, at the step with an index."""
+
+    step: int
+    text: str = ""
+
+
+class Drop(msgspec.Struct, frozen=True, tag_field="kind", tag="drop"):
+    """A range of steps to exclude.
+
+    Attributes:
+        first: Index of the first step.
+        last: Index of the last step, inclusive.
+        why: Such as "undo", "cut" or "bad".
+    """
+
+    first: int
+    last: int
+    why: str = ""
+
+
+class Keep(Drop, frozen=True, tag="keep"):
+    """A range of steps to include again."""
+
+
+Edit = EpisodeMark | Drop | Keep
+"""Lines of `steps.jsonl` other than steps."""
 
 
 _PAUSE_PERIODS: Final = 30.0
@@ -331,8 +334,9 @@ _CHECK: Final = b',"crc":"%08x"}\n'
 _CHECK_SIZE: Final = len(_CHECK % 0)
 
 
-def encode_line(fields: dict[str, Any]) -> bytes:
+def encode_line(line: Step | Edit | dict[str, Any]) -> bytes:
     """Encode one line of `steps.jsonl`, with the CRC-32 of what precedes it as its last key."""
+    fields = line.to_json() if isinstance(line, Step) else msgspec.to_builtins(line)
     text = json.dumps(fields, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     # A lone surrogate has no UTF-8 encoding.
     body = text.encode(errors="replace")[:-1]
@@ -360,6 +364,24 @@ def decode_line(line: bytes) -> dict[str, Any]:
     if not isinstance(fields, dict):
         raise ValueError("it is not a JSON object")
     return cast("dict[str, Any]", fields)
+
+
+def parse_line(line: bytes) -> Step | Edit | None:
+    r"""Parse one line of `steps.jsonl`, with its `\n`; None for a kind of a later version.
+
+    Raises:
+        ValueError: If the line is damaged or invalid; the message is part of a sentence.
+    """
+    match decode_line(line):
+        case {"kind": "step"} as fields:
+            return Step.from_json(fields)
+        case {"kind": "mark" | "drop" | "keep"} as fields:
+            try:
+                return msgspec.convert(fields, Edit)
+            except msgspec.ValidationError as error:
+                raise ValueError(f"it is not a valid mark or edit ({error})") from error
+        case _:
+            return None
 
 
 def split_lines(content: bytes) -> list[bytes]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import threading
@@ -12,28 +13,37 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from itertools import takewhile
 from pathlib import Path
-from typing import Final, Self
+from queue import SimpleQueue
+from typing import Any, Final, Self
 
 import msgspec
 
 from shapechanger.demos.episodes.files import (
     FRAMES,
     FULL_BYTES,
+    HEADER,
     MAX_PICTURE_BYTES,
     STEPS,
     free_path,
     lock,
     write_all,
-    write_header,
 )
-from shapechanger.demos.episodes.records import EpisodeHeader, Step, StepPicture, encode_line
+from shapechanger.demos.episodes.records import (
+    Drop,
+    Edit,
+    EpisodeHeader,
+    EpisodeMark,
+    Step,
+    StepPicture,
+    encode_line,
+)
 from shapechanger.errors import DemosError, OutputError
-from shapechanger.files import cannot_write
+from shapechanger.files import write_atomic, writing
 
 _SYNC_PERIOD_S: Final = 1.0
 
 
-class Syncer:
+class Syncer(threading.Thread):
     """Flush files to disk once a second, so that a power cut costs at most a second.
 
     A crash of the program alone costs nothing, because the kernel has the bytes by then. The work
@@ -44,40 +54,33 @@ class Syncer:
     """
 
     def __init__(self, fd: int) -> None:
+        super().__init__(name="episode sync", daemon=True)
         self._fd = fd
-        self._waiting: list[Path] = []
-        self._lock = threading.Lock()
+        self._waiting: SimpleQueue[Path] = SimpleQueue()
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="episode sync", daemon=True)
-        self._thread.start()
+        self.start()
 
     def add(self, path: Path) -> None:
         """Schedule a finished file for the next flush."""
-        with self._lock:
-            self._waiting.append(path)
+        self._waiting.put(path)
 
     def sync(self) -> None:
         """Flush now; a file that is missing or fails does not keep the others from it."""
-        with self._lock:
-            waiting, self._waiting = self._waiting, []
-        for path in waiting:
-            # The next write reports a failing disk; an error here would have no recipient.
-            with contextlib.suppress(OSError):
-                fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-                try:
-                    os.fsync(fd)
-                finally:
-                    os.close(fd)
+        # The next write reports a failing disk; an error here would have no recipient.
+        while not self._waiting.empty():
+            with contextlib.suppress(OSError), self._waiting.get().open("rb") as file:
+                os.fsync(file.fileno())
         with contextlib.suppress(OSError):
             os.fsync(self._fd)
 
     def close(self) -> None:
         """Stop the thread, and flush one last time."""
         self._ended.set()
-        self._thread.join()
+        self.join()
         self.sync()
 
-    def _run(self) -> None:
+    def run(self) -> None:
+        """Flush until `close`."""
         while not self._ended.wait(_SYNC_PERIOD_S):
             self.sync()
 
@@ -85,7 +88,7 @@ class Syncer:
 SPARE_BYTES: Final = 64 << 20
 """Disk space to leave free by default."""
 
-CONTINUED: Final = "continued"
+_CONTINUED: Final = "continued"
 """Outcome of an episode that was full, and goes on in the next one."""
 
 _LOCK: Final = ".recording"
@@ -147,7 +150,7 @@ class EpisodeWriter:
                 None for now.
 
         Raises:
-            DemosError: If another process is recording there.
+            DemosError: If the header is invalid, or another process is recording there.
             OutputError: If the folder cannot be written to, or the disk is full.
         """
         began = now()
@@ -156,10 +159,9 @@ class EpisodeWriter:
             created=began.isoformat(timespec="milliseconds") if created is None else created,
             version=version("shapechanger"),
         )
-        try:
+        EpisodeHeader.from_json(header.to_json())  # Readers refuse an invalid one.
+        with writing(recording):
             recording.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(recording, error) from error
         _require_space(recording, spare_bytes)
         held = lock(
             recording / _LOCK, f"{recording} is in use by another recorder: choose another folder."
@@ -191,7 +193,7 @@ class EpisodeWriter:
         Raises:
             OutputError: If the next one cannot be created; this one is closed then.
         """
-        self.close(CONTINUED)
+        self.close(_CONTINUED)
         # The next episode does not begin with a reset of the env.
         header = replace(
             self._header, seed=None, notes=self._header.notes | {"continues": self.path.name}
@@ -230,7 +232,7 @@ class EpisodeWriter:
         if self.steps % _SPACE_CHECK_STEPS == 0:
             _require_space(self.path, self._spare_bytes)
         step = msgspec.structs.replace(step, index=self.steps, picture=self._frame(jpeg))
-        self._append(step.to_json())
+        self._append(step)
         self._before = step
         self._times.append((step.index, self._time_ns(step)))
         self.steps += 1
@@ -246,7 +248,7 @@ class EpisodeWriter:
         self._require_open()
         if not self.steps:
             raise DemosError("There is no step yet that could be marked.")
-        self._append({"kind": "mark", "step": self.steps - 1, "text": text})
+        self._append(EpisodeMark(self.steps - 1, text))
         self.marks += 1
 
     def undo(self, seconds: float = 5.0) -> int:
@@ -261,21 +263,18 @@ class EpisodeWriter:
             Number of excluded steps.
 
         Raises:
-            DemosError: If `seconds` is not positive, or not finite.
+            DemosError: If `seconds` is not positive and finite.
             OutputError: If it cannot be written.
         """
         self._require_open()
-        if not seconds > 0.0:
-            raise DemosError(f"seconds to undo must be positive, got {seconds}.")
-        if not math.isfinite(seconds):
-            raise DemosError(f"seconds to undo must be finite, got {seconds}.")
+        if not 0.0 < seconds < math.inf:
+            raise DemosError(f"seconds to undo must be positive and finite, got {seconds}.")
         if not self._times:
             return 0
         newest_ns = self._times[-1][1]
         later = (newest_ns - at_ns < seconds * _NS_PER_S for _, at_ns in reversed(self._times))
         count = sum(takewhile(bool, later))
-        first = self._times[-count][0]
-        self._append({"kind": "drop", "first": first, "last": self.steps - 1, "why": "undo"})
+        self._append(Drop(self._times[-count][0], self.steps - 1, "undo"))
         del self._times[-count:]
         self.dropped += count
         return count
@@ -294,21 +293,16 @@ class EpisodeWriter:
         self._syncer.close()
         self._syncer = None
         try:
-            write_header(
-                self.path,
-                self._header.to_json() | {"closed": {"steps": self.steps, "outcome": outcome}},
-            )
+            write_header(self.path, self._header, {"steps": self.steps, "outcome": outcome})
         finally:
             os.close(self._fd)
             os.close(self._lock)
 
-    def _append(self, fields: dict[str, object]) -> None:
-        line = encode_line(fields)
-        try:
-            write_all(self._fd, line)
-        except OSError as error:
-            raise cannot_write(self.path / STEPS, error) from error
-        self._bytes += len(line)
+    def _append(self, line: Step | Edit) -> None:
+        content = encode_line(line)
+        with writing(self.path / STEPS):
+            write_all(self._fd, content)
+        self._bytes += len(content)
 
     def _frame(self, jpeg: bytes | None) -> StepPicture | None:
         """Write an image, and return its record; without a new one, keep that before."""
@@ -320,12 +314,12 @@ class EpisodeWriter:
         frame = StepPicture.of(f"{self.steps:06d}.jpg", jpeg)
         path = self.path / FRAMES / frame.name
         try:
-            with path.open("wb", buffering=0) as file:
+            with writing(path), path.open("wb", buffering=0) as file:
                 write_all(file.fileno(), jpeg)
-        except OSError as error:
+        except OutputError:
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
-            raise cannot_write(path, error) from error
+            raise
         if self._syncer is not None:
             self._syncer.add(path)
         return frame
@@ -352,26 +346,26 @@ class EpisodeWriter:
 def _new_folder(recording: Path, header: EpisodeHeader, began: str) -> Path:
     """Create the folder of an episode with its empty files, atomically."""
     part = recording / f".{began}.{os.getpid()}"
-    try:
+    with writing(part):
         (part / FRAMES).mkdir(parents=True, exist_ok=True)
         (part / STEPS).touch()
-        write_header(part, header.to_json() | {"closed": None})
+        write_header(part, header, None)
         return part.rename(free_path(recording, f"{began}-0001"))  # No race: it is locked.
-    except OutputError:  # Already worded, and a subclass of OSError.
-        raise
-    except OSError as error:
-        raise cannot_write(part, error) from error
+
+
+def write_header(folder: Path, header: EpisodeHeader, closed: dict[str, Any] | None) -> None:
+    """Write the header of an episode atomically, with how it was closed."""
+    text = json.dumps(header.to_json() | {"closed": closed}, indent=1, ensure_ascii=False)
+    write_atomic(folder / HEADER, f"{text}\n".encode())
 
 
 def _require_space(folder: Path, spare_bytes: int) -> None:
     """Refuse to fill the disk."""
-    try:
+    with writing(folder):
         found = os.statvfs(folder)
-    except OSError as error:
-        raise cannot_write(folder, error) from error
-    free = found.f_bavail * found.f_frsize
-    if free < spare_bytes:
-        raise OutputError(
-            f"Cannot write to {folder}: only {free >> 20} MB of the disk are free, and at least "
-            f"{spare_bytes >> 20} MB must stay free."
-        )
+        free = found.f_bavail * found.f_frsize
+        if free < spare_bytes:
+            raise OutputError(
+                f"Cannot write to {folder}: only {free >> 20} MB of the disk are free, and at "
+                f"least {spare_bytes >> 20} MB must stay free."
+            )

@@ -13,7 +13,7 @@ from typing import Final
 from shapechanger.demos.episodes import Episode
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode, lock, write_all
 from shapechanger.demos.episodes.reader import read_header
-from shapechanger.demos.episodes.records import Step, decode_line, split_lines
+from shapechanger.demos.episodes.records import Step, parse_line, split_lines
 from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from shapechanger.errors import (
     DemosError,
@@ -134,13 +134,9 @@ def _kept(piece: Piece, frames: Path) -> list[bytes]:
         with translate_errors(
             ValueError, to=lambda error, why=damaged: DemosError(f"{why}{error}; repair it there.")
         ):
-            fields = decode_line(line)
-            step = Step.from_json(fields) if fields.get("kind") == "step" else None
-        if step is None or (picture := step.picture) is None:
+            step = parse_line(line)
+        if not isinstance(step, Step) or (picture := step.picture) is None:
             continue
-        # A robot's data must not escape the folder.
-        if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
-            raise DemosError(f"A step names the image {step.frame!r}.")
         file = frames / step.frame
         known = file.read_bytes() if file.is_file() else b""
         if not (len(known) == picture.size if jpeg is None else picture.fits(jpeg)):

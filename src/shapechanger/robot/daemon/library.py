@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from shapechanger.demos.episodes import drop, keep
+from shapechanger.demos.episodes import Step, drop, keep, read_outline
 from shapechanger.demos.episodes.files import (
     FRAMES,
     HEADER,
@@ -19,7 +19,7 @@ from shapechanger.demos.episodes.files import (
     is_episode,
     read_file,
 )
-from shapechanger.demos.episodes.outline import frame_of, read_outline
+from shapechanger.demos.episodes.records import parse_line
 from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.robot.daemon.recorder import Worker
 from shapechanger.robot.link import messages
@@ -84,8 +84,8 @@ class RecordingLibrary:
             return messages.EpisodeSummary(id=name, outcome=str(error)[:_MAX_TEXT])
         summary = messages.EpisodeSummary(
             id=name,
-            steps=outline.steps,
-            kept=outline.kept,
+            steps=len(outline.steps),
+            kept=len(outline.kept),
             seconds=outline.seconds,
             closed=outline.closed,
             created=outline.header.created[:_MAX_TEXT],
@@ -121,7 +121,13 @@ class RecordingLibrary:
         frames: list[bytes | None] = []
         size, frame_before = len(header), ""
         for number, line in enumerate(index.lines(question.first, question.count), question.first):
-            name = frame_of(line, f"Line {number + 1} of {steps}")
+            try:
+                parsed = parse_line(line.encode() + b"\n")
+            except ValueError as error:
+                raise DemosError(
+                    f"Line {number + 1} of {steps} is damaged, because {error}."
+                ) from error
+            name = parsed.frame if isinstance(parsed, Step) else ""
             frame = None
             if name and name != frame_before:
                 frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)

@@ -13,49 +13,46 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import EpisodeWriter, drop, mark, read_episode
 from shapechanger.demos.episodes.records import durations_s
-from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter, spread, summary
+from shapechanger.demos.report import distributions, recording_html
+from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from tests.demos.episodes.making import header, recorded, step
 
 
-def test_numbers_are_counted_in_bins() -> None:
-    found = spread([-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, math.nan], -1.0, 1.0)
-    assert found is not None
-    assert (found.counts[0], found.counts[10], found.counts[-1]) == (1, 4, 2)
-    assert (found.total, found.missing) == (7, 1)
-    assert (found.least, found.median, found.most) == (-1.0, 0.01, 1.0)
-
-
-def test_without_bounds_the_range_is_that_of_the_numbers() -> None:
-    found = spread([2.0, 4.0])
-    assert found is not None
-    assert (found.low, found.high) == (2.0, 4.0)
-    equal = spread([3.0, 3.0])
-    assert equal is not None
-    assert (equal.low, equal.high, equal.total) == (2.5, 3.5, 2)
-    assert spread([math.nan, math.inf]) is None
-
-
-def test_summary_of_an_episode(tmp_path: Path) -> None:
+def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
+    """Of the kept steps, over all episodes."""
+    speeds = [-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, 7.0]
     with EpisodeWriter.create(tmp_path, header(env="x/Car-v1"), spare_bytes=0) as writer:
-        for number in range(10):
+        for number, speed in enumerate(speeds):
             writer.add(
                 step(
                     number,
+                    action=(speed, 0.3),
+                    state=(1.0, (math.nan, math.inf, 2.0, 4.0)[number % 4]),
                     driver="expert" if number < 4 else "policy",
                     reward=1.0,
-                    terms={"reward_collision": -10.0 * (number == 9)},
-                    stop_reason="Slow." if number == 8 else "",
+                    terms={"reward_collision": -10.0 * (number == 6)},
                 )
             )
         writer.close("collision")
-    drop(writer.path, 0, 2, "bad")
+    drop(writer.path, 7, 7, "bad")
     mark(writer.path, 5, "here")
-    found = summary(read_episode(writer.path))
-    assert (found.what, found.steps, found.kept) == ("Car-v1", 10, 7)
-    assert list(found.drivers.items()) == [("policy", 6), ("expert", 1)]
-    assert (found.reward, found.collisions, found.stopped, found.marks) == (7.0, 1, 1, 1)
-    assert found.seconds == pytest.approx(7 / 20)
-    assert (found.outcome, found.closed) == ("collision", True)
+    recorded(tmp_path / "none", 0)
+    episode = read_episode(writer.path)
+    assert (episode.origin, episode.reward, episode.outcome) == ("Car-v1", 7.0, "collision")
+    assert list(episode.drivers.items()) == [("expert", 4), ("policy", 3)]
+    assert episode.seconds == pytest.approx(7 / 20)
+    steering, throttle, distance, between = distributions([episode])
+    assert steering.values.tolist() == speeds[:7]
+    assert (throttle.low, throttle.high) == (-1.0, 1.0)
+    assert (distance.values.tolist(), distance.missing) == ([2.0, 4.0, 2.0], 4)
+    assert (between.name, between.unit, between.values.mean()) == ("time between steps", "ms", 50.0)
+    page = recording_html("name", [episode])
+    for part in ("Car-v1", "7 of 8", "Collisions", "step 5: here", "4 without a value"):
+        assert part in page
+    # 0 has its own bin; values outside the range are in the outer ones.
+    assert "-0.0476 to 0.0476: 4 steps, 57.1 %" in page
+    assert "0.905 to 1: 2 steps, 28.6 %" in page
+    assert "49.5 to 49.5 ms: 0 steps" in page
 
 
 @settings(max_examples=50, deadline=None)
@@ -63,10 +60,9 @@ def test_summary_of_an_episode(tmp_path: Path) -> None:
     hz=st.floats(1.0, 100.0),
     spread_by=st.floats(0.0, 0.2),
     pauses_s=st.lists(st.floats(31.0, 1e5), max_size=3),
-    dropped=st.integers(0, 20),
 )
 def test_durations_are_those_of_the_times(
-    hz: float, spread_by: float, pauses_s: list[float], dropped: int
+    hz: float, spread_by: float, pauses_s: list[float]
 ) -> None:
     rng = np.random.default_rng(1)
     periods_s = (1 + rng.uniform(-spread_by, spread_by, 40)) / hz
@@ -87,9 +83,7 @@ def test_an_episode_lasts_as_long_as_its_times_say(tmp_path: Path) -> None:
         for number in range(100):
             at_ns = number * 200_000_000
             writer.add(msgspec.structs.replace(step(number), captured_ns=at_ns, decided_ns=None))
-    episode = read_episode(writer.path)
-    assert episode.header.control_hz == 20.0
-    assert episode.seconds == pytest.approx(99 * 0.2 + 0.05)
+    assert read_episode(writer.path).seconds == pytest.approx(99 * 0.2 + 0.05)
     drop(writer.path, 0, 49, "bad")
     assert read_episode(writer.path).seconds == pytest.approx(49 * 0.2 + 0.05)
 
