@@ -88,7 +88,9 @@ class ObservationEncoder:
             ("state", parts.get("state"), self.state_layout),
             ("action", env.action_space, self.action_layout),
         ):
-            if layout is not None and not (_is_row(part) and part.shape == (layout.size,)):
+            if layout is None or part is None:
+                continue
+            if not _is_row(part) or part.shape != (layout.size,):
                 raise DemosError(
                     f"{name_of(env)}: the {kind} space is {part}, but its layout has {layout.size} "
                     "values."
@@ -131,7 +133,7 @@ def _is_picture(space: gym.Space[Any]) -> bool:
     )
 
 
-def _is_row(space: gym.Space[Any] | None) -> bool:
+def _is_row(space: gym.Space[Any]) -> bool:
     return isinstance(space, spaces.Box) and len(space.shape) == 1
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import msgspec
 
@@ -208,20 +208,20 @@ def read_header(path: Path) -> tuple[EpisodeHeader, str | None]:
         DemosError: If the header is missing or cannot be read.
     """
     try:
-        fields = json.loads(read_file(path / HEADER, MAX_TEXT_BYTES).decode())
-        if not isinstance(fields, dict):
+        plain = json.loads(read_file(path / HEADER, MAX_TEXT_BYTES).decode())
+        if not isinstance(plain, dict):
             raise DemosError("it is not a JSON object.")
+        fields = cast("dict[str, Any]", plain)
         header = EpisodeHeader.from_json(fields)
     except FileNotFoundError:
         raise DemosError(f"{path} is not an episode: it has no {HEADER}.") from None
     except (OSError, ValueError, RecursionError) as error:
         reason = str(getattr(error, "strerror", None) or error).rstrip(".")
         raise DemosError(f"{path / HEADER} cannot be read: {reason}.") from error
-    match fields.get("closed"):
-        case dict() as closed:
-            return header, str(closed.get("outcome", ""))
-        case _:
-            return header, None
+    closed = fields.get("closed")
+    if not isinstance(closed, dict):
+        return header, None
+    return header, str(cast("dict[str, Any]", closed).get("outcome", ""))
 
 
 class _ScannedLine(NamedTuple):
