@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Episode, EpisodeHeader, Step
-from shapechanger.demos.episodes.records import longest_period_s
+from shapechanger.demos.episodes.records import Keep, longest_period_s
 from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, Format
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
@@ -190,7 +190,7 @@ def _rows(episode: Episode, steps: Sequence[Step]) -> Iterator[ExchangeStep]:
     why = {
         index: drop.why
         for drop in episode.drops
-        if not drop.keep
+        if not isinstance(drop, Keep)
         for index in range(max(0, drop.first), min(drop.last, newest) + 1)
     }
     marks: dict[int, tuple[str, ...]] = {}
