@@ -25,7 +25,6 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.study_films import film_study, median_index, view_distance
 from shapechanger.files import read_json
-from shapechanger.finger.controller import FingerController
 from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.reports.films import write_film
@@ -81,25 +80,14 @@ def _together() -> Picture:
 
 def _vehicles() -> Picture:
     """Four vehicles from outside, and below each what its camera sees."""
-    pairs = [_seen(name) for name in VEHICLES]
-    rows = [np.concatenate(row, axis=1) for row in zip(*pairs, strict=True)]
-    return np.concatenate(rows)
+    pairs = [_driving(name, name.lower(), _DRIVEN_S, view=_PORTRAIT)[-1] for name in VEHICLES]
+    return np.concatenate([np.concatenate(row, axis=1) for row in zip(*pairs, strict=True)])
 
 
 def _finger() -> Picture:
-    """A finger on a circle, four times."""
-    made = EnvRef("shapechanger/FingerTrack-v1", {"path": {"kind": "circle", "radius": 0.018}})
-    wide, high = _SIZE
-    env = cast("Any", made.make(render_mode="rgb_array", width=wide, height=high))
-    act = FingerController(env.unwrapped.observation_layout)
-    observation, _ = env.reset(seed=1)
-    frames: list[Picture] = []
-    for step in range(100):
-        if step % 25 == 0:
-            frames.append(env.render())
-        observation, *_ = env.step(act(observation))
-    env.close()
-    return np.concatenate(frames, axis=1)
+    """A finger that follows a circle, four times."""
+    circle = EnvRef("shapechanger/FingerTrack-v1", {"path": {"kind": "circle", "radius": 0.018}})
+    return np.concatenate(_filmed(circle, "track", (1,))[:24:6], axis=1)
 
 
 _FILM_SIZE: Final = {"width": 400, "height": 300}
@@ -152,21 +140,6 @@ def _row(names: tuple[str, ...], share: float = 1.0) -> Picture:
     return row
 
 
-def _seen(name: str) -> tuple[Picture, Picture]:
-    """A vehicle after some seconds of its expert's driving, from outside and through its camera."""
-    env = cast("Any", EnvRef(f"shapechanger/{name}-v1").make())
-    picture, _ = env.reset(seed=3)
-    expert = env.unwrapped.demonstrator(seed=0)
-    expert.begin()
-    for _ in range(round(_DRIVEN_S * env.metadata["render_fps"])):
-        picture, *_ = env.step(expert.act()[1])
-    world = env.unwrapped.world
-    outside = _outside(world, _SIZE, world.reach)
-    env.close()
-    seen = Image.fromarray(picture).resize(_SIZE, Image.Resampling.NEAREST)
-    return outside, np.asarray(seen)
-
-
 # Starts that vary more than the policies' training, so that there is something to see.
 _LEANING: Final = {"reset_noise_scale": 0.08}
 
@@ -188,12 +161,8 @@ def film_bodies(
 ) -> Film:
     """Return a function that films the reference policies of bodies, each group at one scale.
 
-    Args:
-        groups: Names of bodies.
-        seconds: Length of the film.
-        rows: Rows of pixels to keep; below them is nothing to see.
-        farther: Factor of the distance at which a body fills the frame.
-        **arguments: Arguments of the envs.
+    It keeps so many rows of pixels, below which is nothing to see, and views from farther away than
+    the distance at which a body fills the frame.
     """
 
     def film(stem: Path) -> None:
@@ -232,7 +201,11 @@ def _moving(ref: EnvRef, distance: float, seconds: float) -> list[Picture]:
 
 
 def _driving(
-    name: str, driver: str, seconds: float, size: tuple[int, int] = _SIZE
+    name: str,
+    driver: str,
+    seconds: float,
+    size: tuple[int, int] = _SIZE,
+    view: float = _BESIDE,
 ) -> list[tuple[Picture, Picture]]:
     """Frames from outside and through the camera of a vehicle that a shipped clone drives."""
     env = cast("Any", EnvRef(f"shapechanger/{name}-v1", {"courses": "held-out"}).make())
@@ -241,7 +214,7 @@ def _driving(
     world = env.unwrapped.world
     frames: list[tuple[Picture, Picture]] = []
     for _ in range(round(seconds * _FPS)):
-        outside = _outside(world, size, 1.3 * world.reach, _BESIDE)
+        outside = _outside(world, size, 1.3 * world.reach, view)
         seen = Image.fromarray(picture).resize(size, Image.Resampling.BICUBIC)
         frames.append((outside, np.asarray(seen)))
         picture, _, terminated, truncated, _ = env.step(policy.predict(picture))
@@ -252,7 +225,7 @@ def _driving(
 
 
 def _outside(
-    world: MujocoWorld, size: tuple[int, int], reach: float, azimuth_rad: float = _PORTRAIT
+    world: MujocoWorld, size: tuple[int, int], reach: float, azimuth_rad: float
 ) -> Picture:
     """View of a vehicle from outside, with smooth edges, and exposed longer in a dark corridor."""
     wide, high = size
@@ -267,10 +240,8 @@ _COURSE: Final = 5
 
 def _film_vehicles(stem: Path) -> None:
     """Film the four clones, from outside and below that through the camera."""
-    panels = [
-        [np.concatenate(pair) for pair in _driving(name, name.lower(), 8.0)] for name in VEHICLES
-    ]
-    _clip(stem, panels)
+    films = [_driving(name, name.lower(), 8.0) for name in VEHICLES]
+    _clip(stem, [[np.concatenate(pair) for pair in film] for film in films])
 
 
 def _film_corridor(stem: Path) -> None:
@@ -296,10 +267,10 @@ _CAPTIONS: Final = {
 
 def _film_transfer(stem: Path) -> None:
     """Transfer from Ant to BigAnt, and film before and after, as a clip and as a strip."""
-    study = Transfer(
-        "Ant", "BigAnt", source_policy=Path("reference"), seeds=2, steps=_STEPS, out=STUDY
-    )
-    study.run()
+    given = Path("reference")
+    Transfer(
+        source="Ant", target="BigAnt", source_policy=given, seeds=2, steps=_STEPS, out=STUDY
+    ).run()
     clip = stem.with_suffix(".webm")
     made = read_json(STUDY / STUDY_FILE, Study, f"delete {STUDY}")
     film_study(

@@ -18,6 +18,8 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
+from mujoco import _specs
+
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _MODULES: Final = (
     "_callbacks",
@@ -33,84 +35,30 @@ _INT: Final = "typing.SupportsInt | typing.SupportsIndex"
 _FLOAT: Final = "typing.SupportsFloat | typing.SupportsIndex"
 _ARRAY_LIKE: Final = "numpy.typing.ArrayLike"
 
-# The element type of each list that a spec or a body gives.
-_PLURALS: Final = {
-    "actuators": "MjsActuator",
-    "bodies": "MjsBody",
-    "cameras": "MjsCamera",
-    "equalities": "MjsEquality",
-    "excludes": "MjsExclude",
-    "flexes": "MjsFlex",
-    "frames": "MjsFrame",
-    "geoms": "MjsGeom",
-    "hfields": "MjsHField",
-    "joints": "MjsJoint",
-    "keys": "MjsKey",
-    "lights": "MjsLight",
-    "materials": "MjsMaterial",
-    "meshes": "MjsMesh",
-    "numerics": "MjsNumeric",
-    "pairs": "MjsPair",
-    "plugins": "MjsPlugin",
-    "sensors": "MjsSensor",
-    "sites": "MjsSite",
-    "skins": "MjsSkin",
-    "tendons": "MjsTendon",
-    "texts": "MjsText",
-    "textures": "MjsTexture",
-    "tuples": "MjsTuple",
-}
-# Where the name of a model's or data's accessor differs from its view's.
-_VIEWS: Final = {
-    "cam": "Camera",
-    "eq": "Equality",
-    "jnt": "Joint",
-    "key": "Keyframe",
-    "mat": "Material",
-    "ten": "Tendon",
-    "tex": "Texture",
-}
-# Return types that the bindings leave open, or give as a bare container.
+# Return types that the bindings leave open.
 _RETURNS: Final = {
     "MjSpec.compile": "mujoco._structs.MjModel",
-    "MjSpec.recompile": "tuple[mujoco._structs.MjModel, mujoco._structs.MjData]",
-    "MjByteVec.__getitem__": "int",
-    "MjByteVec.__iter__": "collections.abc.Iterator[int]",
-    "MjsSkin.vertid": "list[list[int]]",
-    "MjsSkin.vertweight": "list[list[float]]",
-    "MjModel.bind": "typing.Any",  # The result has the attributes of the argument.
-    "MjData.bind": "typing.Any",
-    "MjvScene.camera": "builtins.tuple[MjvGLCamera, ...]",
-    "MjvScene.geoms": "builtins.tuple[MjvGeom, ...]",
-    "MjvScene.lights": "builtins.tuple[MjvLight, ...]",
     "mj_id2name": "str | typing.Any",
-}
-# Parameters that the bindings leave open.
-_PARAMETERS: Final = {
-    "MjSpec.attach.frame": "MjsFrame | str | None",
-    "MjSpec.attach.site": "MjsSite | str | None",
-    "MjSpec.copy_back.model": "mujoco._structs.MjModel",
-    "MjSpec.recompile.d": "mujoco._structs.MjData",
-    "MjSpec.recompile.m": "mujoco._structs.MjModel",
-    "MjByteVec.__init__.arg0": "int",
-    "MjByteVec.__setitem__.arg1": "int",
-    "MjData.bind.specs": "mujoco.MjStruct | collections.abc.Sequence[mujoco.MjStruct]",
-    "MjModel.bind.specs": "mujoco.MjStruct | collections.abc.Sequence[mujoco.MjStruct]",
-    "MjModel.from_binary_path.vfs": "mujoco._specs.MjVfs | None",
-    "MjModel.from_xml_path.vfs": "mujoco._specs.MjVfs | None",
-    "MjModel.from_xml_string.vfs": "mujoco._specs.MjVfs | None",
-}
-# Set on their classes by mujoco/__init__.py, which makes them look like static methods.
-_METHODS_IN_PYTHON: Final = ("MjData.bind", "MjModel.bind", "MjSpec.to_zip")
-_ATTRIBUTES: Final = {
-    "MjModel.stat": "MjStatistic",
-    "MjSpec.assets": "dict[str, bytes]",
 }
 # The bare containers that are left.
 _CONTAINERS: Final = {
     "dict": "dict[str, typing.Any]",
     "list": "list[typing.Any]",
     "tuple": "builtins.tuple[typing.Any, ...]",
+}
+
+
+def _plural(name: str) -> str:
+    if name.endswith("y"):
+        return f"{name[:-1]}ies"
+    return name + ("es" if name.endswith(("sh", "x")) else "s")
+
+
+# The element type of each list that a spec or a body gives, such as `bodies`.
+_LISTS: Final = {
+    _plural(name.removeprefix("Mjs").lower()): f"list[{name}]"
+    for name in dir(_specs)
+    if name.startswith("Mjs")
 }
 
 
@@ -133,8 +81,7 @@ class _Corrector(ast.NodeTransformer):
         name = ast.unparse(node.target)
         if name == "__all__":
             return node
-        known = _ATTRIBUTES.get(self._path(name))
-        node.annotation = _parse(known) if known else self._simplified(node.annotation)
+        node.annotation = self._simplified(node.annotation)
         if isinstance(node.value, ast.Tuple) and ast.unparse(node.annotation).endswith(
             "[Any, ...]"
         ):
@@ -144,11 +91,6 @@ class _Corrector(ast.NodeTransformer):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
         path = self._path(node.name)
-        if path in _METHODS_IN_PYTHON:
-            node.decorator_list = []
-            node.args.args[0] = ast.arg("self")
-        if node.name == "bind_scalar":
-            node.args.defaults = []  # They say None, which the bindings refuse.
         self._correct_parameters(node, path)
         node.returns = _parse(self._returned(node, path))
         if any(ast.unparse(d) == "property" for d in node.decorator_list):
@@ -171,10 +113,7 @@ class _Corrector(ast.NodeTransformer):
         for parameter, default in pairs:
             if parameter.arg == "self":
                 continue
-            known = _PARAMETERS.get(f"{path}.{parameter.arg}")
-            if known:
-                text = known
-            elif parameter.annotation is None:
+            if parameter.annotation is None:
                 text = "typing.Any"
             else:
                 text = ast.unparse(self._simplified(parameter.annotation, is_parameter=True))
@@ -196,21 +135,9 @@ class _Corrector(ast.NodeTransformer):
         if node.returns is None:
             return "typing.Any"
         text = ast.unparse(self._simplified(node.returns))
-        owner = self._class[-1] if self._class else ""
-        if text == "list[typing.Any]" and node.name in _PLURALS:
-            return f"list[{_PLURALS[node.name]}]"
-        if text == "list[typing.Any]" and node.name == "find_all":
-            return "list[typing.Any]"
-        if owner in ("MjModel", "MjData"):
-            if node.name == "bind_scalar":
-                kind = ast.unparse(node.args.args[1].annotation or _ellipsis().value)
-                kind = kind.split(" ")[0].removeprefix("mujoco._specs.Mjs")
-                kind = {"HField": "Hfield", "Key": "Keyframe"}.get(kind, kind)
-                return f"_{owner}{kind}Views"
-            if text == "typing.Any" and len(node.args.args) == 2:
-                kind = _VIEWS.get(node.name, node.name.capitalize())
-                return f"_{owner}{kind}Views"
-        is_lookup = owner == "MjSpec" and ast.unparse(node.args).endswith("arg0: str")
+        if text == "list[typing.Any]":
+            return _LISTS.get(node.name, text)
+        is_lookup = self._class == ["MjSpec"] and ast.unparse(node.args).endswith("arg0: str")
         is_neighbour = node.name.startswith(("first_", "next_", "find_child", "find_default"))
         may_be_none = is_lookup or is_neighbour or node.name == "parent"
         if may_be_none and text.startswith("Mjs") and not node.name.startswith("add_"):

@@ -63,10 +63,8 @@ def _keys(
 ) -> Iterator[str]:
     """Return a table of the fields of some types, if they have any.
 
-    Args:
-        kinds: The types.
-        typed: Whether they are messages, whose values have the types of MessagePack.
-        options: Names that a key can have as its value, keyed by the key.
+    `typed` is for messages, whose values have the types of MessagePack; `options` are the names
+    that a key can have as its value.
     """
     rows: list[str] = []
     for kind in kinds:

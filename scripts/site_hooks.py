@@ -10,7 +10,6 @@ import html
 import logging
 import posixpath
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -33,8 +32,8 @@ ALWAYS: Final = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 
 _LOG: Final = logging.getLogger("mkdocs.hooks.shapechanger")
 _LINK: Final = re.compile(r"(\]\()([^)\s]+)(\))")
-_FENCE: Final = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
-# Words for the site alone: they link to pages that no code host has.
+_FENCE: Final = re.compile(r"(^ *```.*?^ *``` *$|^ *~~~.*?^ *~~~ *$)", re.DOTALL | re.MULTILINE)
+# Words of a page of docs for the site alone: they link to pages that no code host has.
 _ONLY_HERE: Final = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
 _MERMAID: Final = re.compile(r"^```mermaid\n(.*?)^```", re.DOTALL | re.MULTILINE)
 # An image that leads to a clip: code hosts show no clips inside a page.
@@ -45,17 +44,12 @@ _SCHEME: Final = re.compile(r"[a-z]+:")
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Make the pages from the code, and add them to the navigation."""
-    made = {
-        "environments/index.md": environment_pages(),
-        "wiring/index.md": wiring_pages(),
-        "api/index.md": api_pages(),
-    }
-    for pages in made.values():
-        for page in pages:
-            for note in page.notes:
-                _LOG.info(note)
-    config.extra["made"] = [page for pages in made.values() for page in pages]
-    config.nav = _extended(config.nav, made)
+    sections = environment_pages(), wiring_pages(), api_pages()
+    config.extra["made"] = [page for pages in sections for page in pages]
+    for page in config.extra["made"]:
+        for note in page.notes:
+            _LOG.info(note)
+    config.nav = _extended(config.nav, {pages[0].path: pages for pages in sections})
     return config
 
 
@@ -82,11 +76,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         for name, content in page.pictures.items():
             files.append(File.generated(config, name, content=content))
     files.append(File.generated(config, "index.md", abs_src_path=str(ROOT / HOME)))
-    waiting = [
-        *(f"{DOCS}/{file.src_uri}" for file in files.documentation_pages()),
-        *ALWAYS,
-    ]
-    seen = {*waiting, HOME} - {*ALWAYS}
+    pages = [f"{DOCS}/{file.src_uri}" for file in files.documentation_pages()]
+    seen, waiting = {*pages, HOME}, [*pages, *ALWAYS]
     while waiting:
         origin = waiting.pop()
         if origin not in seen:
@@ -94,17 +85,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             path = str(ROOT / origin)
             files.append(File.generated(config, in_site(origin), abs_src_path=path))
         if origin.endswith(".md") and (ROOT / origin).is_file():
-            targets = links_of((ROOT / origin).read_text(), origin)
-            waiting += [one for one in targets if one not in seen and not _in_docs(one)]
+            linked = links_of((ROOT / origin).read_text(), origin)
+            waiting += [one for one in linked - seen if not _in_docs(one)]
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Add the tables of keys to a page, and rewrite its links to files outside `docs`."""
-    markdown = with_keys(markdown)
-    origin = origin_of(page.file.src_uri)
-    markdown = _ONLY_HERE.sub(lambda match: _to_made_pages(match[1], origin), markdown)
-    return _CLIP.sub(_player, rewritten(_MERMAID.sub(_graph_as_table, markdown), origin))
+    markdown = _ONLY_HERE.sub(r"\1", _MERMAID.sub(_graph_as_table, with_keys(markdown)))
+    return _CLIP.sub(_player, rewritten(markdown, origin_of(page.file.src_uri)))
 
 
 def _player(match: re.Match[str]) -> str:
@@ -114,12 +103,6 @@ def _player(match: re.Match[str]) -> str:
         f'<video controls loop muted playsinline preload="none" poster="{picture}" '
         f'aria-label="{words}" src="{clip}"></video>'
     )
-
-
-def _to_made_pages(words: str, origin: str) -> str:
-    """Return words whose links are given from the root of the site, for the page at `origin`."""
-    here = posixpath.dirname(in_site(origin)) or "."
-    return _LINK.sub(lambda link: f"{link[1]}{posixpath.relpath(link[2], here)}{link[3]}", words)
 
 
 def _graph_as_table(match: re.Match[str]) -> str:
@@ -155,23 +138,13 @@ def _in_docs(path: str) -> bool:
 
 
 def links_of(markdown: str, origin: str) -> set[str]:
-    """Return the files of the repository that a page links to.
-
-    Args:
-        markdown: The page.
-        origin: Its path in the repository.
-    """
-    found = {_target(match[2], origin)[0] for match in _links(markdown)}
+    """Return the files that a page, whose path in the repository is `origin`, links to."""
+    found = {_target(link[2], origin)[0] for link in _LINK.finditer(_FENCE.sub("", markdown))}
     return {path for path in found if path and (ROOT / path).is_file()}
 
 
 def rewritten(markdown: str, origin: str) -> str:
-    """Return a page with its links as the site needs them.
-
-    Args:
-        markdown: The page.
-        origin: Its path in the repository.
-    """
+    """Return a page of the repository with its links as the site needs them."""
     here = posixpath.dirname(in_site(origin))
 
     def link(match: re.Match[str]) -> str:
@@ -180,16 +153,9 @@ def rewritten(markdown: str, origin: str) -> str:
             return match[0]
         return f"{match[1]}{posixpath.relpath(in_site(path), here or '.')}{anchor}{match[3]}"
 
-    parts: list[str] = []
-    end = 0
-    for fence in _FENCE.finditer(markdown):
-        parts += [_LINK.sub(link, markdown[end : fence.start()]), fence[0]]
-        end = fence.end()
-    return "".join([*parts, _LINK.sub(link, markdown[end:])])
-
-
-def _links(markdown: str) -> Iterator[re.Match[str]]:
-    return _LINK.finditer(_FENCE.sub("", markdown))
+    # Every second part is a fence.
+    parts = _FENCE.split(markdown)
+    return "".join(part if at % 2 else _LINK.sub(link, part) for at, part in enumerate(parts))
 
 
 def _target(link: str, origin: str) -> tuple[str, str]:

@@ -80,11 +80,7 @@ def unreleasable() -> str:
 
 
 def build() -> tuple[Path, ...]:
-    """Build the source distribution, and from it the wheel.
-
-    Returns:
-        Their files.
-    """
+    """Build the source distribution, and from it the wheel; return their files."""
     shutil.rmtree(DIST, ignore_errors=True)
     command = [sys.executable, "-m", "build", "--outdir", str(DIST), str(ROOT)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -98,15 +94,7 @@ def has_python(version: str) -> bool:
 
 
 def run_lane(lane: str, wheel: Path) -> int:
-    """Install and test one lane.
-
-    Args:
-        lane: Name of the lane.
-        wheel: The built wheel.
-
-    Returns:
-        The exit status of the installation or of pytest.
-    """
+    """Install and test a lane, and return the exit status of the installation or of pytest."""
     if lane == "robot":  # This test makes its own environment.
         tests = [sys.executable, "-m", "pytest", "-q", "tests/claims/test_robot_install.py"]
         return subprocess.run(tests, cwd=ROOT, check=False).returncode

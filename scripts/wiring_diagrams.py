@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -30,104 +30,83 @@ ENABLE: Final = "ENABLE"
 
 @dataclass(frozen=True)
 class Terminal:
-    """One terminal of a device.
-
-    Attributes:
-        label: Its printed label.
-        source: The BCM pin that a wire leads to, or the flag of a net.
-        pull: Net that a resistor of 10 kOhm leads to; "" for none.
-        divider: Whether 1 kOhm lies in the wire and 2 kOhm lead from the pin to ground.
-        bus: Whether other devices share the wire.
-    """
+    """One terminal of a device."""
 
     label: str
-    source: int | str
-    pull: str = ""
-    divider: bool = False
-    bus: bool = False
+    source: int | str  # The BCM pin that a wire leads to, or the flag of a net.
+    pull: str = ""  # Net that a resistor of 10 kOhm leads to; "" for none.
+    divider: bool = False  # Whether 1 kOhm lies in the wire, and 2 kOhm between pin and ground.
+    bus: bool = False  # Whether other devices share the wire.
 
 
 @dataclass(frozen=True)
 class Load:
-    """What a device drives.
-
-    Attributes:
-        label: The terminals of the device.
-        name: Name of the load.
-        kind: "motor", "box", "net", or "chain" for a box that hangs on the one above.
-    """
+    """What the terminals `label` of a device drive."""
 
     label: str
     name: str
-    kind: str = "box"
+    kind: str = "box"  # "motor", "box", "net", or "chain" for a box that hangs on the one above.
 
 
 @dataclass(frozen=True)
 class Device:
-    """A board, sensor or switch outside the Pi.
-
-    Attributes:
-        title: Its name.
-        note: A second line; "" for none.
-        terminals: Its terminals, which face the Pi.
-        loads: What it drives.
-        parts: Parts that it takes: name, number and purpose.
-    """
+    """A board, sensor or switch outside the Pi."""
 
     title: str
-    note: str = ""
-    terminals: tuple[Terminal, ...] = ()
+    note: str = ""  # A second line.
+    terminals: tuple[Terminal, ...] = ()  # They face the Pi.
     loads: tuple[Load, ...] = ()
-    parts: tuple[tuple[str, int, str], ...] = ()
+    parts: tuple[tuple[str, int, str], ...] = ()  # Name, number and purpose.
 
 
 def devices_of(profile: Profile) -> list[Device]:
     """Return the parts that are wired to the Pi, in the order of the diagram."""
-    found: list[Device] = []
-    bridges = [one for one in profile.outputs if one.driver in ("hbridge", "phase_enable")]
-    for first in range(0, len(bridges), 2):
-        found.append(_bridge(bridges[first : first + 2], profile))
+    outputs, sensors = profile.outputs, profile.sensors
+    bridges = [one for one in outputs if one.driver in ("hbridge", "phase_enable")]
+    found = [_bridge(bridges[at : at + 2], profile) for at in range(0, len(bridges), 2)]
     if profile.enable_pin is not None:
         found.append(_one_shot(profile.enable_pin, profile.enable_hold_ms, bool(bridges)))
-    found += [_direct(one) for one in profile.outputs if one.settings.get("over") in _DIRECT]
-    found += [_SENSORS[one.driver](one) for one in profile.sensors if one.driver in _ON_PINS]
+    found += [_direct(one) for one in outputs if one.settings.get("over") in ("lgpio", "sysfs")]
+    found += [_SENSORS[one.driver](one) for one in sensors if one.driver in _ON_PINS]
     if profile.stop_pin is not None:
-        wire = Terminal("contact", profile.stop_pin)
         parts = (("push button", 1, "emergency stop in the guard"),)
-        found.append(
-            Device("Emergency button", "pull-up in the Pi", (wire, _GROUND_WIRE), parts=parts)
-        )
+        wires = _wires({"contact": profile.stop_pin, "ground": GROUND})
+        found.append(Device("Emergency button", "pull-up in the Pi", wires, parts=parts))
     boards: dict[tuple[int, int], list[OutputPlan]] = {}
-    for output in profile.outputs:
+    for output in outputs:
         if output.settings.get("over") == "pca9685":
             key = output.settings["bus"], output.settings["address"]
             boards.setdefault(key, []).append(output)
-    found += [_servo_board(outputs) for outputs in boards.values()]
-    found += [_SENSORS[one.driver](one) for one in profile.sensors if one.driver in _ON_BUS]
-    servos = [one for one in profile.outputs if one.driver == "bus_servo"]
-    if servos:
+    found += map(_servo_board, boards.values())
+    on_bus = [one for one in sensors if one.driver in _SENSORS and one.driver not in _ON_PINS]
+    found += [_SENSORS[one.driver](one) for one in on_bus]
+    if servos := [one for one in outputs if one.driver == "bus_servo"]:
         found.append(_servo_bus(servos))
     if profile.camera is not None and profile.camera.driver in _CAMERAS:
         cable, part = _CAMERAS[profile.camera.driver]
-        found.append(
-            Device("Camera", "", (Terminal("cable", cable),), parts=((part, 1, "camera"),))
-        )
-    speeds = any(one.driver == "esc" for one in profile.outputs)
+        found.append(Device("Camera", "", _wires({"cable": cable}), parts=((part, 1, "camera"),)))
+    speeds = any(one.driver == "esc" for one in outputs)
     if speeds or any(one.source == MOTORS for device in found for one in device.terminals):
         parts = (
             ("motor battery, with a fuse", 1, "never the Pi's 5 V"),
             ("latching switch", 1, "in the motors' supply: emergency stop without software"),
         )
-        measured = any(one.driver == "ina219" for one in profile.sensors)
+        measured = any(one.driver == "ina219" for one in sensors)
         plus = BATTERY if measured else MOTORS
         supply = (Load("+, fuse, switch", plus, "net"), Load("-", GROUND, "net"))
         found.append(Device("Battery", "with a fuse and a switch", loads=supply, parts=parts))
     return found
 
 
-_GROUND_WIRE: Final = Terminal("ground", GROUND)
-_LOGIC_WIRES: Final = (Terminal("VCC", LOGIC), Terminal("GND", GROUND))
-_DIRECT: Final = ("lgpio", "sysfs")
+def _wires(sources: Mapping[str, int | str], pull: str = "") -> tuple[Terminal, ...]:
+    """Return terminals, keyed by label, without pins that are not used; `pull` is for the pins."""
+    return tuple(
+        Terminal(label, source, pull=pull if isinstance(source, int) else "")
+        for label, source in sources.items()
+        if source != _NO_PIN
+    )
+
+
 _CAMERAS: Final = {
     "picamera2": ("ribbon cable", "camera on the ribbon cable"),
     "v4l2": ("USB", "webcam that sends JPEG"),
@@ -136,43 +115,38 @@ _CAMERAS: Final = {
 
 def _bridge(outputs: list[OutputPlan], profile: Profile) -> Device:
     """Return an H-bridge board with one or two channels."""
-    terminals: list[Terminal] = []
+    pins: dict[str, int | str] = {}
     loads: list[Load] = []
     wired = False
-    for number, output in enumerate(outputs):
+    for number, (channel, output) in enumerate(zip("AB", outputs, strict=False)):
         settings = output.settings
         if output.driver == "hbridge":
-            first = 2 * number + 1
-            names = {f"IN{first}": settings["forward"], f"IN{first + 1}": settings["backward"]}
+            pins[f"IN{2 * number + 1}"] = settings["forward"]
+            pins[f"IN{2 * number + 2}"] = settings["backward"]
         else:
-            names = {f"PH{'AB'[number]}": settings["phase"]}
-        enable = settings.get("enable", _NO_PIN)
-        if enable != _NO_PIN:
-            names[f"EN{'AB'[number]}"] = enable
-            wired = True
-        terminals += [Terminal(name, pin, pull=GROUND) for name, pin in names.items()]
-        loads.append(Load(f"OUT {'AB'[number]}", output.name, "motor"))
+            pins[f"PH{channel}"] = settings["phase"]
+        pins[f"EN{channel}"] = settings.get("enable", _NO_PIN)
+        wired = wired or pins[f"EN{channel}"] != _NO_PIN
+        loads.append(Load(f"OUT {channel}", output.name, "motor"))
     if not wired:
-        held = ENABLE if profile.enable_pin is not None else LOGIC
-        terminals.append(Terminal("enable", held))
-    terminals += [Terminal("VM", MOTORS), Terminal("GND", GROUND)]
+        pins["enable"] = LOGIC if profile.enable_pin is None else ENABLE
+    wires = _wires({**pins, "VM": MOTORS, "GND": GROUND}, pull=GROUND)
     parts = (
         ("H-bridge board, two channels (TB6612FNG, DRV8833; L298N above 6 V)", 1, "motors"),
         ("DC motor", len(outputs), ", ".join(one.part or one.name for one in outputs)),
     )
     note = "enable AND one-shot" if wired and profile.enable_pin is not None else ""
-    return Device("H-bridge", note, tuple(terminals), tuple(loads), parts)
+    return Device("H-bridge", note, wires, tuple(loads), parts)
+
+
+# K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md gives its source.
+_HOLD_OF_KOHM_MS: Final = 0.45
 
 
 def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
     resistor = f"{float(f'{hold_ms / _HOLD_OF_KOHM_MS:.2g}'):g}"
-    wires = (
-        Terminal("2B", pin, pull=GROUND),
-        Terminal("2A", GROUND),
-        Terminal("2RD", LOGIC),
-        Terminal("2RCext", f"{resistor} kΩ to {LOGIC}"),
-        Terminal("2Cext", "1 µF to 2RCext"),
-    )
+    timing = {"2RCext": f"{resistor} kΩ to {LOGIC}", "2Cext": "1 µF to 2RCext"}
+    wires = _wires({"2B": pin, "2A": GROUND, "2RD": LOGIC, **timing}, pull=GROUND)
     parts = (
         ("74HC123", 1, "one-shot in the enable line"),
         (f"resistor {resistor} kOhm", 1, f"its time: {hold_ms} ms"),
@@ -182,20 +156,21 @@ def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
     return Device("One-shot 74HC123", f"drops after {hold_ms} ms", wires, (load,), parts)
 
 
+_ESC: Final = "speed controller (ESC) with its motor"
+
+
 def _direct(output: OutputPlan) -> Device:
     """Return a servo or speed controller whose pulses come from the Pi."""
     settings = output.settings
-    if settings["over"] == "lgpio":
-        signal = Terminal("signal", settings["pin"], pull=GROUND)
-    else:
-        channel = f"PWM {settings['chip']}.{settings['channel']}"
-        signal = Terminal("signal", channel, pull=GROUND)
+    by_pin = settings["over"] == "lgpio"
+    source = settings["pin"] if by_pin else f"PWM {settings['chip']}.{settings['channel']}"
+    signal = Terminal("signal", source, pull=GROUND)
     if output.driver == "esc":
+        wires = (signal, *_wires({"battery +": MOTORS, "GND": GROUND}))
         loads = (Load("motor wires", output.name, "motor"),)
-        parts = (("speed controller (ESC) with its motor", 1, output.name),)
-        wires = (signal, Terminal("battery +", MOTORS), Terminal("GND", GROUND))
+        parts = ((_ESC, 1, output.name),)
         return Device(f"ESC ({output.name})", "BEC powers the servos", wires, loads, parts)
-    wires = (signal, Terminal("V+", "5 to 6 V"), Terminal("GND", GROUND))
+    wires = (signal, *_wires({"V+": "5 to 6 V", "GND": GROUND}))
     parts = (("servo", 1, output.name),)
     return Device(f"Servo ({output.name})", "V+ not from the Pi", wires, parts=parts)
 
@@ -206,45 +181,39 @@ def _servo_board(outputs: list[OutputPlan]) -> Device:
     held = Terminal("OE", enable, pull=LOGIC) if enable != _NO_PIN else Terminal("OE", GROUND)
     motors = [one.name for one in outputs if one.driver == "esc"]
     supply = "BEC of the ESC" if motors else "5 to 6 V supply"
-    wires = (*_i2c(settings["bus"]), *_LOGIC_WIRES, held, Terminal("V+", supply))
+    wires = (*_i2c(settings["bus"]), held, Terminal("V+", supply))
+    names = {True: "ESC ({}), + V MOTOR", False: "servo ({})"}
     loads = tuple(
-        Load(
-            f"{one.settings['channel']}",
-            f"ESC ({one.name}), + V MOTOR" if one.driver == "esc" else f"servo ({one.name})",
-        )
+        Load(f"{one.settings['channel']}", names[one.driver == "esc"].format(one.name))
         for one in outputs
     )
-    servos = len(outputs) - len(motors)
     parts = (
         ("PCA9685 board", 1, "pulses for servos"),
-        *(
-            (("speed controller (ESC) with its motor", len(motors), ", ".join(motors)),)
-            * bool(motors)
-        ),
-        *((("servo", servos, "its channels"),) * bool(servos)),
-        *((("servo supply, 5 to 6 V", 1, "V+ of the board"),) * (not motors)),
+        (_ESC, len(motors), ", ".join(motors)),
+        ("servo", len(outputs) - len(motors), "its channels"),
+        ("servo supply, 5 to 6 V", int(not motors), "V+ of the board"),
     )
     return Device("PCA9685", f"address {settings['address']:#x}", wires, loads, parts)
 
 
 def _i2c(bus: int) -> tuple[Terminal, ...]:
-    pins = I2C_PINS.get(bus)
-    if pins is None:
-        return (Terminal("SDA", f"I2C bus {bus}"), Terminal("SCL", f"I2C bus {bus}"))
-    return (Terminal("SDA", pins[0], bus=True), Terminal("SCL", pins[1], bus=True))
+    """Return the terminals of a board on an I2C bus."""
+    words = f"I2C bus {bus}"
+    pins = I2C_PINS.get(bus, (words, words))
+    lines = zip(("SDA", "SCL"), pins, strict=True)
+    return (
+        *(Terminal(label, pin, bus=pin != words) for label, pin in lines),
+        *_wires({"VCC": LOGIC, "GND": GROUND}),
+    )
 
 
 def _servo_bus(servos: list[OutputPlan]) -> Device:
-    model = servos[0].settings["model"]
+    model, device = servos[0].settings["model"], servos[0].settings["device"]
     loads = tuple(
         Load("", f"{one.name}: {one.settings['model']}, id {one.settings['id']}", "chain")
         for one in servos
     )
-    wires = (
-        Terminal("USB", servos[0].settings["device"]),
-        Terminal("supply", "servo supply"),
-        Terminal("GND", GROUND),
-    )
+    wires = _wires({"USB": device, "supply": "servo supply", "GND": GROUND})
     parts = (
         ("USB adapter of the servo bus", 1, "with a latency timer of 1 ms"),
         (f"servo {model}", len(servos), "tendons"),
@@ -256,25 +225,22 @@ def _servo_bus(servos: list[OutputPlan]) -> Device:
 
 def _encoder(sensor: SensorPlan) -> Device:
     channels = {"A": sensor.settings["a"], "B": sensor.settings["b"]}
-    wires = [Terminal(name, pin) for name, pin in channels.items() if pin != _NO_PIN]
+    wires = _wires({**channels, "VCC": LOGIC, "GND": GROUND})
     parts = (("wheel encoder, open collector or 3.3 V", 1, sensor.name),)
-    return Device(f"Encoder ({sensor.name})", "3.3 V maximum", (*wires, *_LOGIC_WIRES), parts=parts)
+    return Device(f"Encoder ({sensor.name})", "3.3 V maximum", wires, parts=parts)
 
 
 def _switch(sensor: SensorPlan) -> Device:
-    pins = sensor.settings["pins"]
-    wires = [Terminal(f"contact {number}", pin) for number, pin in enumerate(pins, start=1)]
-    up = sensor.settings["pull"] == "up"
-    wires.append(Terminal("other side", GROUND if up else LOGIC))
+    pull, pins = sensor.settings["pull"], sensor.settings["pins"]
+    contacts = {f"contact {number}": pin for number, pin in enumerate(pins, start=1)}
+    wires = _wires({**contacts, "other side": GROUND if pull == "up" else LOGIC})
     parts = (("switch", len(pins), f"{sensor.name}, in front"),)
-    note = f"pull-{sensor.settings['pull']} in the Pi"
-    return Device(f"Switches ({sensor.name})", note, tuple(wires), parts=parts)
+    return Device(f"Switches ({sensor.name})", f"pull-{pull} in the Pi", wires, parts=parts)
 
 
 def _hcsr04(sensor: SensorPlan) -> Device:
     wires = (
-        Terminal("VCC", FIVE),
-        Terminal("Trig", sensor.settings["trigger"]),
+        *_wires({"VCC": FIVE, "Trig": sensor.settings["trigger"]}),
         Terminal("Echo", sensor.settings["echo"], divider=True),
         Terminal("GND", GROUND),
     )
@@ -286,22 +252,19 @@ def _hcsr04(sensor: SensorPlan) -> Device:
     return Device("HC-SR04", sensor.name, wires, parts=parts)
 
 
-def _mpu6050(sensor: SensorPlan) -> Device:
-    wires = (*_i2c(sensor.settings["bus"]), *_LOGIC_WIRES)
-    note = f"address {sensor.settings['address']:#x}"
-    return Device("MPU-6050", note, wires, parts=(("MPU-6050 board", 1, sensor.name),))
+def _board(title: str, *loads: Load) -> Callable[[SensorPlan], Device]:
+    """Return a function that makes a sensor's board on an I2C bus."""
 
+    def made(sensor: SensorPlan) -> Device:
+        note = f"address {sensor.settings['address']:#x}"
+        parts = ((f"{title} board", 1, sensor.name),)
+        return Device(title, note, _i2c(sensor.settings["bus"]), loads, parts)
 
-def _ina219(sensor: SensorPlan) -> Device:
-    wires = (*_i2c(sensor.settings["bus"]), *_LOGIC_WIRES)
-    note = f"address {sensor.settings['address']:#x}"
-    loads = (Load("Vin+", BATTERY, "net"), Load("Vin-", MOTORS, "net"))
-    return Device("INA219", note, wires, loads, (("INA219 board", 1, sensor.name),))
+    return made
 
 
 def _as5600(sensor: SensorPlan) -> Device:
     settings = sensor.settings
-    wires = (*_i2c(settings["bus"]), *_LOGIC_WIRES)
     loads = tuple(
         Load(f"channel {row['channel']}", f"AS5600 {joint}")
         for joint, row in settings["rows"].items()
@@ -310,22 +273,18 @@ def _as5600(sensor: SensorPlan) -> Device:
         ("TCA9548A board", 1, "multiplexer of the encoders"),
         ("AS5600 board with a diametric magnet", len(loads), "joints"),
     )
-    return Device("TCA9548A", f"address {settings['mux']:#x}", wires, loads, parts)
+    return Device("TCA9548A", f"address {settings['mux']:#x}", _i2c(settings["bus"]), loads, parts)
 
 
-# K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md gives its source.
-_HOLD_OF_KOHM_MS: Final = 0.45
-
+_ON_PINS: Final = ("encoder", "switch", "hcsr04")
 _SENSORS: Final[dict[str, Callable[[SensorPlan], Device]]] = {
     "encoder": _encoder,
     "switch": _switch,
     "hcsr04": _hcsr04,
-    "mpu6050": _mpu6050,
-    "ina219": _ina219,
+    "mpu6050": _board("MPU-6050"),
+    "ina219": _board("INA219", Load("Vin+", BATTERY, "net"), Load("Vin-", MOTORS, "net")),
     "as5600": _as5600,
 }
-_ON_PINS: Final = ("encoder", "switch", "hcsr04")
-_ON_BUS: Final = ("mpu6050", "ina219", "as5600")
 
 
 # Tables
@@ -347,16 +306,12 @@ def pin_table(profile: Profile) -> str:
         return "None: everything is on a bus or a cable."
     rows = [f"| GPIO{pin} | {_POSITIONS[pin]} | {'; '.join(used[pin])} |" for pin in sorted(used)]
     head = ["| pin | position on the header | connection |", "|---|---|---|"]
-    grounds = f"Ground is position {_listed(_GROUNDS)}; 3.3 V are 1 and 17, 5 V are 2 and 4."
-    return "\n".join([*head, *rows]) + f"\n\n{grounds}"
+    *most, last = map(str, _GROUNDS)
+    grounds = f"Ground is position {', '.join(most)} or {last}"
+    return "\n".join([*head, *rows, "", f"{grounds}; 3.3 V are 1 and 17, 5 V are 2 and 4."])
 
 
-_GROUNDS: Final[tuple[int, ...]] = (6, 9, 14, 20, 25, 30, 34, 39)
-
-
-def _listed(numbers: Iterable[int]) -> str:
-    *most, last = map(str, numbers)
-    return f"{', '.join(most)} or {last}"
+_GROUNDS: Final = (6, 9, 14, 20, 25, 30, 34, 39)
 
 
 def part_list(profile: Profile) -> str:
@@ -370,9 +325,9 @@ def part_list(profile: Profile) -> str:
     if pulls:
         parts.append(("resistor 10 kOhm", pulls, "outputs are off until the guard runs"))
     for name, number, purpose in parts:
-        count, purposes = counts.get(name, (0, []))
-        more = [] if purpose in purposes else [purpose]
-        counts[name] = count + number, [*purposes, *more]
+        if number:
+            count, purposes = counts.get(name, (0, []))
+            counts[name] = count + number, list(dict.fromkeys([*purposes, purpose]))
     rows = [f"| {name} | {count} | {'; '.join(why)} |" for name, (count, why) in counts.items()]
     return "\n".join(["| part | number | for |", "|---|---|---|", *rows])
 
@@ -408,14 +363,22 @@ _COLOURS: Final = (
 
 @dataclass
 class _Drawing:
-    """Elements of an image, and how far down they reach."""
+    """Elements of an image, the colours of pins, and the places of wires that devices share."""
 
     elements: list[str] = field(default_factory=list[str])
     colours: dict[int, str] = field(default_factory=dict[int, str])
     shared: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
 
-    def add(self, element: str) -> None:
-        self.elements.append(element)
+    def add(self, tag: str, content: str = "", **attributes: float | str) -> None:
+        given = {"fill": "none", "stroke": "currentColor", "stroke-width": 1.5}
+        if tag == "text":
+            given = {}
+        given |= {name.replace("_", "-"): value for name, value in attributes.items()}
+        texts = (
+            f'{name}="{value if isinstance(value, str) else f"{value:g}"}"'
+            for name, value in given.items()
+        )
+        self.elements.append(f"<{tag} {' '.join(texts)}>{escape(content)}</{tag}>")
 
     def colour(self, pin: int) -> str:
         """Return the colour of a pin's wire."""
@@ -423,24 +386,19 @@ class _Drawing:
 
     def line(self, *points: tuple[float, float], colour: str = "currentColor") -> None:
         path = " ".join(f"{x:g},{y:g}" for x, y in points)
-        self.add(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"/>')
+        self.add("polyline", points=path, stroke=colour, stroke_width=2)
 
     def text(
         self, x: float, y: float, words: str, anchor: str = "start", bold: bool = False
     ) -> None:
-        weight = ' font-weight="bold"' if bold else ""
-        self.add(
-            f'<text x="{x:g}" y="{y + 4:g}" text-anchor="{anchor}"{weight}>{escape(words)}</text>'
-        )
+        weight = "bold" if bold else "normal"
+        self.add("text", words, x=x, y=y + 4, text_anchor=anchor, font_weight=weight)
 
     def dot(self, x: float, y: float, colour: str) -> None:
-        self.add(f'<circle cx="{x:g}" cy="{y:g}" r="3.5" fill="{colour}"/>')
+        self.add("circle", cx=x, cy=y, r=3.5, fill=colour, stroke="none")
 
-    def box(self, x: float, y: float, width: float, height: float) -> None:
-        self.add(
-            f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" rx="4" fill="none" '
-            'stroke="currentColor" stroke-width="1.5"/>'
-        )
+    def box(self, x: float, y: float, width: float, height: float, fill: str = "none") -> None:
+        self.add("rect", x=x, y=y, width=width, height=height, rx=4, fill=fill)
 
     def resistor(self, x: float, y: float, net: str, words: str) -> None:
         """Draw a resistor down from a wire to ground, or to the flag of a net."""
@@ -458,6 +416,9 @@ class _Drawing:
         for half, down in ((8, 0), (5, 4), (2, 8)):
             self.line((x - half, y + down), (x + half, y + down))
 
+    def bus_x(self, pin: int) -> float:
+        return _BUS_X + _BUS_PITCH * list(self.shared).index(pin)
+
 
 def draw_wiring(profile: Profile, name: str) -> str:
     """Return the wiring of a robot as an SVG element.
@@ -473,100 +434,76 @@ def draw_wiring(profile: Profile, name: str) -> str:
     y = float(_TOP)
     for device in devices:
         y = _draw_device(drawing, device, y) + _GAP
-    _draw_buses(drawing)
-    wires = any(isinstance(one.source, int) for device in devices for one in device.terminals)
-    bottom = max(y, _TOP + 24.0 * _HEADER_PITCH) if wires else y
-    if wires:
+    # Wires that several devices share lead from the first to the last one.
+    for pin, places in drawing.shared.items():
+        if len(places) > 1:
+            x, colour = drawing.bus_x(pin), drawing.colour(pin)
+            drawing.line((x, places[0]), (x, places[-1]), colour=colour)
+            for place in places[:-1]:
+                drawing.dot(x, place, colour)
+    if any(isinstance(one.source, int) for device in devices for one in device.terminals):
+        y = max(y, _TOP + 24.0 * _HEADER_PITCH)
         _draw_header(drawing)
-        drawing.box(_PI_X, _TOP - 26, _PI_WIDTH, bottom - _GAP - _TOP + 40)
+        drawing.box(_PI_X, _TOP - 26, _PI_WIDTH, y - _GAP - _TOP + 40)
         drawing.text(_PI_X + _PI_WIDTH / 2, _TOP - 10, "Raspberry Pi", "middle", bold=True)
     what = ", ".join(device.title for device in devices)
-    title = f"Wiring of {name}: a Raspberry Pi with {what}"
+    title = escape(f"Wiring of {name}: a Raspberry Pi with {what}")
     body = "\n".join(drawing.elements)
     return (
         f'<svg class="wiring" xmlns="http://www.w3.org/2000/svg" role="img" '
-        f'viewBox="0 0 {_WIDTH} {bottom:g}" font-family="sans-serif" font-size="13" '
-        f'fill="currentColor" aria-label="{escape(title)}">\n<title>{escape(title)}</title>\n'
-        f"{body}\n</svg>"
+        f'viewBox="0 0 {_WIDTH} {y:g}" font-family="sans-serif" font-size="13" '
+        f'fill="currentColor" aria-label="{title}">\n<title>{title}</title>\n{body}\n</svg>'
     )
 
 
 def _draw_device(drawing: _Drawing, device: Device, top: float) -> float:
     """Draw a device, and return its lower end."""
-    y = top + _TITLE if device.note else top + _TITLE - 18
-    first = y
+    first = top + _TITLE if device.note else top + _TITLE - 18
+    y = first
     for wire in device.terminals:
         _draw_wire(drawing, wire, y)
         y += _PULLED_ROW if wire.pull or wire.divider else _ROW
     loads = first
-    for number, load in enumerate(device.loads):
-        if load.kind == "chain" and number:
-            drawing.line((_LOAD_X + 20, loads - _LOAD_ROW + 12), (_LOAD_X + 20, loads - 12))
-            drawing.box(_LOAD_X, loads - 12, _LOAD_WIDTH, 24)
-            drawing.text(_LOAD_X + 8, loads, load.name)
-        else:
-            _draw_load(drawing, load, loads)
+    for load in device.loads:
+        hangs = load.kind == "chain" and loads > first
+        _draw_load(drawing, load, loads, _LOAD_ROW if hangs else 0)
         loads += _LOAD_ROW
     bottom = max(y, loads, first + _ROW) - _ROW / 2
     drawing.box(_BOX_X, top, _BOX_WIDTH, bottom - top)
     middle = _BOX_X + _BOX_WIDTH / 2
     drawing.text(middle, top + 12, device.title, "middle", bold=True)
-    if device.note:
-        drawing.text(middle, top + 28, device.note, "middle")
+    drawing.text(middle, top + 28, device.note, "middle")
     return bottom
 
 
 def _draw_wire(drawing: _Drawing, wire: Terminal, y: float) -> None:
     drawing.text(_BOX_X + 8, y, wire.label)
+    colour = "currentColor"
     if isinstance(wire.source, str):
         start = _PULL_X - 10 if wire.pull else _FLAG_X + 8
-        drawing.line((start, y), (_BOX_X, y))
-        if wire.pull:
-            drawing.dot(_PULL_X, y, "currentColor")
-            drawing.resistor(_PULL_X, y, wire.pull, "10 kΩ")
         if wire.source == GROUND:
             drawing.line((_FLAG_X + 8, y), (_FLAG_X + 8, y + 4))
             drawing.ground(_FLAG_X + 8, y + 4)
         else:
             drawing.text(start - 6, y, wire.source, "end")
-        return
-    pin, colour = wire.source, drawing.colour(wire.source)
-    start = _PI_EDGE
-    if wire.bus:
-        shared = drawing.shared.setdefault(pin, [])
-        start = _PI_EDGE if not shared else _bus_x(drawing, pin)
-        shared.append(y)
-    if start == _PI_EDGE:
-        drawing.text(_PI_EDGE - 8, y, f"GPIO{pin}  ({_POSITIONS[pin]})", "end")
+    else:
+        pin, colour = wire.source, drawing.colour(wire.source)
+        start = drawing.bus_x(pin) if pin in drawing.shared else _PI_EDGE
+        if wire.bus:
+            drawing.shared.setdefault(pin, []).append(y)
+        if start == _PI_EDGE:
+            drawing.text(_PI_EDGE - 8, y, f"GPIO{pin}  ({_POSITIONS[pin]})", "end")
     drawing.line((start, y), (_BOX_X, y), colour=colour)
-    if wire.pull:
+    if wire.pull or wire.divider:
         drawing.dot(_PULL_X, y, colour)
-        drawing.resistor(_PULL_X, y, wire.pull, "10 kΩ")
+        drawing.resistor(_PULL_X, y, wire.pull or GROUND, "10 kΩ" if wire.pull else "2 kΩ")
     if wire.divider:
-        drawing.dot(_PULL_X, y, colour)
-        drawing.resistor(_PULL_X, y, GROUND, "2 kΩ")
-        drawing.add(
-            f'<rect x="430" y="{y - 4:g}" width="22" height="8" '
-            'fill="var(--md-default-bg-color, white)" stroke="currentColor" stroke-width="1.5"/>'
-        )
+        drawing.box(430, y - 4, 22, 8, fill="var(--md-default-bg-color, white)")
         drawing.text(441, y - 12, "1 kΩ", "middle")
 
 
-def _bus_x(drawing: _Drawing, pin: int) -> float:
-    return _BUS_X + _BUS_PITCH * list(drawing.shared).index(pin)
-
-
-def _draw_buses(drawing: _Drawing) -> None:
-    """Draw the wires that several devices share from the first to the last one."""
-    for pin, places in drawing.shared.items():
-        if len(places) > 1:
-            x, colour = _bus_x(drawing, pin), drawing.colour(pin)
-            drawing.line((x, places[0]), (x, places[-1]), colour=colour)
-            for y in places[:-1]:
-                drawing.dot(x, y, colour)
-
-
-def _draw_load(drawing: _Drawing, load: Load, y: float) -> None:
+def _draw_load(drawing: _Drawing, load: Load, y: float, hangs: float) -> None:
+    """Draw a load, at the device or below another load that is `hangs` higher."""
     drawing.text(_BOX_EDGE - 8, y, load.label, "end")
     if load.kind == "net":
         drawing.line((_BOX_EDGE, y), (_BOX_EDGE + 22, y))
@@ -574,14 +511,14 @@ def _draw_load(drawing: _Drawing, load: Load, y: float) -> None:
     elif load.kind == "motor":
         for offset in (-5, 5):
             drawing.line((_BOX_EDGE, y + offset), (_LOAD_X + 2, y + offset))
-        drawing.add(
-            f'<circle cx="{_LOAD_X + 13:g}" cy="{y:g}" r="12" fill="none" '
-            'stroke="currentColor" stroke-width="1.5"/>'
-        )
+        drawing.add("circle", cx=_LOAD_X + 13, cy=y, r=12)
         drawing.text(_LOAD_X + 13, y, "M", "middle")
         drawing.text(_LOAD_X + 32, y, load.name)
     else:
-        drawing.line((_BOX_EDGE, y), (_LOAD_X, y))
+        if hangs:
+            drawing.line((_LOAD_X + 20, y - hangs + 12), (_LOAD_X + 20, y - 12))
+        else:
+            drawing.line((_BOX_EDGE, y), (_LOAD_X, y))
         drawing.box(_LOAD_X, y - 12, _LOAD_WIDTH, 24)
         drawing.text(_LOAD_X + 8, y, load.name)
 
@@ -589,13 +526,12 @@ def _draw_load(drawing: _Drawing, load: Load, y: float) -> None:
 def _draw_header(drawing: _Drawing) -> None:
     """Draw the header's 40 positions, with the used ones in the colours of their wires."""
     drawing.text(_HEADER_X + 8, _TOP - 10, "Header", "middle", bold=True)
-    rails: dict[int, str] = dict.fromkeys(_GROUNDS, "currentColor")
     for position in range(1, 41):
         row, right = divmod(position - 1, 2)
         x, y = _HEADER_X + 17 * right, _TOP + _HEADER_PITCH * (row + 0.6)
-        pin = BCM_OF_BOARD.get(position)
-        colour = rails.get(position) or drawing.colours.get(-1 if pin is None else pin, "none")
-        drawing.add(f'<circle cx="{x:g}" cy="{y:g}" r="6" fill="{colour}" stroke="currentColor"/>')
+        used = drawing.colours.get(BCM_OF_BOARD.get(position, _NO_PIN), "none")
+        colour = "currentColor" if position in _GROUNDS else used
+        drawing.add("circle", cx=x, cy=y, r=6, fill=colour, stroke_width=1)
         drawing.text(x + (12 if right else -12), y, str(position), "start" if right else "end")
     for number, words in enumerate(("filled: GND", "1, 17: 3.3 V", "2, 4: 5 V")):
         drawing.text(_HEADER_X + 8, _TOP + _HEADER_PITCH * (21 + number), words, "middle")

@@ -97,61 +97,6 @@ def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None
     assert done.stderr.count("\n") == 1
 
 
-def test_an_option_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["train", "Ant", "--set", "gamma=0.9", "--set", "n_epochs=5"])
-    assert stop.value.code == 2
-    assert capsys.readouterr().err == (
-        "error: --set is given twice: give it once, with all its values after it.\n"
-    )
-    with pytest.raises(SystemExit):
-        main(["robot", "serve", "car", "--policy", "a.onnx", "--policy=b.onnx"])
-    assert "one policy drives at a time" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "hint"),
-    [
-        (["polices"], "No command of `shapechanger` matches 'polices'. Did you mean 'policies'?"),
-        (["policies", "shw"], "`shapechanger policies` matches 'shw'. Did you mean 'show'?"),
-        (["robot", "safe-pin"], "Did you mean 'safe-pins'?"),
-    ],
-)
-def test_a_misspelt_command_has_a_nearest_spelling(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], hint: str
-) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    assert hint in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["train", "Car", "--teacher"], "error: --teacher needs a value after it"),
-        (["transfer", "Car", "Tank", "--target-lens"], "error: --target-lens needs a value"),
-        (["transfer", "Car", "Tank", "--arms", "--seeds", "1"], "error: --arms needs a value"),
-        (["robot", "serve", "car", "--twin", "--lens"], "error: --lens needs a value after it"),
-        (["train", "Car", "--teacher", "--seed", "1"], "error: --teacher needs a value after it"),
-        (["train", "Car", "--teachr", "x"], "matches '--teachr'. Did you mean '--teacher'?"),
-        (["demos", "cut", "x", "--frm", "4"], "Did you mean '--from'?"),
-        (["demos", "cut", "x", "--from", "4"], "error: There is no"),
-        (["robot", "camera", "--profile", "x"], "No option of `shapechanger robot camera` matches"),
-    ],
-)
-def test_an_option_that_is_unknown_or_lacks_its_value_is_one_sentence(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
-) -> None:
-    """The parser's own answer is a box."""
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
-
-
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
+from tests.cli.running import Cli
 
 LEARNER = "def build(envs, seed):\n    raise NotImplementedError\n"
 METHOD = """
@@ -45,6 +45,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+SUITE = "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\n"
+
+
 @pytest.mark.parametrize(
     ("module", "content", "arguments", "words"),
     [
@@ -60,38 +63,22 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             ["transfer", "Ant", "BigAnt", "--arms", "scratch", "my_method:reluctant"],
             "reluctant was asked.",
         ),
+        ("suite_method", METHOD, ["suite", "run", "mine.toml"], "reluctant was asked."),
         ("my_env", ENV, ["train", "my_env:Bare-v0"], "publishes no observation_layout"),
     ],
 )
 def test_a_module_of_the_current_folder_is_found(
-    module: str,
-    content: str,
-    arguments: list[str],
-    words: str,
-    folder: Path,
-    capsys: pytest.CaptureFixture[str],
+    module: str, content: str, arguments: list[str], words: str, folder: Path, cli: Cli
 ) -> None:
     """As the documentation of a user's own methods and learners promises."""
     (folder / f"{module}.py").write_text(content)
-    with pytest.raises(SystemExit):
-        main(arguments)
-    assert words in capsys.readouterr().err
+    (folder / "mine.toml").write_text(SUITE)
+    assert words in cli.refused(*arguments)
 
 
-def test_a_suite_finds_one_too(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "suite_method.py").write_text(METHOD)
-    (folder / "mine.toml").write_text(
-        "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\n"
-    )
-    with pytest.raises(SystemExit):
-        main(["suite", "run", "mine.toml"])
-    assert "reluctant was asked." in capsys.readouterr().err
-
-
-def test_names_of_ours_leave_the_path_alone(folder: Path) -> None:
+def test_names_of_ours_leave_the_path_alone(folder: Path, cli: Cli) -> None:
     """A module next to a policy cannot be imported by naming one of our learners."""
-    with pytest.raises(SystemExit):
-        main(["train", "Ant", "--learner", "ppo-run", "--steps", "10"])
+    cli.refused("train", "Ant", "--learner", "ppo-run", "--steps", "10")
     assert str(folder) not in sys.path
 
 
@@ -122,10 +109,7 @@ gym.register("Wall-v0", Wall)
 """
 
 
-def test_playing_says_why_an_episode_ended(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_playing_says_why_an_episode_ended(folder: Path, cli: Cli) -> None:
     (folder / "wall.py").write_text(WALL)
-    main(["play", "wall:Wall-v0", "--episodes", "2", "--out", "film.mp4"])
-    output = capsys.readouterr().out
+    output = cli.output("play", "wall:Wall-v0", "--episodes", "2", "--out", "film.mp4")
     assert "episode 1: return 1.0 in 1 steps: A wall was touched." in output

@@ -14,8 +14,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from shapechanger.cli import env_arguments, main
+from shapechanger.cli import main
 from shapechanger.cli import suite as suite_command
+from shapechanger.cli import transfer as transfer_command
 from shapechanger.envs.suite_file import SuiteFile
 from shapechanger.errors import FailedRuns
 from shapechanger.transfer.executor import Job, OnProgress, Serial
@@ -75,7 +76,7 @@ def _run(
         contextlib.redirect_stdout(output),
         contextlib.redirect_stderr(errors),
     ):
-        patch.setattr(env_arguments, "Processes", lambda workers: counting)
+        patch.setattr(transfer_command, "Processes", lambda workers: counting)
         patch.setattr(sys, "argv", ["shapechanger", *typed])
         try:
             main(typed)

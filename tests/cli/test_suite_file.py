@@ -7,17 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
 from shapechanger.envs.naming import driven, env_ref, short_name
 from shapechanger.envs.suite_file import load_suite, shipped_suites, suite_tasks
 from shapechanger.transfer.plan import TransferTask
+from tests.cli.running import Cli
 
 
-def test_an_unknown_suite_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["suite", "run", "vehicle"])
-    assert stop.value.code == 2
-    message = capsys.readouterr().err
+def test_an_unknown_suite_is_refused(cli: Cli) -> None:
+    message = cli.refused("suite", "run", "vehicle")
     assert "Did you mean 'vehicles'?" in message
     assert "lenses" in message
 
@@ -93,17 +90,12 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
     ],
 )
 def test_a_mistake_in_a_file_gives_one_sentence(
-    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, words: str, tmp_path: Path, cli: Cli
 ) -> None:
     """With line, alternatives and nearest spelling; nothing is run."""
     file = tmp_path / "mine.toml"
     file.write_text(text)
-    with pytest.raises(SystemExit) as stop:
-        main(["suite", "run", str(file), "--out", str(tmp_path / "out")])
-    message = capsys.readouterr().err
-    assert stop.value.code == 2
-    assert words in message
-    assert message.count("\n") == 1
+    assert words in cli.refused("suite", "run", file, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
 from shapechanger.errors import OutputError
 from shapechanger.policy import load_policy
 from shapechanger.reports import films
+from tests.cli.running import Cli
 from tests.envs.own_robots import DOG
 
 pytestmark = pytest.mark.system
@@ -155,14 +155,17 @@ def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
 
 
 @pytest.mark.gl
-@pytest.mark.parametrize("env", ["InvertedPendulum", "BigInvertedPendulum"])
 def test_a_policy_is_played_in_its_body_and_in_another(
-    trained: tuple[Path, str], env: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    trained: tuple[Path, str], tmp_path: Path, cli: Cli
 ) -> None:
+    """Without a policy, the actions are random."""
     film = tmp_path / "film.mp4"
-    main(["play", env, "--policy", str(trained[0]), "--max-steps", "5", "--out", str(film)])
-    assert "episode 0: return" in capsys.readouterr().out
-    assert film.stat().st_size > 0
+    policy = ("--policy", trained[0])
+    for words in (("InvertedPendulum", *policy), ("BigInvertedPendulum", *policy), ("Ant",)):
+        printed = cli.output("play", *words, "--max-steps", "5", "--out", film)
+        assert "episode 0: return" in printed
+        assert film.stat().st_size > 0
+        film.unlink()
 
 
 @pytest.mark.slow
@@ -190,97 +193,6 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.count("error: Cannot write") == 1
     assert "ended" not in done.stderr
-
-
-@pytest.mark.gl
-def test_play_writes_a_film_without_a_display(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    film = tmp_path / "ant.mp4"
-    main(["play", "Ant", "--max-steps", "5", "--out", str(film)])
-    assert film.stat().st_size > 0
-    assert "episode 0: return" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["train", "Ant", "--learner", "ppo-rum"], "Did you mean 'ppo-run'?"),
-        (["train", "Ant", "--steps", "10"], "smaller than one evaluation"),
-        (["transfer", "Ant", "BigAmt"], "Did you mean 'BigAnt'?"),
-        (["transfer", "Ant", "ExtendedAnt", "--rule", "foot_1"], "NAME=RULE"),
-        (["transfer", "Ant", "ExtendedAnt", "--map", "none.toml"], "cannot be read"),
-        (["transfer", "Ant", "BigAnt", "--workers", "0"], "at least one worker"),
-        (["transfer", "Ant", "BigAnt", "--arms", "scratch", "identified"], "can adapt the source"),
-        (["transfer", "Ant", "BigAnt", "--set", "learning_rat=1"], "'learning_rate'"),
-        (["train", "Ant", "--set", "learning_rate"], "NAME=VALUE"),
-        (["train", "Ant", "--set", "n_envs='a'"], "n_envs"),
-        (["train", "Ant", "--set", "gamma=0.9", "gamma=0.8"], "more than once"),
-        (["train", "Ant", "--learner", "cloning"], "Ant-v1 has no camera and no demonstrator"),
-        (["transfer", "Finger", "Finger", "--target-options", "{"], "must be JSON"),
-        (
-            ["play", "Ant", "--policy", "none.safetensors"],
-            "There is no policy file none.safetensors",
-        ),
-        (["play", "Ant", "--policy", "referense"], "did you mean reference?"),
-        (["play", "Ant", "--episodes", "0"], "at least one episode"),
-        (["play", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
-        (["train", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
-        (["transfer", "Ant", "BigAnt", "--seed", "-1"], "A seed is a whole number from 0"),
-        (["transfer", "Ant", "BigAnt", "--map", "m", "--rule", "a=b"], "leave out --rule"),
-        (["transfer", "Ant", "BigAnt", "--map", "m", "--units", "torque"], "leave out --rule"),
-        (
-            ["transfer", "Ant", "BigAnt", "--arms", "scratch", "fine-tune", "fine-tune"],
-            "--arms names fine-tune more than once",
-        ),
-        (["train", "Car", "--tensorboard", "logs"], "leave out --tensorboard"),
-        (["train", "Ant", "--out", "."], "Cannot write .: it is a folder"),
-        (["play", "Ant", "--out", "."], "Cannot write .: it is a folder"),
-        (["play", "Ant", "--out", "film.txt"], "a film ends with one of .avi"),
-    ],
-)
-def test_mistakes_give_one_sentence(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Exit code 2, no traceback, and no file is written."""
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    message = capsys.readouterr().err
-    assert stop.value.code == 2
-    assert words in message
-    assert message.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["train", "Ant", "--tensorboard", "file"],
-        ["train", "Ant", "--out", "file/policy.safetensors"],
-        ["play", "Ant", "--out", "file/film.mp4"],
-    ],
-)
-def test_a_file_where_a_folder_should_be_is_refused_before_the_work(
-    arguments: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "file").touch()
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    captured = capsys.readouterr()
-    assert stop.value.code == 2
-    assert captured.err.startswith("error: Cannot write to file")
-    assert captured.err.count("\n") == 1
-    assert captured.out == ""
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_only_the_first_line_of_an_encoder_error_is_shown(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
+from tests.cli.running import Cli
 from tests.transfer.own_robot import (
     METHOD,
     TASK,
@@ -50,50 +50,36 @@ def folder(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 _POLICY = "suite/a-to-b/runs/scratch-0/policy.safetensors"
 
 
-def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(folder: Path, cli: Cli) -> None:
     """The task is found as `train` finds it; an edited robot or task is refused and named."""
-    main(["policies", "evaluate", _POLICY, "--episodes", "1"])
-    assert "return" in capsys.readouterr().out
-    main(["policies", "show", _POLICY])
-    assert "cliown_task.py" in capsys.readouterr().out
+    evaluate = ("policies", "evaluate", _POLICY, "--episodes", "1")
+    assert "return" in cli.output(*evaluate)
+    assert "cliown_task.py" in cli.output("policies", "show", _POLICY)
     for file, content, words in (
         ("b.xml", XML.format(0.5), "its model has changed from"),
         ("cliown_goal.py", "HEIGHT = 0.7\n", "cliown_goal.py has changed from"),
     ):
         was = (folder / file).read_text()
         (folder / file).write_text(content)
-        for command in (["evaluate"], ["play", "--out", "film.mp4"]):
-            with pytest.raises(SystemExit) as ended:
-                main(["policies", command[0], _POLICY, *command[1:]])
-            assert ended.value.code != 0
-            told = " ".join(capsys.readouterr().err.split())
+        for command, *more in (("evaluate",), ("play", "--out", "film.mp4")):
+            told = " ".join(cli.refused("policies", command, _POLICY, *more).split())
             assert words in told
             assert "give the present one with --env" in told
-        main(
-            ["policies", "evaluate", _POLICY, "--episodes", "1", "--env", "b.xml@cliown_task:Hold"]
-        )
+        cli.output(*evaluate, "--env", "b.xml@cliown_task:Hold")
         (folder / file).write_text(was)
-    main(["policies", "evaluate", _POLICY, "--episodes", "1"])
+    cli.output(*evaluate)
 
 
 def test_a_suite_is_watched_with_own_methods(
-    folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     """From elsewhere the message says where to go, and to delete nothing."""
-    main(["suite", "watch", "suite"])
-    assert "a-to-b" in capsys.readouterr().out
+    assert "a-to-b" in cli.output("suite", "watch", "suite")
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(folder)])
     monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
     forget("cliown")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit):
-        main(["suite", "watch", str(folder / "suite")])
-    told = " ".join(capsys.readouterr().err.split())
+    told = " ".join(cli.refused("suite", "watch", folder / "suite").split())
     assert "go to the folder that the study was started in" in told
     assert "delete" not in told
 

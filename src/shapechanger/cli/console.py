@@ -49,12 +49,7 @@ _ENOUGH_TO_TELL: Final = 0.05
 
 
 class StudyProgress:
-    """Progress of several runs, measured in steps.
-
-    Args:
-        steps: Number of steps of each run, keyed by its name, at least 1.
-        console: The console; None for standard error.
-    """
+    """Progress of several runs, from the steps of each, on a console or on standard error."""
 
     def __init__(self, steps: dict[str, int], console: Console | None = None) -> None:
         self._steps = steps
@@ -78,7 +73,6 @@ class StudyProgress:
             self._task = self._bar.add_task("env steps", total=sum(steps.values()))
 
     def __enter__(self) -> Self:
-        """Start the display."""
         if self._bar is not None:
             self._bar.start()
         return self
@@ -89,7 +83,9 @@ class StudyProgress:
             self._bar.stop()
 
     def __call__(self, run: str, steps: int, ended: bool) -> None:
-        """Report that `run` has done `steps` steps."""
+        """Report that `run` has done `steps` steps; one that has ended does no more."""
+        if run in self._ended:
+            return
         self._done[run] = self._steps[run] if ended else min(steps, self._steps[run])
         if ended:
             self._ended.add(run)

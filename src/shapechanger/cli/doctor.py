@@ -38,7 +38,7 @@ print(f"{width} x {height} with {os.environ.get('MUJOCO_GL', 'glfw')}")
 
 
 @dataclass(frozen=True)
-class ExamineMachine:
+class Doctor:
     """Say what works on this machine, and how to mend what does not.
 
     `shapechanger robot check PROFILE` checks a robot.
@@ -86,7 +86,6 @@ def examine_machine(
 
 
 def _machine() -> Results:
-    """Yield the versions and the size of the machine."""
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
     yield (
         "good",
@@ -144,7 +143,6 @@ def _drawing() -> Results:
 
 
 def _films() -> Results:
-    """Yield whether films can be encoded."""
     ffmpeg: Any = importlib.import_module("imageio_ffmpeg")
     try:
         yield "good", f"Encoded by {ffmpeg.get_ffmpeg_exe()}."
@@ -153,7 +151,6 @@ def _films() -> Results:
 
 
 def _torch() -> Results:
-    """Report PyTorch's device."""
     import torch
 
     where = f"{torch.get_num_threads()} threads of the CPU"
@@ -163,7 +160,6 @@ def _torch() -> Results:
 
 
 def _warp() -> Results:
-    """Report the devices available to Warp."""
     warp: Any = importlib.import_module("shapechanger.envs.warp.devices").wp
     if devices := [device.name for device in warp.get_cuda_devices()]:
         yield "good", f"Steps on {', '.join(devices)}."
@@ -172,7 +168,6 @@ def _warp() -> Results:
 
 
 def _ray() -> Results:
-    """Yield whether Ray can be imported."""
     try:
         ray: Any = importlib.import_module("ray")
     except ImportError as error:

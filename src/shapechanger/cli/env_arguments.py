@@ -1,4 +1,4 @@
-"""Parsing of env ids, bodies, options and seeds."""
+"""Options that commands share: envs, bodies, policies and learners."""
 
 from __future__ import annotations
 
@@ -6,32 +6,23 @@ import json
 import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Annotated, Any, Final, cast
 
 import gymnasium as gym
 import tyro
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import CATALOGUE
-from shapechanger.envs.naming import allow_own_modules
-from shapechanger.errors import (
-    MorphologyError,
-    StudyError,
-    check_seed,
-    no_policy_file,
-)
-from shapechanger.transfer.executor import Executor, Processes
+from shapechanger.envs.naming import allow_own_modules, driven, env_ref
+from shapechanger.errors import MorphologyError, StudyError, no_policy_file
 from shapechanger.transfer.references import reference_policy
 
 EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
 """Argument: the id of an env."""
 Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, or edits as JSON.")]
 """Option: the body of an env."""
-EnvOptions = Annotated[
-    str, tyro.conf.arg(help="More arguments of the env as JSON, such as '{\"frame_skip\": 4}'.")
-]
-"""Option: more arguments of an env."""
 OwnLearner = Annotated[
     str,
     tyro.conf.arg(
@@ -40,19 +31,21 @@ OwnLearner = Annotated[
     ),
 ]
 """Option: the algorithm that a policy's file names."""
-ExecutorKind = Annotated[
-    Literal["processes", "ray"],
-    tyro.conf.arg(help="Where runs run: in processes of this machine, or on a Ray cluster."),
-]
-"""Option: what runs the jobs of a study."""
-ClusterAddress = Annotated[
-    str | None,
+Learner = Annotated[
+    str,
     tyro.conf.arg(
-        help="Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not "
-        "given."
+        help="Name of the learner's settings, a TOML file of them, or your class or function as "
+        "module:name; by default the settings tuned for the env, or for the target."
     ),
 ]
-"""Option: the Ray cluster of a study."""
+"""Option: what learns."""
+Settings = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        help="Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."
+    ),
+]
+"""Option: settings of what learns."""
 _REFERENCE: Final = "reference"
 
 
@@ -90,24 +83,52 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
     return cast("dict[str, Any]", options)
 
 
-def executor_of(kind: str, workers: int | None, address: str | None) -> Executor:
-    """Return the executor of a study's jobs.
+@dataclass(frozen=True, kw_only=True)
+class OneEnv:
+    """Options of a command for one env."""
 
-    Args:
-        kind: "processes" or "ray".
-        workers: Number of processes; None for one per core.
-        address: Address of the Ray cluster; None to start Ray on this machine.
-    """
-    if kind == "ray":
-        if workers is not None:
-            raise StudyError("Ray runs one run on each core of its nodes: leave out --workers.")
-        from shapechanger.transfer.ray_executor import RayCluster  # An extra.
+    env: EnvId
+    """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
+    body: Body = ""
+    options: str = ""
+    """More arguments of the env as JSON, such as '{"frame_skip": 4}'."""
 
-        return RayCluster(address)
-    if address is not None:
-        raise StudyError("--address names a Ray cluster: give --executor ray, too.")
+    @property
+    def ref(self) -> EnvRef:
+        """The env with its body and further arguments."""
+        return env_ref(self.env, self.body).having(options_of(self.options, "--options"))
 
-    return Processes(workers)
+
+@dataclass(frozen=True, kw_only=True)
+class TwoEnvs:
+    """Options of a command that goes from one env to another."""
+
+    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
+    """Id of the env to come from, in which a policy is learned, such as Ant."""
+    target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
+    """Id of the env to go to, such as ExtendedAnt."""
+    source_body: str = ""
+    """Another body of the source's family: its name, or edits as JSON."""
+    target_body: str = ""
+    """Another body of the target's family: its name, or edits as JSON."""
+    source_options: str = ""
+    """More arguments of the source as JSON, such as '{"actions": "length"}'."""
+    target_options: str = ""
+    """The same of the target, such as '{"gap": "real-like"}' for a finger."""
+
+    def refs(self, *, studied: bool = False, lenses: Sequence[str] = ()) -> tuple[EnvRef, EnvRef]:
+        """Return source and target with their bodies and options.
+
+        In a study, vehicles are reset after a collision, and the target's camera may have lenses.
+        """
+        source = env_ref(self.source, self.source_body)
+        target = env_ref(self.target, self.target_body)
+        if studied:
+            source, target = driven(source), driven(target, lenses)
+        return (
+            source.having(options_of(self.source_options, "--source-options")),
+            target.having(options_of(self.target_options, "--target-options")),
+        )
 
 
 def policy_file(given: Path, env: EnvRef) -> Path:
@@ -138,8 +159,3 @@ def settings_of(given: Sequence[str]) -> dict[str, Any]:
             raise StudyError(f"--set names {name} more than once.")
         settings[name] = parsed["value"]
     return settings
-
-
-def require_seed(seed: int) -> None:
-    """Refuse a seed that a random generator does not accept."""
-    check_seed(seed, StudyError)

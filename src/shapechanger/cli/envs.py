@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Any, cast
 
-import tyro
 from rich.table import Table
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, print_table, say
-from shapechanger.cli.env_arguments import Body, EnvId, EnvOptions, asked, opened, options_of
-from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.cli.env_arguments import OneEnv, TwoEnvs, asked, opened
+from shapechanger.contract.env_ref import layouts_of
 from shapechanger.contract.testing import examine
 from shapechanger.envs.catalogue import (
     CATALOGUE,
@@ -23,33 +22,36 @@ from shapechanger.envs.catalogue import (
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
 )
-from shapechanger.envs.naming import env_ref
 from shapechanger.layout import Layout
 from shapechanger.reports.films import write_picture
 
 
+def summaries() -> dict[str, str]:
+    """Return a line on each env, keyed by id."""
+    vehicles = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
+    return {
+        **{entry.id: entry.summary for entry in CATALOGUE.values()},
+        **{env_id: f"{vehicle}: {summary}" for env_id, (vehicle, summary) in vehicles.items()},
+        **{env_id: task.summary for env_id, task in FINGER_ENVS.items()},
+    }
+
+
 @dataclass(frozen=True)
-class ListEnvs:
+class List:
     """List all envs."""
 
     odrl: bool = False
     """List the bodies of ODRL one by one, instead of in one row."""
 
     def run(self) -> None:
-        """Print a table of the catalogue."""
         table = Table("id", "body", box=None, pad_edge=False)
         if self.odrl:
             for entry in ODRL_ENVS.values():
                 table.add_row(entry.id, entry.family)
             print_table(table)
             return
-        for entry in CATALOGUE.values():
-            table.add_row(entry.id, entry.summary)
-        vehicles = (VEHICLE_ENVS, RANGES_ENVS, WAYPOINT_ENVS)
-        for env_id, (vehicle, summary) in (one for envs in vehicles for one in envs.items()):
-            table.add_row(env_id, f"{vehicle}: {summary}")
-        for env_id, task in FINGER_ENVS.items():
-            table.add_row(env_id, task.summary)
+        for env_id, summary in summaries().items():
+            table.add_row(env_id, summary)
         table.add_row(OWN_ROBOT, "your MJCF or URDF file: give FILE or FILE@TASK as ENV")
         robots = len({entry.family for entry in ODRL_ENVS.values()})
         targets = len(ODRL_ENVS) - robots
@@ -60,18 +62,12 @@ class ListEnvs:
         print_table(table)
 
 
-@dataclass(frozen=True)
-class ShowEnv:
+@dataclass(frozen=True, kw_only=True)
+class Show(OneEnv):
     """Show the name, unit and range of each number of an env's observation and action."""
 
-    env: EnvId
-    """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
-    body: Body = ""
-    options: EnvOptions = ""
-
     def run(self) -> None:
-        """Print both layouts and the properties of the body."""
-        with opened(_env(self.env, self.body, self.options)) as env:
+        with opened(self.ref) as env:
             observation, action = layouts_of(env)
             print_table(_layout_table("action", action))
             print_table(_layout_table("observation", observation))
@@ -81,76 +77,41 @@ class ShowEnv:
                     say(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
 
 
-@dataclass(frozen=True)
-class Compare:
+@dataclass(frozen=True, kw_only=True)
+class Compare(TwoEnvs):
     """Compare two envs: what the shift from one to the other changes."""
 
-    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
-    """Id of the env to come from."""
-    target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
-    """Id of the env to go to."""
-    source_body: str = ""
-    """Another body of the source's family: its name, or edits as JSON."""
-    target_body: str = ""
-    """Another body of the target's family: its name, or edits as JSON."""
-    source_options: str = ""
-    """More arguments of the source as JSON, such as '{"frame_skip": 4}'."""
-    target_options: str = ""
-    """The same of the target."""
-
     def run(self) -> None:
-        """Print the certificate of the shift."""
-        with (
-            opened(_env(self.source, self.source_body, self.source_options)) as source,
-            opened(_env(self.target, self.target_body, self.target_options)) as target,
-        ):
+        from_, to = self.refs()
+        with opened(from_) as source, opened(to) as target:
             asked(target, "certify_shift")
-            certificate = asked(source, "certify_shift")(source, target)
-            say(str(certificate))
+            say(str(asked(source, "certify_shift")(source, target)))
 
 
-@dataclass(frozen=True)
-class CheckEnv:
+@dataclass(frozen=True, kw_only=True)
+class Check(OneEnv):
     """Check that an env satisfies the contract that learners rely on."""
 
-    env: EnvId
-    """Id of the env."""
-    body: Body = ""
-    options: EnvOptions = ""
-
     def run(self) -> None:
-        """Run the exam on the env."""
-        ref = _env(self.env, self.body, self.options)
-        for question in examine(ref.make):
+        for question in examine(self.ref.make):
             plain_console().print(Text.assemble(("kept", "green"), f"  {question}"))
 
 
-@dataclass(frozen=True)
-class Render:
+@dataclass(frozen=True, kw_only=True)
+class Render(OneEnv):
     """Render an env's body in its start pose."""
 
-    env: EnvId
-    """Id of the env."""
     out: Path
     """The image to write, a PNG file."""
-    body: Body = ""
-    options: EnvOptions = ""
     width: int = 640
     """Width of the image in pixels."""
     height: int = 480
     """Height of the image in pixels."""
 
     def run(self) -> None:
-        """Write the image."""
-        with opened(_env(self.env, self.body, self.options)) as env:
-            picture = asked(env, "picture")(self.width, self.height)
-            write_picture(picture, self.out)
+        with opened(self.ref) as env:
+            write_picture(asked(env, "picture")(self.width, self.height), self.out)
         say(f"wrote {self.out}")
-
-
-def _env(env_id: str, body: str, options: str) -> EnvRef:
-    """Return an env with a body and more arguments."""
-    return env_ref(env_id, body).having(options_of(options, "--options"))
 
 
 def _layout_table(side: str, layout: Layout) -> Table:

@@ -12,11 +12,11 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
-from shapechanger.cli.env_arguments import EnvId, options_of, require_seed
+from shapechanger.cli.env_arguments import EnvId, options_of
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.episodes.files import read_file
 from shapechanger.envs.naming import env_ref
-from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.errors import FingerError, OutputError, StudyError, UnknownName, check_seed
 from shapechanger.files import require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.export import finger_mjcf
@@ -37,7 +37,6 @@ from shapechanger.finger.tensions import drive_of
 
 if TYPE_CHECKING:
     from shapechanger.finger.identify import IdentifiedFinger
-    from shapechanger.finger.parameters import FingerParameters
 
 # Largest file of parameters, which have some kilobytes.
 _MOST_BYTES: Final = 1 << 20
@@ -59,7 +58,6 @@ class Identify:
     them. A log that `record` has written of a rig says it by itself."""
 
     def run(self) -> None:
-        """Print the parameters, and write them and the report."""
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
         for path in files:
@@ -105,7 +103,7 @@ def _table(found: IdentifiedFinger) -> Table:
 
 
 @dataclass(frozen=True)
-class RecordFinger:
+class Record:
     """Excite all joints of a finger and log the motion."""
 
     env: EnvId
@@ -127,9 +125,8 @@ class RecordFinger:
     """More arguments of the env as JSON, such as '{"robot": "my-finger"}'."""
 
     def run(self) -> None:
-        """Record and print a summary."""
-        require_seed(self.seed)
-        require_seed(self.finger_seed)
+        for seed in (self.seed, self.finger_seed):
+            check_seed(seed, StudyError)
         if not 0.0 < self.seconds < float("inf"):
             raise FingerError(f"--seconds is more than 0, got {self.seconds}.")
         require_file(self.out)
@@ -155,7 +152,7 @@ class RecordFinger:
 
 
 @dataclass(frozen=True)
-class ExportFinger:
+class Export:
     """Export a finger as MJCF, which MuJoCo loads without Shapechanger."""
 
     out: Path
@@ -171,10 +168,9 @@ class ExportFinger:
     """Seed of the finger drawn from the gap."""
 
     def run(self) -> None:
-        """Write the file."""
         import numpy as np
 
-        require_seed(self.finger_seed)
+        check_seed(self.finger_seed, StudyError)
         require_file(self.out)
         if self.gap and self.parameters:
             raise FingerError("Give either --parameters or --gap, not both.")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Final, NoReturn, Union, get_args, get_type_hints
+from typing import Annotated, Any, Final, NoReturn, Union, get_args, get_origin, get_type_hints
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError, UnknownName
 
@@ -38,116 +38,74 @@ except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
 
 @dataclass(frozen=True)
 class Group:
-    """Commands with the same first word.
-
-    Attributes:
-        summary: One line for the help.
-        commands: Module and class of each command, keyed by name.
-    """
+    """Commands with the same first word: a line for the help, and module and class of each."""
 
     summary: str
     commands: Mapping[str, str | Group]
 
 
-_GROUPS: Final[Mapping[str, str | Group]] = {
-    "envs": Group(
-        "Look at the envs: list, show, compare, check, render.",
-        {
-            "list": "envs:ListEnvs",
-            "show": "envs:ShowEnv",
-            "compare": "envs:Compare",
-            "check": "envs:CheckEnv",
-            "render": "envs:Render",
-        },
-    ),
-    "train": "train:Train",
-    "play": "play:Play",
-    "transfer": "transfer:Transfer",
-    "suite": Group(
-        "Run, watch and merge suites: many studies with one page.",
-        {
-            "run": "suite:RunSuite",
-            "watch": "suite:WatchSuite",
-            "merge": "suite:MergeSuites",
-            "list": "suite:ListSuites",
-        },
-    ),
-    "methods": "transfer:Methods",
-    "policies": Group(
-        "List, inspect, watch, evaluate, export, convert and share policies.",
-        {
-            "list": "policies:ListPolicies",
-            "show": "policies:Show",
-            "play": "policies:PlayPolicy",
-            "evaluate": "policies:EvaluatePolicy",
-            "export": "policies:ExportPolicy",
-            "convert": "policies:Convert",
-            "push": "hub:PushPolicy",
-            "pull": "hub:PullPolicy",
-        },
-    ),
-    "robot": Group(
-        "Set up, serve, find, drive and test robots.",
-        {
-            "init": "robot.setup:Init",
-            "install": "robot.setup:Install",
-            "check": "robot.check:CheckRobot",
-            "calibrate": "robot.calibrate:Calibrate",
-            "camera": "robot.camera:CameraView",
-            "home": "robot.setup:Home",
-            "serve": "robot.serve:Serve",
-            "key": "robot.key:Key",
-            "find": "robot.remote:Find",
-            "remember": "robot.remote:Remember",
-            "forget": "robot.remote:Forget",
-            "drive": "robot.drive:Drive",
-            "fetch": "robot.remote:FetchEpisodes",
-            "stop": "robot.remote:Stop",
-            "safe-pins": "robot.setup:SafePins",
-        },
-    ),
-    "demos": Group(
-        "Record, inspect, edit and share demonstrations, and learn from them.",
-        {
-            "record": "demos.record:RecordDemonstrations",
-            "list": "demos.recordings:ListEpisodes",
-            "show": "demos.recordings:ShowEpisodes",
-            "cut": "demos.recordings:CutEpisode",
-            "bad": "demos.recordings:Bad",
-            "good": "demos.recordings:Good",
-            "mark": "demos.recordings:MarkStep",
-            "merge": "demos.recordings:Merge",
-            "repair": "demos.recordings:RepairEpisodes",
-            "replay": "demos.replay:Replay",
-            "import": "demos.recordings:Import",
-            "export": "demos.recordings:Export",
-            "push": "hub:PushDemonstrations",
-            "pull": "hub:PullDemonstrations",
-            "train": "demos.train:TrainClone",
-            "evaluate": "demos.train:Evaluate",
-        },
-    ),
-    "finger": Group(
-        "Record, identify and export a finger.",
-        {
-            "record": "finger:RecordFinger",
-            "identify": "finger:Identify",
-            "export": "finger:ExportFinger",
-        },
-    ),
-    "doctor": "doctor:ExamineMachine",
-}
+def _group(summary: str, modules: Mapping[str, Sequence[str]]) -> Group:
+    """Return a group from the names of commands in each module, whose classes have these names."""
+    places = {
+        name: f"{module}:{name.title().replace('-', '')}"
+        for module, names in modules.items()
+        for name in names
+    }
+    return Group(summary, places)
+
 
 COMMANDS: Final = Group(
     "Learn a skill in one body, move it to another, and measure the gain. Begin with "
     "`shapechanger doctor`, then `shapechanger transfer InvertedPendulum BigInvertedPendulum "
     "--quick`; each command has --help.",
-    _GROUPS,
+    {
+        "envs": _group(
+            "Look at the envs: list, show, compare, check, render.",
+            {"envs": ("list", "show", "compare", "check", "render")},
+        ),
+        "train": "train:Train",
+        "play": "play:Play",
+        "transfer": "transfer:Transfer",
+        "suite": _group(
+            "Run, watch and merge suites: many studies with one page.",
+            {"suite": ("run", "watch", "merge", "list")},
+        ),
+        "methods": "transfer:Methods",
+        "policies": _group(
+            "List, inspect, watch, evaluate, export, convert and share policies.",
+            {"policies": ("list", "show", "play", "evaluate", "export", "convert", "push", "pull")},
+        ),
+        "robot": _group(
+            "Set up, serve, find, drive and test robots.",
+            {
+                "robot.setup": ("init", "install", "key", "home", "safe-pins"),
+                "robot.check": ("check",),
+                "robot.calibrate": ("calibrate",),
+                "robot.camera": ("camera",),
+                "robot.serve": ("serve",),
+                "robot.remote": ("find", "remember", "forget", "fetch", "stop"),
+                "robot.drive": ("drive",),
+            },
+        ),
+        "demos": _group(
+            "Record, inspect, edit and share demonstrations, and learn from them.",
+            {
+                "demos.record": ("record", "replay"),
+                "demos.recordings": (
+                    *("list", "show", "cut", "bad", "good", "mark", "merge", "repair"),
+                    *("import", "export", "push", "pull"),
+                ),
+                "demos.train": ("train", "evaluate"),
+            },
+        ),
+        "finger": _group(
+            "Record, identify and export a finger.",
+            {"finger": ("record", "identify", "export")},
+        ),
+        "doctor": "doctor:Doctor",
+    },
 )
 """Module and class of each command in this package, so that only the given one is imported."""
-
-# Options that take several values.
-_SEVERAL: Final = ("--set", "--rule", "--arms", "--only")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -202,7 +160,6 @@ def parse(arguments: Sequence[str]) -> Any:
         kind, description = kind[tuple(described)], command.summary
     else:
         _require_options(rest, prog, command)
-        _require_single(rest)
         kind, description = command, None
     config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone)
     return tyro.cli(kind, prog=prog, description=description, args=rest, config=config)
@@ -257,10 +214,15 @@ def options_of(kind: type) -> dict[str, Any]:
 
 
 def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
-    """Raise an error of one sentence for an option that no parser can read."""
+    """Raise an error of one sentence for an option that no parser can read.
+
+    Nor may an option of several values, or a policy, be given twice: the first one would be dropped
+    without a word. For other options the last one counts.
+    """
     named = options_of(kind)
     flags = [name for name, hint in named.items() if hint is bool]
     options = [*named, *(name.replace("--", "--no-", 1) for name in flags), "--help"]
+    seen: set[str] = set()
     for word, value in itertools.pairwise([*arguments, "--"]):
         if not word.startswith("--"):
             continue
@@ -269,25 +231,15 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         if option not in options:
             raise UnknownName(f"option of `{said}`", given, sorted(options))
         # Without a value, one of several values would mean its default.
-        takes = option in named and option not in flags
-        if takes and not equals and value.startswith("--"):
+        if option in named and option not in flags and not equals and value.startswith("--"):
             raise StudyError(f"{given} needs a value after it: see `{said} --help`.")
-
-
-def _require_single(arguments: Sequence[str]) -> None:
-    """Raise StudyError for an option of several values, or a policy, that is given twice.
-
-    The first one would be dropped without a word. For other options the last one counts.
-    """
-    options = [word.partition("=")[0] for word in arguments]
-    for name in _SEVERAL:
-        if options.count(name) > 1:
-            raise StudyError(f"{name} is given twice: give it once, with all its values after it.")
-    if options.count("--policy") > 1:
-        raise StudyError("--policy is given twice, and one policy drives at a time: give it once.")
+        if option in seen and get_origin(named.get(option)) is tuple:
+            raise StudyError(f"{given} is given twice: give it once, with all its values after it.")
+        if option in seen and option == "--policy":
+            raise StudyError("--policy is given twice, and one policy drives at a time.")
+        seen.add(option)
 
 
 def _stop(message: str, code: int) -> NoReturn:
-    """Print a message and exit."""
     plain_console(stderr=True).print(message, soft_wrap=True)
     sys.exit(code)

@@ -1,8 +1,9 @@
-"""`shapechanger policies`: list, show, play, evaluate, export, convert and share policies."""
+"""`shapechanger policies`: list, show, play, evaluate, export, convert, push and pull policies."""
 
 from __future__ import annotations
 
 import math
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -11,18 +12,21 @@ import msgspec
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.acting import acting_in, load_any_policy
+from shapechanger import hub
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
-from shapechanger.cli.play import Watching
+from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
+from shapechanger.cli.play import Watching, acting_in, load_any_policy
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.demos.cloning.onnx_policy import export_clone
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.envs.naming import allow_own_modules, driven, env_ref
-from shapechanger.errors import ShapechangerError, StudyError
+from shapechanger.errors import HubError, ShapechangerError, StudyError
+from shapechanger.files import require_file, write_atomic
 from shapechanger.identity import identify_env
+from shapechanger.layout import Layout
 from shapechanger.own_modules import texts_in
-from shapechanger.policy import kind_of
+from shapechanger.policy import kind_of, load_policy
 from shapechanger.transfer.identities import ENV, known, single_body
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import load_references
@@ -30,34 +34,71 @@ from shapechanger.vehicles.expert import PERIOD_S
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
-    from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
-    from shapechanger.transfer.onnx_policy import OnnxCard
 
 _FILE_WIDTH: Final = 160
 
 
-@dataclass(frozen=True)
-class Show:
-    """Print where a policy comes from, and what it senses and does."""
+@dataclass(frozen=True, kw_only=True)
+class _OfPolicy:
+    """Options of a command for one policy."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A policy, such as results/policies/Ant-v1.safetensors."""
+    """A policy, such as results/policies/Ant-v1.safetensors, a clone, or one exported as ONNX."""
     learner: OwnLearner = ""
 
+
+@dataclass(frozen=True, kw_only=True)
+class _InEnv(_OfPolicy):
+    """Options of a command for a policy in an env."""
+
+    env: str = ""
+    """Id of another env, if it acts through the body map of same names; by default the one of its
+    training."""
+    body: Body = ""
+
+    def ref(self) -> EnvRef:
+        """Return the env that is named, else the one in which the policy was trained."""
+        if self.env:
+            return driven(env_ref(self.env, self.body))
+        card: Any = load_any_policy(self.file, self.learner).card
+        env = card.data.get("env") if is_clone(card) else card.env
+        if env is None:
+            raise StudyError(f"{self.file} learned from recordings of no env: name one with --env.")
+        # A policy of many bodies is seen in the family's own.
+        trained_in = single_body(env_ref(env) if isinstance(env, str) else env)
+        # The env of a policy may be of the user's own, or have a task that is.
+        allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
+        if self.body and "path" not in trained_in.kwargs:
+            trained_in = env_ref(trained_in.id, self.body)
+        elif self.body:
+            trained_in = trained_in.having({"body": self.body})
+        return driven(trained_in)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Show(_OfPolicy):
+    """Print where a policy comes from, and what it senses and does."""
+
     def run(self) -> None:
-        """Print the card."""
         from shapechanger.transfer.learners.policy_file import TrainedPolicy  # PyTorch.
 
         policy: Any = load_any_policy(self.file, self.learner)
         card = policy.card
-        lines = _lines(card)
-        if hasattr(card, "observation"):
-            lines |= {"version": card.version}
-            if isinstance(policy, TrainedPolicy):
-                lines["command"] = card.command or "not in this file"
-                lines["normalised"] = "no" if policy.normalisation is None else "yes"
+        lines = origin_of(card)
+        if not lines["command"]:
+            del lines["command"]
+        if explored := getattr(card, "start_log_std", None):
+            low, high = math.exp(min(explored)), math.exp(max(explored))
+            lines["explored"] = f"standard deviations of {low:.2f} to {high:.2f} at the start"
+        if isinstance(policy, TrainedPolicy):
+            lines["command"] = card.command or "not in this file"
+            lines["normalised"] = "no" if policy.normalisation is None else "yes"
+        sensed, done = layouts_in(card)
+        if is_clone(card):
+            lines |= {"picture": card.eyes, "state": ", ".join(sensed.names) if sensed else "none"}
+        else:
             lines["observation"] = ", ".join(card.observation.names)
-            lines["action"] = ", ".join(card.action.names)
+        lines["action"] = ", ".join(done.names) if done else STEERING
         for part, identity in card.identity.items():
             made_of = {"model": identity.model, **identity.files}
             shown = ", ".join(f"{name} {digest}" for name, digest in made_of.items() if digest)
@@ -69,47 +110,37 @@ class Show:
                 say(f"  {name:16} {value}")
 
 
-def _lines(card: Any) -> dict[str, str]:
+STEERING: Final = "steering, throttle"
+"""Action of a clone whose card has no layout of it."""
+
+
+def is_clone(card: Any) -> bool:
+    """Return whether a card is one of a policy that was learned from demonstrations."""
+    return hasattr(card, "state_layout")
+
+
+def origin_of(card: Any) -> dict[str, str]:
     """Return the facts of a policy's origin from its card, keyed by name."""
-    return _card_lines(card) if hasattr(card, "observation") else _clone_lines(card)
-
-
-def _card_lines(card: PolicyCard | OnnxCard) -> dict[str, str]:
-    """Return the facts of a policy's origin, keyed by name."""
-    explored: tuple[float, ...] | None = getattr(card, "start_log_std", None)
+    cloned = is_clone(card)
     return {
-        "env": str(card.env),
-        "learner": card.learner,
+        "env": str(card.data.get("env", "recorded") if cloned else card.env),
+        "learner": "cloning" if cloned else card.learner,
         "steps": f"{card.steps:,}",
-        "seed": str(card.seed),
-        **({} if explored is None else {"explored": _deviations(explored)}),
-    }
-
-
-def _deviations(log_std: tuple[float, ...]) -> str:
-    """Return the standard deviations of the actions at the start of a fine-tuning."""
-    low, high = math.exp(min(log_std)), math.exp(max(log_std))
-    return f"standard deviations of {low:.2f} to {high:.2f} at the start"
-
-
-def _clone_lines(card: CloneCard) -> dict[str, str]:
-    """Return the facts of a clone's card, keyed by name."""
-    actions = ("steering", "throttle") if card.action_layout is None else card.action_layout.names
-    return {
-        "env": str(card.data.get("env", "recorded")),
-        "learner": "cloning",
-        "steps": f"{card.steps:,}",
-        "seed": ", ".join(map(str, card.seeds)),
+        "seed": ", ".join(map(str, card.seeds)) if cloned else str(card.seed),
         "version": card.version,
-        "command": card.command,
-        "picture": card.eyes,
-        "state": "none" if card.state_layout is None else ", ".join(card.state_layout.names),
-        "action": ", ".join(actions),
+        "command": getattr(card, "command", ""),
     }
+
+
+def layouts_in(card: Any) -> tuple[Layout | None, Layout | None]:
+    """Return the layouts of what a policy senses, besides images, and does."""
+    if is_clone(card):
+        return card.state_layout, card.action_layout
+    return card.observation, card.action
 
 
 @dataclass(frozen=True)
-class ListPolicies:
+class List:
     """List the policies in a folder and its subfolders."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")] = Path("results")
@@ -127,7 +158,7 @@ class ListPolicies:
         for path in sorted(self.folder.rglob("*.safetensors")):
             name = str(path.relative_to(self.folder))
             try:
-                lines = _lines(load_any_policy(path).card)
+                lines = origin_of(load_any_policy(path).card)
             except ShapechangerError as error:
                 table.add_row(name, str(error))
                 continue
@@ -151,25 +182,17 @@ class ListPolicies:
         print_table(table, _FILE_WIDTH)
 
 
-@dataclass(frozen=True)
-class EvaluatePolicy:
+@dataclass(frozen=True, kw_only=True)
+class Evaluate(_InEnv):
     """Play a policy for some episodes, and print its measures."""
 
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A policy, or one that was exported as ONNX."""
-    env: str = ""
-    """Id of another env, if it acts through the body map of same names; by default the one of its
-    training."""
-    body: Body = ""
-    learner: OwnLearner = ""
     episodes: int = 10
     """Number of episodes; they start like every evaluation's."""
 
     def run(self) -> None:
-        """Evaluate."""
         if self.episodes < 1:
             raise StudyError("An evaluation takes at least one episode.")
-        ref = _env_of(self.file, self.env, self.body, self.learner)
+        ref = self.ref()
         with opened(ref) as env:
             acting, act = acting_in(
                 env, self.file, self.learner, None if self.env or self.body else ref
@@ -185,67 +208,28 @@ class EvaluatePolicy:
             say(f"{'length':14} {found.mean_length:.4g} steps")
 
 
-@dataclass(frozen=True)
-class PlayPolicy(Watching):
+@dataclass(frozen=True, kw_only=True)
+class Play(_InEnv, Watching):
     """Watch a policy in the env of its training, in a window or as a video."""
 
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A policy, or one that was exported as ONNX."""
-    env: str = ""
-    """Id of another env, if it acts through the body map of same names; by default the one of its
-    training."""
-    body: Body = ""
-
     def run(self) -> None:
-        """Play and print the returns."""
-        ref = _env_of(self.file, self.env, self.body, self.learner)
-        self.show(ref, self.file, trained_in=not (self.env or self.body))
+        self.show(self.ref(), self.file, trained_in=not (self.env or self.body))
 
 
-def _env_of(file: Path, env: str, body: str, learner: str = "") -> EnvRef:
-    """Return the env that is named, else the one in which a policy was trained."""
-    if env:
-        return driven(env_ref(env, body))
-    # A policy of many bodies is seen in the family's own.
-    trained_in = single_body(_trained_in(file, learner))
-    # The env of a policy may be of the user's own, or have a task that is.
-    allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
-    if body:
-        if "path" not in trained_in.kwargs:
-            return driven(env_ref(trained_in.id, body))
-        return driven(trained_in.having({"body": body}))
-    return driven(trained_in)
+@dataclass(frozen=True, kw_only=True)
+class Export(_InEnv):
+    """Export a policy for other programs, which need neither PyTorch nor Shapechanger.
 
+    A robot runs a clone on board. --env and --body name the body that a policy of limbs is exported
+    for; other policies are exported for their own.
+    """
 
-def _trained_in(file: Path, learner: str) -> EnvRef:
-    """Return the env of a policy's card."""
-    card: Any = load_any_policy(file, learner).card
-    if hasattr(card, "env"):
-        return card.env
-    env = card.data.get("env")
-    if env is None:
-        raise StudyError(f"{file} learned from recordings of no env: name one with --env.")
-    return env_ref(str(env))
-
-
-@dataclass(frozen=True)
-class ExportPolicy:
-    """Export a policy for other programs, which need neither PyTorch nor Shapechanger."""
-
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A policy, or a clone, which a robot then runs on board."""
     out: Path
     """The file to write, such as ant.onnx."""
-    env: str = ""
-    """Id of the env of the body that a policy of limbs is exported for; by
-    default the one of its training. Other policies are exported for their own."""
-    body: Body = ""
-    learner: OwnLearner = ""
     format: Literal["onnx"] = "onnx"
     """Its format."""
 
     def run(self) -> None:
-        """Write the file."""
         policy = load_any_policy(self.file, self.learner)
         kind = kind_of(self.file)
         if kind.endswith("onnx"):
@@ -254,23 +238,20 @@ class ExportPolicy:
             body, control_hz = _learned_with(policy.card)
             export_clone(policy, self.out, body=body, control_hz=control_hz)
         else:
-            self._export(policy)
+            from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
+
+            if "many bodies" in policy.card.settings.takes:
+                ref = self.ref()
+                with opened(ref) as env:
+                    export_limbs(policy, env, ref, self.out)
+            elif self.env or self.body:
+                raise StudyError(
+                    "Only a policy of limbs fits another body than its own: leave out --env and "
+                    "--body."
+                )
+            else:
+                export_onnx(policy, self.out)
         say(f"wrote {self.out}")
-
-    def _export(self, policy: TrainedPolicy) -> None:
-        """Write a policy that is no clone."""
-        from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
-
-        if "many bodies" in policy.card.settings.takes:
-            ref = _env_of(self.file, self.env, self.body)
-            with opened(ref) as env:
-                export_limbs(policy, env, ref, self.out)
-            return
-        if self.env or self.body:
-            raise StudyError(
-                "Only a policy of limbs fits another body than its own: leave out --env and --body."
-            )
-        export_onnx(policy, self.out)
 
 
 def _learned_with(card: CloneCard) -> tuple[str, float | None]:
@@ -299,7 +280,6 @@ class Convert:
     """Required, because the zip holds pickled objects: give it only if you trust its author."""
 
     def run(self) -> None:
-        """Convert the policy."""
         from shapechanger.transfer.learners.convert import convert_zip  # PyTorch.
 
         if not self.trust:
@@ -312,3 +292,76 @@ class Convert:
             layouts, identity = layouts_of(made), known({ENV: identify_env(made, env.id).identity})
         convert_zip(self.file, env, layouts, identity, command_line()).save(self.out)
         say(f"wrote {self.out}")
+
+
+_MAX_BYTES: Final = 256 << 20  # As for the files of policies.
+
+
+@dataclass(frozen=True)
+class Push:
+    """Upload a policy to the Hugging Face Hub, with a card that describes it."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A policy, or a clone."""
+    repo: RepoName
+    """Name of the repository, such as ada/ant; it is made if it does not exist."""
+    public: Public = False
+
+    def run(self) -> None:
+        card = _policy_card(self.file, self.repo)
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / hub.POLICY).symlink_to(self.file.resolve())
+            address = hub.push(Path(folder), card, self.repo, "policy", public=self.public)
+        say(f"pushed {self.file} to {address}")
+
+
+@dataclass(frozen=True)
+class Pull:
+    """Download a policy from the Hugging Face Hub; nothing else of the repository is read."""
+
+    repo: RepoName
+    """Name of a repository that `policies push` has filled, such as ada/ant."""
+    out: Path
+    """The file to write, such as ant.safetensors; it must not exist yet."""
+    revision: Revision = ""
+
+    def run(self) -> None:
+        if self.out.exists():
+            raise HubError(f"{self.out} exists already: choose another name, or move it away.")
+        with tempfile.TemporaryDirectory() as folder:
+            commit = hub.pull(
+                self.repo,
+                "policy",
+                Path(folder),
+                revision=self.revision,
+                max_bytes=_MAX_BYTES,
+            )
+            path = Path(folder) / hub.POLICY
+            try:
+                env = origin_of(load_policy(path).card)["env"]
+            except StudyError as error:
+                raise HubError(
+                    str(error).replace(str(path), f"{path.name} of {self.repo}")
+                ) from error
+            require_file(self.out)
+            write_atomic(self.out, path.read_bytes())
+        say(f"wrote {self.out}: {env}, revision {commit}")
+
+
+def _policy_card(file: Path, repo: str) -> str:
+    """Return the README of a policy, after checking its hash."""
+    card = load_policy(file).card
+    rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
+    command = str(rows.pop("command"))
+    sensed, done = layouts_in(card)
+    seen = f"picture ({card.eyes})" if is_clone(card) else ""
+    return readme(
+        repo,
+        ["reinforcement-learning"],
+        f"A policy of Shapechanger for `{rows['env']}`.",
+        rows,
+        {"Observation": features_text(sensed, seen), "Action": features_text(done, STEERING)},
+        command,
+        f"shapechanger policies pull {repo} --out policy.safetensors\n"
+        "shapechanger policies play policy.safetensors",
+    )

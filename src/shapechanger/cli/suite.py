@@ -14,16 +14,8 @@ import tyro
 from rich.live import Live
 from rich.table import Table
 
-from shapechanger.cli.console import (
-    Interrupted,
-    StudyProgress,
-    command_line,
-    plain_console,
-    print_table,
-    say,
-)
-from shapechanger.cli.env_arguments import ClusterAddress, ExecutorKind, executor_of, require_seed
-from shapechanger.cli.transfer import run_steps
+from shapechanger.cli.console import Interrupted, command_line, plain_console, print_table, say
+from shapechanger.cli.transfer import StudyRuns, run_showing_progress
 from shapechanger.envs.naming import allow_own_modules, default_learner
 from shapechanger.envs.study_films import film_study
 from shapechanger.envs.suite_file import (
@@ -33,7 +25,7 @@ from shapechanger.envs.suite_file import (
     shipped_suites,
     suite_tasks,
 )
-from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
+from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName, check_seed
 from shapechanger.files import read_json, write_atomic, write_json
 from shapechanger.reports.numbers import interval_text
 from shapechanger.transfer.executor import Serial
@@ -63,7 +55,7 @@ from shapechanger.transfer.suite import merge_study, open_study_folder, study_ou
 
 if TYPE_CHECKING:
     from shapechanger.transfer.report.suite import FilmStrip
-    from shapechanger.transfer.study import Study, TaskTraits
+    from shapechanger.transfer.study import TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
 _SUMMARY: Final = "suite.json"
@@ -71,8 +63,8 @@ _FILM: Final = "film.mp4"
 _FILE_WIDTH: Final = 200
 
 
-@dataclass(frozen=True)
-class RunSuite:
+@dataclass(frozen=True, kw_only=True)
+class Run(StudyRuns):
     """Run a suite of studies: one study and report per pair, and a joint page.
 
     Run the same command again to resume, or with more seeds to add to it.
@@ -81,31 +73,18 @@ class RunSuite:
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
     """A TOML file, or the name of a suite that comes with Shapechanger: ants, lenses, methods,
     pendulums, replay, shank, vehicles or waypoints."""
-    seeds: int | None = None
-    """Runs of each arm; the suite's own number if not given."""
-    steps: int | None = None
-    """Target steps of a run; the suite's own number if not given."""
-    source_steps: int | None = None
-    """Source steps of a source policy; the suite's own number if not given."""
     only: tuple[str, ...] = ()
     """Names of the studies to run, such as Ant-to-BigAnt; all if not given."""
     out: Path | None = None
     """The suite's folder; results/NAME if not given."""
-    seed: int | None = None
-    """Number that the seeds of all runs are drawn from; the suite's own if not given."""
-    executor: ExecutorKind = "processes"
-    address: ClusterAddress = None
-    workers: int | None = None
-    """Runs at a time; one for each core if not given."""
 
     def run(self) -> None:
-        """Run the studies, write their reports, and print the joint table."""
         suite = load_suite(self.name)
         given = {name: getattr(self, name) for name in ("seeds", "steps", "source_steps", "seed")}
         chosen = msgspec.structs.replace(
             suite, **{name: value for name, value in given.items() if value is not None}
         )
-        require_seed(chosen.seed)
+        check_seed(chosen.seed, StudyError)
         allow_own_modules(suite.learner, *suite.arms)
         with located_errors(self.name):
             tasks = dict(suite_tasks(suite))
@@ -113,7 +92,7 @@ class RunSuite:
             if name not in tasks:
                 raise UnknownName("study", name, tasks)
         out = self.out or Path("results", Path(self.name).stem)
-        executor = executor_of(self.executor, self.workers, self.address)
+        executor = self.made_executor()
         failed: list[str] = []
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
@@ -122,15 +101,8 @@ class RunSuite:
                 plan = _plan(chosen, tasks[name], traits)
             try:
                 folder = open_study_folder(plan, out, name)
-                with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
-                    study = run_study(
-                        plan,
-                        folder,
-                        executor=executor,
-                        on_progress=progress,
-                        command=command_line(),
-                        traits=traits,
-                    )
+                runs = unfinished_runs(plan, folder)
+                study = run_showing_progress(plan, folder, runs, executor=executor, traits=traits)
             except FailedRuns as error:
                 if plan.exclusive:  # The next study would move the robot.
                     raise
@@ -145,7 +117,6 @@ class RunSuite:
 
 
 def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
-    """Return the plan of one study."""
     learner, settings = resolve_learner(
         suite.learner or default_learner(task.target), suite.settings
     )
@@ -164,7 +135,7 @@ def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
 
 
 @dataclass(frozen=True)
-class WatchSuite:
+class Watch:
     """Watch a suite that runs elsewhere: progress and last evaluations of its runs."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
@@ -188,7 +159,7 @@ class WatchSuite:
 
 
 @dataclass(frozen=True)
-class MergeSuites:
+class Merge:
     """Merge folders of one suite that were run on several machines, and write its page."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
@@ -199,7 +170,6 @@ class MergeSuites:
     """The folder to write; results/NAME if not given."""
 
     def run(self) -> None:
-        """Copy what has ended, and report the studies that are complete."""
         suite = load_suite(self.name)
         allow_own_modules(suite.learner, *suite.arms)
         tasks = dict(suite_tasks(suite))
@@ -230,11 +200,10 @@ class MergeSuites:
 
 
 @dataclass(frozen=True)
-class ListSuites:
+class List:
     """List the suites that come with Shapechanger."""
 
     def run(self) -> None:
-        """Print a line for each."""
         table = Table("suite", "studies", "seeds", "arms", box=None)
         for name in shipped_suites():
             suite = load_suite(name)
@@ -268,18 +237,6 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
     if not table.rows:
         raise StudyError(f"There is no study in {out}: name the folder of a suite.")
     return table, complete
-
-
-def _print_outcomes(found: list[StudyOutcome]) -> None:
-    print_table(_table(found), _FILE_WIDTH)
-    halves = sum(outcome.halves for outcome in found)
-    arms = " or ".join(dict.fromkeys(outcome.arm for outcome in found))
-    say(
-        f"Gains are of {arms} over scratch, in scores (0: what takes no skill, 1: the "
-        "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
-        f"On {halves} of {len(found)} pairs {arms} reached what scratch ends with in less than "
-        "half of scratch's steps."
-    )
 
 
 class _Page:
@@ -339,8 +296,8 @@ class _Page:
         return {one: self._studies[one] for one in self._tasks if one in self._studies}
 
 
-def _table(found: list[StudyOutcome]) -> Table:
-    """Format the results: values and steps, then gains with intervals."""
+def _print_outcomes(found: list[StudyOutcome]) -> None:
+    """Print a table of values and steps, then of gains with intervals."""
     table = Table(
         *("study", "measure", "scratch", "zero-shot", "arm", "at its end", "scratch, steps"),
         *("arm, steps", "jumpstart", "total reward gain", "gain at the end"),
@@ -362,4 +319,12 @@ def _table(found: list[StudyOutcome]) -> Table:
                 for gain in outcome.gains.values()
             ),
         )
-    return table
+    print_table(table, _FILE_WIDTH)
+    halves = sum(outcome.halves for outcome in found)
+    arms = " or ".join(dict.fromkeys(outcome.arm for outcome in found))
+    say(
+        f"Gains are of {arms} over scratch, in scores (0: what takes no skill, 1: the "
+        "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
+        f"On {halves} of {len(found)} pairs {arms} reached what scratch ends with in less than "
+        "half of scratch's steps."
+    )

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
-from shapechanger.cli.env_arguments import Body, EnvId, opened, require_seed, settings_of
+from shapechanger.cli.env_arguments import Body, EnvId, Learner, Settings, opened, settings_of
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
-from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.errors import MissingExtra, StudyError, check_seed
 from shapechanger.files import make_folder, require_file
 from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import use_one_thread
@@ -42,11 +42,8 @@ class Train:
     """The file to write; results/policies/ENV.safetensors if not given."""
     steps: int | None = None
     """Env steps; the learner's own number if not given."""
-    learner: str | None = None
-    """Name of the learner's settings, a TOML file of them, or your class or function as
-    module:name; by default the settings tuned for the env."""
-    set: tuple[str, ...] = ()
-    """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
+    learner: Learner = ""
+    set: Settings = ()
     seed: int = 0
     """Seed of everything random."""
     teacher: Path | None = None
@@ -56,12 +53,14 @@ class Train:
     """Folder for TensorBoard's logs; none are written if not given."""
 
     def run(self) -> None:
-        """Train and print evaluations as they complete."""
-        require_seed(self.seed)
+        check_seed(self.seed, StudyError)
         allow_own_modules(self.learner)
         env = driven(env_ref(self.env, self.body))
         if self.bodies:
-            env = self._of_many(env)
+            if self.bodies < 0 or self.body:
+                raise StudyError("--bodies takes a number above 0, and no --body.")
+            draw = BodyDraw(count=self.bodies, seed=self.seed)
+            env = env.having({"bodies": msgspec.to_builtins(draw)})
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
         steps, training = (
             self._by_learner(env, out)
@@ -77,17 +76,9 @@ class Train:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
         say(f"wrote {out}")
 
-    def _of_many(self, env: EnvRef) -> EnvRef:
-        """Return the env with bodies to draw from its family."""
-        if self.bodies < 0 or self.body:
-            raise StudyError("--bodies takes a number above 0, and no --body.")
-        draw = BodyDraw(count=self.bodies, seed=self.seed)
-        return env.having({"bodies": msgspec.to_builtins(draw)})
-
     def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
-        own = "limbs" if self.bodies else default_learner(env)
-        wanted = self.learner or own
+        wanted = self.learner or ("limbs" if self.bodies else default_learner(env))
         if self.bodies:
             wanted = in_many_bodies(wanted)
         learner, settings = resolve_learner(wanted, settings_of(self.set))
@@ -135,7 +126,7 @@ class Train:
         """Return the number of steps, and the training of a student of another policy."""
         from shapechanger.vehicles.cloning import STUDENT_STEPS, train_student  # PyTorch.
 
-        if self.learner is not None or self.set or self.tensorboard is not None:
+        if self.learner or self.set or self.tensorboard is not None:
             raise StudyError("A student has no learner: give --teacher without one.")
         if not teacher.exists():
             raise StudyError(

@@ -6,28 +6,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, print_table, say
-from shapechanger.cli.env_arguments import (
-    ClusterAddress,
-    ExecutorKind,
-    executor_of,
-    options_of,
-    policy_file,
-    require_seed,
-    settings_of,
-)
+from shapechanger.cli.env_arguments import Learner, Settings, TwoEnvs, policy_file, settings_of
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
-from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
-from shapechanger.errors import MapError, OutputError, StudyError
+from shapechanger.envs.naming import allow_own_modules, default_learner
+from shapechanger.errors import MapError, OutputError, StudyError, check_seed
 from shapechanger.files import read_text
 from shapechanger.registry import METHODS
-from shapechanger.transfer.learners import LearnerSettings
+from shapechanger.transfer.executor import Executor, Processes
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
@@ -35,6 +26,7 @@ from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.report.study import write_study_report
 from shapechanger.transfer.report.verdict import findings
 from shapechanger.transfer.study import (
+    Study,
     default_arms,
     inspect_task,
     is_folder_of,
@@ -45,7 +37,6 @@ from shapechanger.transfer.study import (
 
 if TYPE_CHECKING:
     from shapechanger.transfer.report.verdict import Findings
-    from shapechanger.transfer.study import TaskTraits
 
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8
@@ -53,25 +44,54 @@ _QUICK_SEEDS: Final = 2
 _FILE_WIDTH: Final = 120
 
 
-@dataclass(frozen=True)
-class Transfer:
+@dataclass(frozen=True, kw_only=True)
+class StudyRuns:
+    """Options of a command that runs studies; the study or the suite states what is not given."""
+
+    seeds: int | None = None
+    """Runs of each arm; the suite's own number, or 5, if not given."""
+    steps: int | None = None
+    """Target steps of a run; the suite's or the learner's own number if not given."""
+    source_steps: int | None = None
+    """Source steps of a source policy; the suite's or the learner's own number if not given: half
+    as many as target steps, and more for a rig. With --source-policy, the steps of arms that train
+    their own policy, such as identified."""
+    seed: int | None = None
+    """Number that the seeds of all runs are drawn from; the suite's own, or 0, if not given."""
+    executor: Literal["processes", "ray"] = "processes"
+    """Where runs run: in processes of this machine, or on a Ray cluster."""
+    address: str | None = None
+    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
+    workers: int | None = None
+    """Runs at a time; one for each core if not given, and one where the target is a robot."""
+
+    def made_executor(self) -> Executor:
+        """Return the executor of the runs."""
+        if self.executor == "ray":
+            if self.workers is not None:
+                raise StudyError("Ray runs one run on each core of its nodes: leave out --workers.")
+            from shapechanger.transfer.ray_executor import RayCluster  # An extra.
+
+            return RayCluster(self.address)
+        if self.address is not None:
+            raise StudyError("--address names a Ray cluster: give --executor ray, too.")
+        return Processes(self.workers)
+
+
+def run_showing_progress(plan: Plan, folder: Path, runs: Iterable[Run], **more: Any) -> Study:
+    """Run a study with its progress; `runs` are those that have not ended before."""
+    # An evaluation counts as one step.
+    with StudyProgress({run.name: max(1, plan.steps_of(run.kind)) for run in runs}) as progress:
+        return run_study(plan, folder, on_progress=progress, command=command_line(), **more)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transfer(TwoEnvs, StudyRuns):
     """Train in SOURCE, transfer to TARGET, and compare with training from scratch.
 
     Run the same command again to resume.
     """
 
-    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
-    """Id of the env that the policy is learned in, such as Ant."""
-    target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
-    """Id of the env that it is transferred to, such as ExtendedAnt."""
-    seeds: int | None = None
-    """Runs of each arm; 5 if not given."""
-    steps: int | None = None
-    """Target steps of a run; the learner's own number if not given."""
-    source_steps: int | None = None
-    """Source steps of a source policy; the learner's own number if not given: half as many as
-    target steps, and more for a rig. With --source-policy, the steps of arms that train their own
-    policy, such as identified."""
     quick: bool = False
     """Two seeds and an eighth of the steps: a check that everything works, not a result."""
     out: Path | None = None
@@ -79,24 +99,13 @@ class Transfer:
     source_policy: Path | None = None
     """A given source policy, instead of training one for each seed: a file, or `reference` for the
     one that ships for the source."""
-    source_body: str = ""
-    """Another body of the source's family: its name, or edits as JSON."""
-    target_body: str = ""
-    """Another body of the target's family: its name, or edits as JSON."""
     target_lens: tuple[str, ...] = ()
     """Disturbances of a vehicle's target camera: night, glare, blur or dirt."""
-    source_options: str = ""
-    """More arguments of the source as JSON, such as '{"actions": "length"}'."""
-    target_options: str = ""
-    """The same of the target, such as '{"gap": "real-like"}' for a finger."""
     measure: str = ""
     """Quantity that policies are compared by: a measure of the target such as "forward speed", a
     reward term such as reward_forward, or return; the target's default if not given."""
-    learner: str | None = None
-    """Name of the learner's settings, a TOML file of them, or your class or function as
-    module:name; by default the settings tuned for the target."""
-    set: tuple[str, ...] = ()
-    """Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."""
+    learner: Learner = ""
+    set: Settings = ()
     arms: tuple[str, ...] = ()
     """Methods to compare; scratch is required. `shapechanger methods` lists them, and module:name
     is a method that your module registers. The default is scratch, zero-shot and fine-tune;
@@ -108,45 +117,65 @@ class Transfer:
     """The body map as a TOML file, instead of --rule and --units."""
     units: Literal["same", "torque"] = "same"
     """Whether actions are mapped directly or by the torque that they produce."""
-    seed: int = 0
-    """Number that the seeds of all runs are drawn from."""
-    executor: ExecutorKind = "processes"
-    address: ClusterAddress = None
-    workers: int | None = None
-    """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
     def run(self) -> None:
-        """Run the study, print its table, and write its report."""
-        self._require_sense()
+        seed = check_seed(self.seed or 0, StudyError)
+        if twice := sorted({arm for arm in self.arms if self.arms.count(arm) > 1}):
+            raise StudyError(f"--arms names {', '.join(twice)} more than once.")
+        if self.map and (self.rule or self.units != "same"):
+            raise MapError(
+                "The file of --map says all of the body map: leave out --rule and --units, or "
+                "--map."
+            )
         allow_own_modules(self.learner, *self.arms)
-        task = self._task()
-        learner, settings, steps = self._learner(task)
+        task = TransferTask(*self.refs(studied=True, lenses=self.target_lens))
+        learner, settings = resolve_learner(
+            self.learner or default_learner(task.target), settings_of(self.set)
+        )
+        steps, seeds = self.steps, 5 if self.seeds is None else self.seeds
+        if self.quick:
+            shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
+            settings = settings.for_budget(shortest)
+            steps = shortest if steps is None else steps
+            seeds = _QUICK_SEEDS if self.seeds is None else seeds
         # Budgets are refused before PyTorch is imported and envs are opened, which takes seconds.
         study_budgets(settings, steps, self.source_steps, is_given=bool(self.source_policy))
 
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
 
+        try:
+            map_text = read_text(self.map) if self.map else ""
+        except (OSError, ValueError) as error:
+            raise MapError(f"The body map {self.map} cannot be read: {error}.") from error
         traits = inspect_task(task)
         given = self.source_policy and policy_file(self.source_policy, task.source)
-        plan = self._plan(task, learner, settings, steps, traits, given)
+        plan = make_plan(
+            task,
+            learner,
+            settings,
+            seeds=seeds,
+            steps=steps,
+            source_steps=self.source_steps,
+            source_policy=given,
+            arms=self.arms or default_arms(traits),
+            seed=seed,
+            rules=dict(_split_rule(rule) for rule in self.rule),
+            map_text=map_text,
+            units=self.units,
+            measure=self.measure,
+            traits=traits,
+        )
         _ = traits.shift  # An empty shift is refused before anything is written.
-        executor = executor_of(self.executor, self.workers, self.address)
-        out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
+        executor = self.made_executor()
+        out = self.out or Path("results", f"{_name(task.source)}-to-{_name(task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
             say(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
         try:
-            with StudyProgress(run_steps(plan, to_do)) as progress:
-                study = run_study(
-                    plan,
-                    out,
-                    source_policy=given,
-                    executor=executor,
-                    on_progress=progress,
-                    command=command_line(),
-                    traits=traits,
-                )
+            study = run_showing_progress(
+                plan, out, to_do, source_policy=given, executor=executor, traits=traits
+            )
         except KeyboardInterrupt:
             raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
         except OutputError as error:
@@ -156,77 +185,12 @@ class Transfer:
         report = write_study_report(study, out, found)
         say(f"\nwrote {out / 'study.json'} and {report}")
 
-    def _require_sense(self) -> None:
-        """Refuse contradictory or unused options."""
-        require_seed(self.seed)
-        twice = sorted({arm for arm in self.arms if self.arms.count(arm) > 1})
-        if twice:
-            raise StudyError(f"--arms names {', '.join(twice)} more than once.")
-        if self.map and (self.rule or self.units != "same"):
-            raise MapError(
-                "The file of --map says all of the body map: leave out --rule and --units, or "
-                "--map."
-            )
-
-    def _task(self) -> TransferTask:
-        """Source and target, with their bodies and options."""
-        source = driven(env_ref(self.source, self.source_body))
-        target = driven(env_ref(self.target, self.target_body), self.target_lens)
-        return TransferTask(
-            source.having(options_of(self.source_options, "--source-options")),
-            target.having(options_of(self.target_options, "--target-options")),
-        )
-
-    def _learner(self, task: TransferTask) -> tuple[str, LearnerSettings, int | None]:
-        """Return the learner's name, its settings, and the steps in the target if they are set."""
-        learner, settings = resolve_learner(
-            self.learner or default_learner(task.target), settings_of(self.set)
-        )
-        if not self.quick:
-            return learner, settings, self.steps
-        shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
-        settings = settings.for_budget(shortest)
-        return learner, settings, shortest if self.steps is None else self.steps
-
-    def _plan(
-        self,
-        task: TransferTask,
-        learner: str,
-        settings: LearnerSettings,
-        steps: int | None,
-        traits: TaskTraits,
-        given: Path | None,
-    ) -> Plan:
-        """The plan of the study."""
-        try:
-            map_text = read_text(self.map) if self.map else ""
-        except (OSError, ValueError) as error:
-            raise MapError(f"The body map {self.map} cannot be read: {error}.") from error
-        seeds = _QUICK_SEEDS if self.quick and self.seeds is None else self.seeds
-        return make_plan(
-            task,
-            learner,
-            settings,
-            seeds=5 if seeds is None else seeds,
-            steps=steps,
-            source_steps=self.source_steps,
-            source_policy=given,
-            arms=self.arms or default_arms(traits),
-            seed=self.seed,
-            rules=dict(_split_rule(rule) for rule in self.rule),
-            map_text=map_text,
-            units=self.units,
-            measure=self.measure,
-            traits=traits,
-        )
-
 
 @dataclass(frozen=True)
 class Methods:
     """List the transfer methods that a study can compare."""
 
     def run(self) -> None:
-        """Print a table."""
         table = Table("method", "what it does", "source", box=None)
         for name in METHODS.names():
             method = load_method(name)
@@ -235,13 +199,7 @@ class Methods:
         print_table(table)
 
 
-def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """Return the steps of each run for the progress; an evaluation counts as one."""
-    return {run.name: max(1, plan.steps_of(run.kind)) for run in runs}
-
-
 def _split_rule(text: str) -> tuple[str, str]:
-    """Split NAME=RULE."""
     name, equals, rule = text.partition("=")
     if not (name and equals and rule):
         raise MapError(f"A rule is written NAME=RULE, such as 'foot_*/motor=learn', not {text!r}.")
@@ -249,7 +207,6 @@ def _split_rule(text: str) -> tuple[str, str]:
 
 
 def _name(env: EnvRef) -> str:
-    """Return a short folder name."""
     if env.id == OWN_ROBOT:
         return Path(env.kwargs["path"]).stem
     return env.id.split("/")[-1].removesuffix("-v1")
@@ -265,7 +222,6 @@ def _way_on(plan: Plan, out: Path) -> str:
 
 
 def _print(found: Findings) -> None:
-    """Print the table of measures and the verdict."""
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
     for row in [row for row in found.measures if row.target != "undefined"]:

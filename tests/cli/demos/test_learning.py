@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.cli.demos.train import Evaluate, TrainClone
+from shapechanger.cli.demos.train import Evaluate, Train
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
@@ -44,7 +44,7 @@ def test_a_recording_becomes_a_policy_with_a_report(
     """`train` writes policy, report and exports; `evaluate` prints the accuracy last."""
     data = _record(tmp_path / "drive", 150, 0)
     out = tmp_path / "made" / "policy.safetensors"
-    TrainClone(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
+    Train(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
     made = sorted(path.name for path in out.parent.iterdir())
     assert made == ["policy.html", "policy.json", "policy.safetensors", "ppo.zip"]
     page = out.with_suffix(".html").read_text()
@@ -76,7 +76,7 @@ def test_regression_prints_errors_and_accuracy(
     data = _record(tmp_path / "drive", 90, 0, STEERS)
     _record(data, 30, 1, STEERS)
     out = tmp_path / "policy.safetensors"
-    TrainClone(data, out, split="episode", sac=tmp_path / "sac.zip").run()
+    Train(data, out, split="episode", sac=tmp_path / "sac.zip").run()
     assert CameraPolicy.load(out).card.data["learned"] == 90
     text = capsys.readouterr().out
     assert "steering: mean absolute error" in text
@@ -88,13 +88,13 @@ def test_invalid_arguments_are_refused_before_training(tmp_path: Path) -> None:
     data = _record(tmp_path / "drive", 20, 0)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match="it is a folder"):
-        TrainClone(data, tmp_path / "taken").run()
+        Train(data, tmp_path / "taken").run()
     with pytest.raises(OutputError, match="two files"):
-        TrainClone(data, tmp_path / "p.safetensors", sac=tmp_path / "p.safetensors").run()
+        Train(data, tmp_path / "p.safetensors", sac=tmp_path / "p.safetensors").run()
     with pytest.raises(CloningError, match="one episode only"):
-        TrainClone(data, tmp_path / "p.safetensors", split="episode").run()
+        Train(data, tmp_path / "p.safetensors", split="episode").run()
     with pytest.raises(DemosError):
-        TrainClone(tmp_path / "nowhere", tmp_path / "p.safetensors").run()
+        Train(tmp_path / "nowhere", tmp_path / "p.safetensors").run()
     with pytest.raises(PolicyError, match="no policy file"):
         Evaluate(tmp_path / "p.safetensors", data).run()
     assert not (tmp_path / "p.safetensors").exists()

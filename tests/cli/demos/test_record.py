@@ -10,19 +10,17 @@ from shapechanger.cli import main
 from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from tests.cli.demos.test_demos import output_of, refused
+from tests.cli.running import Cli
 
 SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')
 
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
-def test_an_experts_recording_replays_identically(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_experts_recording_replays_identically(tmp_path: Path, demos: Cli) -> None:
     """State and images are equal in every step; each episode has its seed."""
     data = tmp_path / "data"
-    printed = output_of(capsys, "record", "Car", "--out", data, "--seed", 7, *SHORT)
+    printed = demos.output("record", "Car", "--out", data, "--seed", 7, *SHORT)
     assert "wrote 60 steps" in printed
     first, second = (read_episode(path) for path in episodes_of(data))
     assert (len(first.steps), len(second.steps)) == (40, 20)
@@ -35,21 +33,21 @@ def test_an_experts_recording_replays_identically(
     assert {step.driver for step in first.steps} == {"expert"}
     assert any(step.action != step.applied for step in first.steps)
     assert load_dataset(data).pictures is not None
-    printed = output_of(capsys, "replay", first.path, "--env", "Car")
+    printed = demos.output("replay", first.path, "--env", "Car")
     assert "played 40 of 40 steps" in printed
     assert "the state is the same in every step" in printed
     assert "the images are the same in every step" in printed
-    printed = output_of(capsys, "replay", first.path, "--env", "Tank")
+    printed = demos.output("replay", first.path, "--env", "Tank")
     assert "when recorded" in printed
 
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
-def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_policy_is_corrected(tmp_path: Path, demos: Cli) -> None:
     """Only the expert's steps are loaded for learning."""
     data = tmp_path / "data"
     policy = ("--driver", str(CLONES["boat"]), "--corrected-by", "expert")
-    printed = output_of(capsys, "record", "Car", "--out", data, "--minutes", "0.1", *policy)
+    printed = demos.output("record", "Car", "--out", data, "--minutes", "0.1", *policy)
     (path,) = episodes_of(data)
     episode = read_episode(path)
     drivers = [step.driver for step in episode.steps]
@@ -85,19 +83,19 @@ def test_invalid_arguments_give_one_sentence(
     words: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    demos: Cli,
     gl: None,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("text.safetensors").write_text("text")
-    assert words in refused(capsys, "record", *arguments, "--out", "data")
+    assert words in demos.refused("record", *arguments, "--out", "data")
     assert not Path("data").exists()
 
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
 def test_ctrl_c_leaves_whole_episodes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, demos: Cli, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from shapechanger.vehicles.envs.demonstrators import Demonstrator
 

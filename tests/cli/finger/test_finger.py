@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.cli import main
 from shapechanger.errors import FingerError
 from shapechanger.finger.anatomy import TENDONS
 from shapechanger.finger.export import finger_mjcf
@@ -18,28 +17,15 @@ from shapechanger.finger.identify import FingerLog, load_log
 from shapechanger.finger.identify.log import save_log
 from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters
 from shapechanger.finger.tensions import drive_of
+from tests.cli.running import Cli
 from tests.finger.identify.logs import recorded
 
 
-def output_of(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """Return the standard output of a command."""
-    main(["finger", *map(str, words)])
-    return capsys.readouterr().out
-
-
-def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """Return the error of a command."""
-    with pytest.raises(SystemExit) as stop:
-        main(["finger", *map(str, words)])
-    assert stop.value.code == 2
-    return capsys.readouterr().err
-
-
-def test_a_finger_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finger_is_recorded(tmp_path: Path, finger: Cli) -> None:
     """The log equals the Python API's with the same seeds."""
     out = tmp_path / "new" / "log.npz"
     words = ("--seconds", 2.4, "--seed", 4, "--gap", "real-like", "--finger-seed", 3)
-    printed = output_of(capsys, "record", "Finger", "--out", out, *words, "--actions", "tension")
+    printed = finger.output("record", "Finger", "--out", out, *words, "--actions", "tension")
     assert "wrote 121 rows, 2.4 s" in printed
     log = load_log(out)
     assert (log.actions, log.source) == ("tension", "shapechanger/Finger-v1")
@@ -48,30 +34,30 @@ def test_a_finger_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     np.testing.assert_array_equal(log.commands, again.commands)
 
 
-def test_invalid_recordings_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_recordings_are_refused(tmp_path: Path, finger: Cli) -> None:
     out = ("--out", tmp_path / "log.npz")
-    assert "is not a finger env" in refused(capsys, "record", "Ant", *out)
-    assert "Did you mean" in refused(capsys, "record", "Fingr", *out)
-    assert "--seconds is more than 0" in refused(capsys, "record", "Finger", *out, "--seconds", "0")
-    assert "--options must be JSON" in refused(capsys, "record", "Finger", *out, "--options", "a")
-    assert "omit `goal`" in refused(capsys, "record", "Finger", *out, "--options", '{"goal": true}')
-    assert "real-like" in refused(capsys, "record", "Finger", *out, "--gap", "real-lik")
+    assert "is not a finger env" in finger.refused("record", "Ant", *out)
+    assert "Did you mean" in finger.refused("record", "Fingr", *out)
+    assert "--seconds is more than 0" in finger.refused("record", "Finger", *out, "--seconds", "0")
+    assert "--options must be JSON" in finger.refused("record", "Finger", *out, "--options", "a")
+    assert "omit `goal`" in finger.refused("record", "Finger", *out, "--options", '{"goal": true}')
+    assert "real-like" in finger.refused("record", "Finger", *out, "--gap", "real-lik")
 
 
-def test_invalid_logs_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
     """Missing and short logs, and outputs that would overwrite the log."""
     log = tmp_path / "log.npz"
-    assert "There is no file" in refused(capsys, "identify", log)
-    output_of(capsys, "record", "Finger", "--out", log, "--seconds", "1")
-    assert "1.0 s long" in refused(capsys, "identify", log)
-    assert "it is the log" in refused(capsys, "identify", log, "--report", log)
-    assert "it is a folder" in refused(capsys, "identify", log, "--out", tmp_path)
+    assert "There is no file" in finger.refused("identify", log)
+    finger.output("record", "Finger", "--out", log, "--seconds", "1")
+    assert "1.0 s long" in finger.refused("identify", log)
+    assert "it is the log" in finger.refused("identify", log, "--report", log)
+    assert "it is a folder" in finger.refused("identify", log, "--out", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["log.npz"]
 
 
 @pytest.mark.parametrize("says", [False, True])
 def test_motors_are_taken_for_geared_where_the_log_says_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, says: bool
+    tmp_path: Path, finger: Cli, monkeypatch: pytest.MonkeyPatch, says: bool
 ) -> None:
     """`--geared` gives a log the shipped rig's motors, and leaves those that a log has."""
     log, _ = recorded(2.4)
@@ -85,17 +71,17 @@ def test_motors_are_taken_for_geared_where_the_log_says_nothing(
 
     monkeypatch.setattr("shapechanger.cli.finger.identify", identify)
     for option in ((), ("--geared",)):
-        assert "That is enough." in refused(capsys, "identify", tmp_path / "log.npz", *option)
+        assert "That is enough." in finger.refused("identify", tmp_path / "log.npz", *option)
     assert taken == ([own, own] if says else [None, shipped_rig()])
 
 
 @pytest.mark.slow
-def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finger_is_identified(tmp_path: Path, finger: Cli) -> None:
     """Arms by tendon and joint, other parameters, those not determined, and a summary."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
-    output_of(capsys, "record", "Finger", "--out", log, "--seconds", 6, *gap)
-    lines = output_of(capsys, "identify", log, "--out", out).splitlines()
+    finger.output("record", "Finger", "--out", log, "--seconds", 6, *gap)
+    lines = finger.output("identify", log, "--out", out).splitlines()
     rows = [line.split() for line in lines]
     assert [row[0] for row in rows if row and row[0] in TENDONS] == list(TENDONS)
     assert sum(line.startswith("joint ") for line in lines) == 8
@@ -106,7 +92,7 @@ def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "Parameters that this log cannot determine" in (tmp_path / "log.html").read_text()
 
 
-def test_a_finger_is_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
     """A finger of a gap, a file or a set of parameters, and the nominal one; others are refused."""
     out, file = tmp_path / "finger.xml", tmp_path / "finger.json"
     drawn = GAPS["real-like"].draw(np.random.default_rng(3))
@@ -118,7 +104,7 @@ def test_a_finger_is_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (),
         ("--parameters", "an-1983"),
     ):
-        assert f"wrote {out}" in output_of(capsys, "export", "--out", out, *words)
+        assert f"wrote {out}" in finger.output("export", "--out", out, *words)
         texts.append(out.read_text())
     drive = drive_of("impedance", NOMINAL)
     assert texts[0] == texts[1] == finger_mjcf(drawn, drive)
@@ -126,11 +112,11 @@ def test_a_finger_is_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert texts[3] == finger_mjcf(PARAMETER_SETS["an-1983"], drive)
     to = ("--out", out)
     both = ("--gap", "wide", "--parameters", file)
-    assert "not both" in refused(capsys, "export", *to, *both)
-    assert "real-like" in refused(capsys, "export", *to, "--gap", "real-lik")
-    assert "cannot be read" in refused(capsys, "export", *to, "--parameters", tmp_path / "no.json")
+    assert "not both" in finger.refused("export", *to, *both)
+    assert "real-like" in finger.refused("export", *to, "--gap", "real-lik")
+    assert "cannot be read" in finger.refused("export", *to, "--parameters", tmp_path / "no.json")
     os.mkfifo(pipe := tmp_path / "pipe.json")  # Without a writer, which would be waited for.
-    assert "not a regular file" in refused(capsys, "export", *to, "--parameters", pipe)
-    assert "an-1983" in refused(capsys, "export", *to, "--parameters", "an-1984")
+    assert "not a regular file" in finger.refused("export", *to, "--parameters", pipe)
+    assert "an-1983" in finger.refused("export", *to, "--parameters", "an-1984")
     file.write_text("{}]")
-    assert "Invalid finger parameters" in refused(capsys, "export", *to, "--parameters", file)
+    assert "Invalid finger parameters" in finger.refused("export", *to, "--parameters", file)

@@ -1,32 +1,34 @@
-"""`shapechanger demos record`: record an expert or a policy in an env."""
+"""`shapechanger demos record | replay`: record an expert or a policy, and replay an episode."""
 
 from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
+import tyro
 from gymnasium.wrappers import TimeLimit
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
-from shapechanger.cli.env_arguments import Body, EnvId, options_of, require_seed
+from shapechanger.cli.env_arguments import OneEnv, options_of
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.drivers import EXPERT, pilot_of, record_steps
+from shapechanger.demos.episodes import episode_at
 from shapechanger.demos.recording import RecordEpisodes
+from shapechanger.demos.replay import play_in_env, write_episode_film
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.envs.naming import driven, env_ref
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, StudyError, check_seed
+from shapechanger.robot.client.recordings import play_on_robot
 from shapechanger.transfer.executor import use_one_thread
 
 
-@dataclass(frozen=True)
-class RecordDemonstrations:
+@dataclass(frozen=True, kw_only=True)
+class Record(OneEnv):
     """Record an expert or a policy in an env."""
 
-    env: EnvId
-    """Id of the env, such as Car."""
     out: Path
     """Folder of the recording; new episodes are added to those there."""
     minutes: float = 10.0
@@ -38,19 +40,15 @@ class RecordDemonstrations:
     learned from."""
     episode_s: float = 50.0
     """Longest episode, s; a collision ends it earlier."""
-    body: Body = ""
     lenses: tuple[str, ...] = ()
     """Disturbances of a vehicle's camera, such as night."""
     put_back: bool = False
     """Put a vehicle back on its lane after a collision, instead of ending the episode."""
-    options: str = ""
-    """More arguments of the env as JSON, such as '{"courses": "held-out"}'."""
     seed: int = 0
     """Seed of the first episode; each later one has the next whole number."""
 
     def run(self) -> None:
-        """Record and print a summary."""
-        require_seed(self.seed)
+        check_seed(self.seed, StudyError)
         for name, value in (("minutes", self.minutes), ("episode-s", self.episode_s)):
             if not 0.0 < value < float("inf"):
                 raise DemosError(f"--{name} is more than 0, got {value}.")
@@ -113,15 +111,40 @@ class RecordDemonstrations:
     def _about(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
         """Return further fields of the header."""
         world = getattr(env.unwrapped, "world", None)
-        who = self.driver if self.driver == EXPERT else Path(self.driver).name
-        notes: dict[str, Any] = {"driver": self.driver}
+        who, notes = Path(self.driver).name, {"driver": self.driver}
         if self.corrected_by:
             who += f", corrected by {self.corrected_by}"
             notes["corrected_by"] = self.corrected_by
         body = {} if world is None else {"body": world.vehicle.name}
-        return {
-            **body,
-            "driver": who,
-            "source": command_line(),
-            "notes": notes,
-        }
+        return {**body, "driver": who, "source": command_line(), "notes": notes}
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Replay an episode as a video, in an env or on a robot."""
+
+    episode: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE")]
+    """Folder of the episode."""
+    film: Path | None = None
+    """A film to write, such as out.mp4, with the actions drawn in."""
+    env: str = ""
+    """Id of an env to play the actions in, from the recorded seed; differences are reported."""
+    robot: str = ""
+    """Name of a robot to play the actions on, see `robot remember`; a person at this terminal
+    arms it, and any key stops it."""
+
+    def run(self) -> None:
+        asked = [bool(self.film), bool(self.env), bool(self.robot)]
+        if sum(asked) != 1:
+            raise DemosError("An episode is played with one of --film, --env and --robot.")
+        episode = episode_at(self.episode)
+        if not episode.kept:
+            raise DemosError(f"No step of {episode.path} counts: `shapechanger demos good` it.")
+
+        if self.film is not None:
+            say(write_episode_film(episode, self.film))
+        elif self.env:
+            for line in play_in_env(episode, env_ref(self.env)):
+                say(line)
+        else:
+            play_on_robot(episode, self.robot, say)

@@ -1,11 +1,9 @@
-"""`shapechanger demos list | show | cut | bad | good | mark | merge | repair | import | export`.
-
-Look at recordings, edit them, and convert them from and to other formats.
-"""
+"""Commands of `shapechanger demos` that list, edit, convert and share recordings."""
 
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,10 +14,11 @@ import numpy as np
 import tyro
 from rich.table import Table
 
+from shapechanger import hub
 from shapechanger.cli.console import counted, plain_console, say
+from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
 from shapechanger.demos.episodes import (
     Episode,
-    Repair,
     drop,
     episode_at,
     episodes_of,
@@ -28,36 +27,55 @@ from shapechanger.demos.episodes import (
     read_episode,
     repair,
 )
+from shapechanger.demos.episodes import (
+    Repair as Repaired,
+)
+from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS
 from shapechanger.demos.exchange import export_recording, formats, import_recording
+from shapechanger.demos.exchange.files import new_folder
 from shapechanger.demos.merging import merge
 from shapechanger.demos.report import distributions, recording_html
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, HubError
 from shapechanger.files import require_file, write_atomic
+from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
 
 _WIDEST: Final = 400
 _MB: Final = 1e6
-_Data = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
-_Episode = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE")]
+_Data = Annotated[
+    Path,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="DATA", help="Folder of the recording, or of one episode."),
+]
+_Episode = Annotated[
+    Path,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="EPISODE", help="Folder of the episode."),
+]
 _From = Annotated[int | None, tyro.conf.arg(name="from", metavar="STEP")]
 _To = Annotated[int | None, tyro.conf.arg(name="to", metavar="STEP")]
 
 
 @dataclass(frozen=True)
-class ListEpisodes:
+class List:
     """List the episodes of a recording."""
 
     data: _Data
-    """Folder of the recording, or of one episode."""
 
     def run(self) -> None:
-        """Print a line per episode and the totals."""
-        table = Table(
-            "episode", "of", "when (UTC)", "steps", "length", "drivers", "marks", "outcome",
-            box=None, pad_edge=False,
-        )  # fmt: skip
-        for name in ("steps", "length", "marks"):
-            next(c for c in table.columns if c.header == name).justify = "right"
+        table = Table(box=None, pad_edge=False)
+        for name in (
+            "episode",
+            "of",
+            "when (UTC)",
+            "steps",
+            "length",
+            "drivers",
+            "marks",
+            "outcome",
+        ):
+            right = name in ("steps", "length", "marks")
+            table.add_column(name, justify="right" if right else "left")
         broken: list[str] = []
         steps = kept = 0
         seconds = 0.0
@@ -85,25 +103,20 @@ class ListEpisodes:
         # Truncated names could not be typed; let the terminal wrap the line.
         needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
         plain_console(width=max(console.width, needed)).print(table)
-        say(
-            f"{counted(len(paths), 'episode')}: {kept} of {steps} steps count, "
-            f"{duration_text(seconds)}"
-        )
+        say(_totals(len(paths), kept, steps, seconds))
         for sentence in broken:
             say(sentence)
 
 
 @dataclass(frozen=True)
-class ShowEpisodes:
+class Show:
     """Summarise a recording in numbers, or as an HTML page with frames."""
 
     data: _Data
-    """Folder of the recording, or of one episode."""
     out: Path | None = None
     """The page to write, such as page.html; it needs no other file."""
 
     def run(self) -> None:
-        """Print the summary and write the page."""
         episodes: list[Episode] = []
         broken: list[str] = []
         for path in episodes_of(self.data):
@@ -129,14 +142,17 @@ class ShowEpisodes:
         say(f"wrote {self.out}")
 
 
+def _totals(episodes: int, kept: int, steps: int, seconds: float) -> str:
+    many = counted(episodes, "episode")
+    return f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}"
+
+
 def _overview(episodes: Sequence[Episode]) -> list[str]:
-    """Describe a recording in a few lines."""
     counts: Counter[str] = Counter(step.driver for one in episodes for step in one.kept)
     seconds = sum(one.seconds for one in episodes)
-    many = counted(len(episodes), "episode")
     steps = sum(len(one.steps) for one in episodes)
     kept = sum(len(one.kept) for one in episodes)
-    lines = [f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}"]
+    lines = [_totals(len(episodes), kept, steps, seconds)]
     if counts:
         lines.append(f"driven by {shares_text(dict(counts.most_common()))}")
     outcomes = Counter(one.outcome or "just ended" for one in episodes if one.closed)
@@ -151,7 +167,6 @@ class _Steps:
     """A range of steps of an episode."""
 
     episode: _Episode
-    """Folder of the episode."""
     first: _From = None
     """The first step; the episode's if not given."""
     last: _To = None
@@ -170,11 +185,10 @@ class _Steps:
         return episode, first, last
 
 
-class CutEpisode(_Steps):
+class Cut(_Steps):
     """Keep a range of steps of an episode and drop the rest."""
 
     def run(self) -> None:
-        """Cut and print what is kept."""
         episode, first, last = self._range()
         least, most = episode.steps[0].index, episode.steps[-1].index
         if first > least:
@@ -188,7 +202,6 @@ class Bad(_Steps):
     """Drop steps of an episode, or all of them."""
 
     def run(self) -> None:
-        """Drop the steps and print what is kept."""
         episode, first, last = self._range()
         drop(episode.path, first, last, "bad")
         _tell(episode.path)
@@ -198,25 +211,22 @@ class Good(_Steps):
     """Restore dropped steps of an episode, or all of them."""
 
     def run(self) -> None:
-        """Restore the steps and print what is kept."""
         episode, first, last = self._range()
         keep(episode.path, first, last)
         _tell(episode.path)
 
 
 @dataclass(frozen=True)
-class MarkStep:
+class Mark:
     """Mark a step of an episode."""
 
     episode: _Episode
-    """Folder of the episode."""
     step: Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="STEP")]
     """Number of the step."""
     text: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TEXT")] = ""
     """A few words."""
 
     def run(self) -> None:
-        """Mark the step."""
         episode = episode_at(self.episode)
         mark(episode.path, self.step, self.text)
         say(f"marked step {self.step} of {episode.path}")
@@ -240,7 +250,6 @@ class Merge:
     """Folder of the recording that they come into."""
 
     def run(self) -> None:
-        """Merge and print a summary."""
         done = merge(self.data, self.out)
         for source, target in done.episodes:
             if source.name != target.name:
@@ -255,14 +264,12 @@ class Merge:
 
 
 @dataclass(frozen=True)
-class RepairEpisodes:
+class Repair:
     """Repair a recording after a crash: keep complete steps and move the rest aside."""
 
     data: _Data
-    """Folder of the recording, or of one episode."""
 
     def run(self) -> None:
-        """Repair each episode and print what was done."""
         refused: list[DemosError] = []
         for path in episodes_of(self.data):
             try:
@@ -276,8 +283,7 @@ class RepairEpisodes:
             raise DemosError(f"{refused[0]}{more}")
 
 
-def _told(done: Repair) -> str:
-    """Describe a repair."""
+def _told(done: Repaired) -> str:
     if not done.changed:
         return f"was complete, with {done.kept} steps"
     parts = [f"kept {done.kept} steps"]
@@ -346,7 +352,6 @@ class Export:
     """Export a recording to another format, leaving the recording unchanged."""
 
     data: _Data
-    """A recording, or one episode of it."""
     out: Path
     """The folder to make; it must not exist yet. For minari its name ends in a version, such as
     drive-v0."""
@@ -360,7 +365,6 @@ class Export:
     """Store images as they were recorded, instead of video; lerobot only."""
 
     def run(self) -> None:
-        """Export and print a summary."""
         done = export_recording(
             self.data, self.out, self.to, dropped=self.dropped, task=self.task, images=self.images
         )
@@ -381,3 +385,97 @@ class Export:
                 f"load it with MINARI_DATASETS_PATH={self.out.absolute().parent} and "
                 f"minari.load_dataset({self.out.name!r})"
             )
+
+
+_GIB: Final = 1 << 30
+_MOST_HASHES: Final = 50
+
+
+@dataclass(frozen=True)
+class Push:
+    """Upload a recording to the Hugging Face Hub, with a card that describes it."""
+
+    data: _Data
+    repo: RepoName
+    """Name of the repository, such as ada/drive; it is made if it does not exist."""
+    public: Public = False
+
+    def run(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            episodes = [read_episode(path) for path in episodes_of(self.data)]
+            hashes: dict[str, str] = {}
+            for episode in episodes:
+                name = f"{hub.EPISODES}/{episode.path.resolve().name}"
+                frames = {f"{FRAMES}/{step.frame}" for step in episode.steps if step.frame}
+                for file in (HEADER, STEPS, *frames):  # Without `lost/`.
+                    link = Path(folder) / name / file
+                    link.parent.mkdir(parents=True, exist_ok=True)
+                    link.symlink_to((episode.path / file).resolve())
+                hashes[f"{name}/{STEPS}"] = hub.sha256_of(episode.path / STEPS)
+            card = _recording_card(episodes, hashes, self.repo)
+            address = hub.push(Path(folder), card, self.repo, "demonstrations", public=self.public)
+        say(f"pushed {counted(len(episodes), 'episode')} of {self.data} to {address}")
+
+
+@dataclass(frozen=True)
+class Pull:
+    """Download a recording from the Hugging Face Hub; nothing else of the repository is read."""
+
+    repo: RepoName
+    """Name of a repository that `demos push` has filled, such as ada/drive."""
+    out: Path
+    """The recording to make; it must not exist yet."""
+    revision: Revision = ""
+    max_gib: float = 16.0
+    """Largest recording to download, GiB."""
+
+    def run(self) -> None:
+        if not 0.0 < self.max_gib < float("inf"):
+            raise HubError(f"--max-gib is more than 0, got {self.max_gib}.")
+        with (
+            new_folder(self.out) as folder,
+            tempfile.TemporaryDirectory(dir=folder) as place,
+        ):
+            commit = hub.pull(
+                self.repo,
+                "demonstrations",
+                Path(place),
+                revision=self.revision,
+                max_bytes=round(self.max_gib * _GIB),
+            )
+            episodes = [read_episode(path) for path in (Path(place) / hub.EPISODES).iterdir()]
+            for episode in episodes:
+                episode.path.rename(folder / episode.path.name)
+        steps = sum(len(episode.steps) for episode in episodes)
+        say(
+            f"wrote {self.out}: {counted(len(episodes), 'episode')}, {counted(steps, 'step')}, "
+            f"revision {commit}"
+        )
+
+
+def _recording_card(episodes: list[Episode], hashes: dict[str, str], repo: str) -> str:
+    header = episodes[0].header
+    drivers = Counter(str(step.driver) for one in episodes for step in one.kept)
+    size = "none" if header.image_size is None else "{} x {}".format(*header.image_size)
+    rows: dict[str, object] = {
+        "recorded in": header.env or header.robot or header.body or "unknown",
+        "episodes": len(episodes),
+        "steps": sum(len(one.steps) for one in episodes),
+        "duration": duration_text(sum(one.seconds for one in episodes)),
+        "drivers": shares_text(dict(drivers.most_common())),
+        "pictures": size,
+        "steps per second": f"{header.control_hz:g}",
+    }
+    shown = list(hashes.items())[:_MOST_HASHES]
+    rows |= {f"SHA-256 of {name}": digest for name, digest in shown}
+    state = Layout.from_json(header.state_layout) if header.state_layout else None
+    action = Layout.from_json(header.action_layout)
+    return readme(
+        repo,
+        ["demonstrations"],
+        "Demonstrations, recorded with Shapechanger.",
+        rows,
+        {"State": features_text(state, "none"), "Action": features_text(action)},
+        header.source,
+        f"shapechanger demos pull {repo} --out data",
+    )

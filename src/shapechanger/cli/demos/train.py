@@ -12,13 +12,12 @@ import numpy as np
 import tyro
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
-from shapechanger.cli.env_arguments import require_seed
 from shapechanger.demos.clone_report import clone_html, write_numbers
 from shapechanger.demos.cloning.evaluation import duration_s, evaluate, outlook
 from shapechanger.demos.cloning.settings import settings_for
 from shapechanger.demos.cloning.shrinking import ShrunkFrames
-from shapechanger.demos.dataset import count_steps, load_dataset
-from shapechanger.errors import DemosError, OutputError
+from shapechanger.demos.dataset import Dataset, count_steps, load_dataset
+from shapechanger.errors import DemosError, OutputError, StudyError, check_seed
 from shapechanger.files import require_file, write_atomic
 from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.presets import LEARNERS
@@ -29,13 +28,35 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.evaluation import EvaluationResult
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.vehicles.cameras.rectify import CanonicalView
     from shapechanger.vehicles.cloning import CloningSettings
-    from shapechanger.vehicles.waypoints import SteeringResponse
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Waypoints:
+    """Options of how a recording on steering becomes one on waypoints."""
+
+    camera: tuple[float, float] | None = None
+    """Pitch and vertical field of view of the camera, degrees, for waypoints; those that the
+    recording states if not given."""
+    response: tuple[float, float] | None = None
+    """How far the vehicle turns at full steering, rad for each metre and for each second, for
+    waypoints; fitted to its recorded motion if not given."""
+
+    def view(self) -> CanonicalView:
+        """Return how images are warped to the virtual camera."""
+        return CanonicalView(None if self.camera is None else CameraGeometry(*self.camera))
+
+    def converted(self, data: Dataset, view: CanonicalView) -> tuple[Dataset, SteeringResponse]:
+        """Return the recording with waypoints as actions, and the response that was used."""
+        given = None if self.response is None else SteeringResponse(*self.response)
+        shown = as_waypoints(data, given)
+        for note in (view.note(), *shown.notes):
+            say(note)
+        return shown.data, shown.response
 
 
 @dataclass(frozen=True)
-class TrainClone:
+class Train(_Waypoints):
     """Clone a driver from demonstrations; write the policy and a report."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
@@ -53,12 +74,6 @@ class TrainClone:
     waypoints: bool = False
     """Learn where the free way is instead of steering and throttle, for any vehicle to follow:
     shapechanger play TankWaypoint --policy ..."""
-    camera: tuple[float, float] | None = None
-    """Pitch and vertical field of view of the camera, degrees, for --waypoints; those that the
-    recording states if not given."""
-    response: tuple[float, float] | None = None
-    """How far the vehicle turns at full steering, rad for each metre and for each second, for
-    --waypoints; fitted to its recorded motion if not given."""
     seed: int = 0
     """Seed of everything random."""
     sac: Path | None = None
@@ -67,14 +82,21 @@ class TrainClone:
     """Also write it as a file that `stable_baselines3.PPO.load` reads."""
 
     def run(self) -> None:
-        """Train, evaluate and write the files."""
         self._require_files()
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.demos.clone_report")
         from shapechanger.demos.cloning.examples import evaluated_steps  # PyTorch.
         from shapechanger.demos.cloning.learn import learn  # PyTorch.
 
-        view = self._view()
+        view = None
+        if self.waypoints:
+            if self.head == "class" or self.inputs in {"state", "both"}:
+                raise DemosError(
+                    "Waypoints are numbers, seen in images: leave out --head, --inputs."
+                )
+            view = self.view()
+        elif self.camera is not None or self.response is not None:
+            raise DemosError("--camera and --response belong to --waypoints: give it, too.")
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
         if view is not None:
             settings = cast("CloningSettings", LEARNERS["waypoint"]).clone
@@ -84,16 +106,21 @@ class TrainClone:
         data = load_dataset(self.data, shrink=shrinking)
         origin: dict[str, Any] = {}
         if view is not None:
-            shown = as_waypoints(data, _response(self.response))
-            for note in (view.note(), *shown.notes):
-                say(note)
-            data, origin = shown.data, {"response": astuple(shown.response)}
+            data, response = self.converted(data, view)
+            origin = {"response": astuple(response)}
         evaluated = evaluated_steps(data.episodes, self.split, self.held_out)
         learned = ~evaluated
         n = int(learned.sum())
         say(f"{n} steps to learn from, {len(data) - n} to evaluate on")
         try:
-            with _Progress(settings.members, settings.steps(n)) as progress:
+            names = [f"network {member + 1}" for member in range(settings.members)]
+            with StudyProgress(dict.fromkeys(names, settings.steps(n))) as progress:
+
+                def on_check(check: MemberCheck) -> None:
+                    if check.member:  # The one before has ended.
+                        progress(names[check.member - 1], check.step, True)
+                    progress(names[check.member], check.step, False)
+
                 policy, training = learn(
                     data,
                     learned,
@@ -101,7 +128,7 @@ class TrainClone:
                     head="regression" if view is not None else self.head,
                     inputs=self.inputs,
                     seed=self.seed,
-                    on_check=progress,
+                    on_check=on_check,
                 )
         except KeyboardInterrupt:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
@@ -124,8 +151,7 @@ class TrainClone:
             note = "These are the steps that it learned from, so expect less on others."
         evaluation = evaluate(policy, data, evaluated)
         policy.save(self.out)
-        for path in self._write_for_sb3(policy, shrinking.size):
-            say(f"wrote {path}")
+        self._write_for_sb3(policy, shrinking.size)
         page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
         report = clone_html(self.out.name, policy, data, evaluation, training, note)
         write_atomic(page, report.encode())
@@ -137,19 +163,9 @@ class TrainClone:
             say(ahead.next_step)
         _print_evaluation(evaluation)
 
-    def _view(self) -> CanonicalView | None:
-        """Return how images are warped; None without waypoints."""
-        if not self.waypoints:
-            if self.camera is not None or self.response is not None:
-                raise DemosError("--camera and --response belong to --waypoints: give it, too.")
-            return None
-        if self.head == "class" or self.inputs in {"state", "both"}:
-            raise DemosError("Waypoints are numbers, seen in images: leave out --head, --inputs.")
-        return _view(self.camera)
-
     def _require_files(self) -> None:
         """Check before the work that the files can be written."""
-        require_seed(self.seed)
+        check_seed(self.seed, StudyError)
         written = [self.out, self.out.with_suffix(".html"), self.out.with_suffix(".json")]
         written += [path for path in (self.sac, self.ppo) if path is not None]
         for path in written:
@@ -157,11 +173,9 @@ class TrainClone:
                 raise OutputError(f"Cannot write two files to {path}: give each its own name.")
             require_file(path)
 
-    def _write_for_sb3(self, policy: CameraPolicy, size: tuple[int, int] | None) -> list[Path]:
-        """Write a Stable-Baselines3 file if requested."""
-        written: list[Path] = []
+    def _write_for_sb3(self, policy: CameraPolicy, size: tuple[int, int] | None) -> None:
         if self.sac is None and self.ppo is None:
-            return written
+            return
         from shapechanger.demos.cloning.sb3 import as_ppo, as_sac  # PyTorch.
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
@@ -169,36 +183,7 @@ class TrainClone:
                 whole = io.BytesIO()  # Stable-Baselines3 would write incrementally, to FILE.zip.
                 make(policy, size, seed=self.seed).save(whole)
                 write_atomic(path, whole.getvalue())
-                written.append(path)
-        return written
-
-
-def _view(camera: tuple[float, float] | None) -> CanonicalView:
-    """Return how images are warped to the virtual camera, from pitch and field of view given."""
-    return CanonicalView(None if camera is None else CameraGeometry(*camera))
-
-
-def _response(given: tuple[float, float] | None) -> SteeringResponse | None:
-    return None if given is None else SteeringResponse(*given)
-
-
-class _Progress(StudyProgress):
-    """Progress of each network."""
-
-    def __init__(self, members: int, steps: int) -> None:
-        super().__init__({self._name(member): steps for member in range(members)})
-        self._at = 0
-
-    def __call__(self, check: MemberCheck) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Report a validation score."""
-        if check.member > self._at:
-            super().__call__(self._name(self._at), check.step, True)
-            self._at = check.member
-        super().__call__(self._name(check.member), check.step, False)
-
-    @staticmethod
-    def _name(member: int) -> str:
-        return f"network {member + 1}"
+                say(f"wrote {path}")
 
 
 def _print_evaluation(evaluation: EvaluationResult) -> None:
@@ -224,7 +209,7 @@ def _print_evaluation(evaluation: EvaluationResult) -> None:
 
 
 @dataclass(frozen=True)
-class Evaluate:
+class Evaluate(_Waypoints):
     """Compare a policy with a driver's demonstrations; the last line is the accuracy."""
 
     policy: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
@@ -233,28 +218,18 @@ class Evaluate:
     """A recording, one episode of it, or anything that `demos import` reads."""
     report: Path | None = None
     """A page to write, with the worst frames; the numbers are written next to it as JSON."""
-    camera: tuple[float, float] | None = None
-    """Pitch and vertical field of view of the camera, degrees, for a waypoint policy on steering;
-    those that the recording states if not given."""
-    response: tuple[float, float] | None = None
-    """How far the vehicle turns at full steering, rad for each metre and for each second, for a
-    waypoint policy on steering; fitted to its recorded motion if not given."""
 
     def run(self) -> None:
-        """Evaluate and print."""
         from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
 
         policy = CameraPolicy.load(self.policy)
         layout = policy.card.action_layout
         has_waypoints = layout is not None and layout.names[0].startswith("waypoint/")
-        view = _view(self.camera) if has_waypoints else None
+        view = self.view() if has_waypoints else None
         shrinking = ShrunkFrames(policy.card.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         if view is not None and view.rectifiers:
-            shown = as_waypoints(data, _response(self.response))
-            for note in (view.note(), *shown.notes):
-                say(note)
-            data = shown.data
+            data, _ = self.converted(data, view)
         evaluation = evaluate(policy, data)
         note = f"These are the {len(data)} steps of {self.data}."
         learned = policy.card.data.get("learned", 0)

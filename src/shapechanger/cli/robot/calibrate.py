@@ -93,16 +93,9 @@ class _Ended(Exception):
 
 
 class Calibration:
-    """Calibration of all outputs and encoders of a robot.
+    """Calibration of all outputs and encoders of a robot, whose results are `found`.
 
-    Args:
-        profile: The robot.
-        keys: Source of key presses.
-        cap: Largest value for motors, and for ESCs unless the person goes beyond.
-        twin: Whether on the twin.
-
-    Attributes:
-        found: Changes to the profile so far, by dotted name.
+    `cap` bounds motors, and ESCs unless the person goes beyond.
     """
 
     def __init__(self, profile: Profile, keys: Terminal, cap: float, *, twin: bool) -> None:
@@ -190,17 +183,10 @@ class Calibration:
         *,
         goes_beyond: bool = False,
     ) -> float | None:
-        """Jog one output with keys until Enter.
+        """Jog an output with keys until Enter; return its applied value, or None if skipped.
 
-        Args:
-            robot: The robot, armed for this client.
-            output: The output, with the settings for jogging.
-            cap: Largest commanded value.
-            step: Change per key press.
-            goes_beyond: Whether to ask at the cap, where Y goes beyond it.
-
-        Returns:
-            The applied value of the output, or None if skipped.
+        A key press changes the command by `step`, to at most `cap`; with `goes_beyond`, Y goes on
+        from there.
         """
         actions, outputs = self._profile.actions, self._profile.outputs
         index = [one.name for one in outputs].index(output.name)
@@ -277,7 +263,6 @@ class Calibration:
 
 
 def _live_line() -> Live:
-    """Return a live line that disappears afterwards."""
     return Live(console=plain_console(), refresh_per_second=10, transient=True)
 
 

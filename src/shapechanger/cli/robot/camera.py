@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import tyro
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import change_profile, own_profile
+from shapechanger.demos.episodes.files import read_file
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture
 from shapechanger.errors import DemosError, OutputError, RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
@@ -26,9 +27,6 @@ from shapechanger.vehicles.cameras.rectify import (
     pitch_of_horizon,
 )
 
-if TYPE_CHECKING:
-    from shapechanger.vehicles.cameras.rectify import CameraGeometry
-
 # As in a profile.
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0
@@ -37,7 +35,7 @@ _JPEG: Final = b"\xff\xd8\xff"  # Begins each JPEG.
 
 
 @dataclass(frozen=True)
-class CameraView:
+class Camera:
     """Measure pitch and field of view of the camera, write them into the profile, and draw them.
 
     With neither --board nor --horizon it draws what the profile says.
@@ -57,7 +55,6 @@ class CameraView:
     """The drawing: the horizon and what policies with waypoints look at, and what they see."""
 
     def run(self) -> None:
-        """Measure, write and draw."""
         import simplejpeg
 
         if self.board and self.horizon is not None:
@@ -136,14 +133,9 @@ def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
             camera.close()
         return _decoded(jpeg, "The robot's camera sent")
     try:
-        if path.exists() and not path.is_file():  # A pipe would block indefinitely.
-            raise RobotError(f"{path} is not a file: --picture is a JPEG.")
-        with path.open("rb") as file:
-            jpeg = file.read(_MOST_BYTES + 1)
+        jpeg = read_file(path, _MOST_BYTES)
     except OSError as error:
         raise RobotError(f"Cannot read {path}: {error.strerror or error}.") from error
-    if len(jpeg) > _MOST_BYTES:
-        raise RobotError(f"{path} is larger than an image can be, {_MOST_BYTES >> 20} MiB.")
     if not jpeg.startswith(_JPEG):
         raise RobotError(f"{path} is not a JPEG: save the image as one, such as picture.jpg.")
     return _decoded(jpeg, f"{path} is")

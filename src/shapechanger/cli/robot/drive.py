@@ -8,13 +8,13 @@ import time
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
-import tyro
 from rich.live import Live
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.remote import RobotName
 from shapechanger.demos.cloning.onnx_policy import OnnxClone
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
@@ -26,10 +26,7 @@ from shapechanger.robot.link.messages import Observation
 from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.onnx_policy import OnnxClone
     from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.robot.client.client import RobotClient
-    from shapechanger.vehicles.remote.pilot import PolicyDriver
 
 _LOOK_EVERY_S: Final = 0.2
 
@@ -42,8 +39,7 @@ class Drive:
     and the person can take over at any time; the corrections can be learned from.
     """
 
-    robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
-    """Name of a robot that is known here, see `remember`."""
+    robot: RobotName
     cap: float = 0.5
     """Largest steering and throttle to ask for with the keys, 0 to 1; + and - change it."""
     terminal: bool = False
@@ -137,14 +133,7 @@ _BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
 class Driving:
-    """Terminal session of a person driving a robot.
-
-    Args:
-        robot: The robot, connected to as a person.
-        terminal: Source of key presses.
-        cap: Largest steering and throttle, 0 to 1.
-        pilot: Policy that may drive; None for any waiting program.
-    """
+    """Terminal session of a person driving a robot, with a `pilot` or any waiting program."""
 
     def __init__(
         self, robot: RobotClient, terminal: Terminal, cap: float, pilot: PolicyDriver | None = None
@@ -165,7 +154,6 @@ class Driving:
         self._unmoved = dict.fromkeys(_BY_KEYS, 0)
 
     def run(self) -> None:
-        """Drive until Q."""
         console = plain_console()
         self._terminal.keys(0.0)  # Keys pressed before this line was shown are no orders.
         console.print(_HELP)
@@ -205,7 +193,6 @@ class Driving:
         return True
 
     def _act(self, key: str, seen: Observation) -> None:
-        """Handle one key press."""
         now_s = time.monotonic()
         before, before_s = self._pressed
         self._pressed = (key, now_s)

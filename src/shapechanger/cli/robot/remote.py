@@ -24,6 +24,15 @@ from shapechanger.robot.link.messages import VERSION
 
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
 
+RobotName = Annotated[
+    str,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="ROBOT", help="Name of a robot that is known here, see `remember`."),
+]
+_LocalName = Annotated[
+    str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME", help="Local name of the robot.")
+]
+
 
 @dataclass(frozen=True)
 class Find:
@@ -33,7 +42,6 @@ class Find:
     """Time to listen, s."""
 
     def run(self) -> None:
-        """Print a table with the robots' local names."""
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
         known: dict[str, str] = {}
@@ -61,8 +69,7 @@ class Find:
 class Remember:
     """Store a robot's address and key under a name."""
 
-    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
-    """Local name of the robot."""
+    name: _LocalName
     address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
     """Address, as HOST or HOST:PORT."""
     fingerprint: str
@@ -79,11 +86,9 @@ class Remember:
 class Forget:
     """Remove a known robot."""
 
-    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
-    """Local name of the robot."""
+    name: _LocalName
 
     def run(self) -> None:
-        """Remove its file."""
         forget(self.name)
 
 
@@ -108,8 +113,7 @@ _CONFIRMED_WITHIN_S: Final = 2.0
 class Stop:
     """Stop a robot immediately, whoever drives it, until a person arms it again."""
 
-    robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
-    """Name of a robot that is known here, see `remember`."""
+    robot: RobotName
     reason: str = "a person typed `robot stop`"
     """Why, for people to read."""
 
@@ -136,11 +140,10 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class FetchEpisodes:
+class Fetch:
     """Download a robot's recordings to this machine, or only what is new."""
 
-    robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
-    """Name of a robot that is known here, see `remember`."""
+    robot: RobotName
     out: Annotated[Path, tyro.conf.arg(metavar="DATA")]
     """Folder for the episodes; interrupted downloads there are resumed."""
     episodes: tuple[str, ...] = ()

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from typing import Annotated, Final
 
@@ -60,7 +61,12 @@ class Serve(Service):
         profile = load_profile(find_profile(self.profile))
         # Undone only after an error: exec keeps everything.
         with contextlib.ExitStack() as undo:
-            board = self.board(profile, lambda: self._place(profile), undo) if self.twin else None
+            board = None
+            if self.twin:
+                place = partial(
+                    place_of, profile, self.world, self.lens, self.gap, self.finger_seed
+                )
+                board = self.board(profile, place, undo)
             plan = self.plan(profile, board)
             self._require_policy(msgspec.convert(plan.daemon, DaemonPlan))
             if board is None:
@@ -73,9 +79,6 @@ class Serve(Service):
                 sys.stdout.flush()
             # Replaces this process, which has loaded much that a supervisor does not need.
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
-
-    def _place(self, profile: Profile) -> Place:
-        return place_of(profile, self.world, self.lens, self.gap, self.finger_seed)
 
     def _refuse_contradictions(self) -> None:
         """Refuse options that only apply to a twin."""
@@ -130,15 +133,10 @@ class Serve(Service):
 def place_of(
     profile: Profile, world: str, lenses: Sequence[str], gap: str = "", seed: int | None = None
 ) -> Place:
-    """Return the world of a twin.
+    """Return the world of a twin, of a kind of course or with the finger of a reality gap.
 
-    Args:
-        profile: The robot.
-        world: Kind of course; "room" for the plain room, "" for the robot's default, or the room
-            without such a default or without MuJoCo.
-        lenses: Disturbances of the camera.
-        gap: Name of the reality gap that a finger is drawn from.
-        seed: Seed of that draw.
+    "room" is the plain room, "" the robot's default, or the room without such a default or without
+    MuJoCo.
     """
     if world == _ROOM or not (world or gap or find_spec("mujoco")):
         if lenses:

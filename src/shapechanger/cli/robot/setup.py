@@ -1,8 +1,9 @@
-"""`shapechanger robot init | install | home | safe-pins`: set up a robot."""
+"""`shapechanger robot init | install | key | home | safe-pins`: set up a robot."""
 
 from __future__ import annotations
 
 import getpass
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -15,17 +16,18 @@ from typing import Annotated, Any, Final, Literal
 import tyro
 
 from shapechanger.cli.console import say
-from shapechanger.cli.robot.key import how_to_remember, shown_credentials
-from shapechanger.errors import RobotError, ShapechangerError, UnknownName
+from shapechanger.errors import MissingExtra, RobotError, ShapechangerError, UnknownName
 from shapechanger.robot.check.pins import require_pins
-from shapechanger.robot.client.known_robots import check_name, remember
+from shapechanger.robot.client.known_robots import check_name, console_address, remember
 from shapechanger.robot.daemon.credentials import (
+    Credentials,
     credentials_folder,
     load_credentials,
     make_credentials,
 )
 from shapechanger.robot.guard.outputs import make_safe
 from shapechanger.robot.hardware import REAL, connect
+from shapechanger.robot.link.authentication import fingerprint_short
 from shapechanger.robot.profile.load import (
     find_profile,
     load_profile,
@@ -70,7 +72,6 @@ class Init:
     """Who may arm it: only a person, or programs, too; as its kind has it if not given."""
 
     def run(self) -> None:
-        """Write the files and print the next steps."""
         if self == Init() and sys.stdin.isatty():
             self._ask()
             return
@@ -155,6 +156,63 @@ class Init:
         return profile
 
 
+@dataclass(frozen=True)
+class Key:
+    """Show the key and fingerprint of a robot that was set up on this machine."""
+
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
+    """Name of the robot."""
+    credentials: Path | None = None
+    """Folder of its key and certificate; by default the one that `init` made."""
+    qr: bool = False
+    """Show a QR code that opens the console on a phone. It contains the key, so keep it private."""
+    address: str = ""
+    """With --qr: address of the robot for the phone, HOST or HOST:PORT; by default this machine's
+    name."""
+
+    def run(self) -> None:
+        folder = self.credentials or credentials_folder(self.name)
+        if not folder.exists() and self.credentials is None:
+            there = folder.parent.iterdir() if folder.parent.is_dir() else ()
+            raise UnknownName(
+                "robot of this machine", self.name, sorted(path.name for path in there)
+            )
+        credentials = load_credentials(folder)
+        say(f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}")
+        if not self.qr:
+            return
+        try:
+            import segno
+        except ImportError as error:
+            raise MissingExtra("segno", "robot") from error
+
+        robot = robot_at(self.address or f"{socket.gethostname()}.local", self.name, credentials)
+        console = console_address(robot)
+        say(f"\nThe console is at {console}; this brings a phone there:\n")
+        # Printed verbatim: wrapping would break the code.
+        segno.make(f"{console}#key={robot.key}", micro=False).terminal(sys.stdout, compact=True)
+
+
+def shown_credentials(credentials: Credentials) -> str:
+    """Format the key and the fingerprint for people to compare."""
+    key = credentials.key_file.read_text().strip()
+    fingerprint = credentials.fingerprint
+    return (
+        f"key          {key}\n"
+        f"fingerprint  {fingerprint.hex()}\n"
+        f"in short     {fingerprint_short(fingerprint)}"
+    )
+
+
+def how_to_remember(name: str, credentials: Credentials) -> str:
+    """Return the command for the computer that is to drive the robot."""
+    return (
+        "On the workstation, with the key from above:\n"
+        f"      shapechanger robot remember {name} {socket.gethostname()}.local "
+        f"--fingerprint {credentials.fingerprint.hex()}"
+    )
+
+
 def _is_pi() -> bool:
     """Return whether a robot can be installed on this machine."""
     try:
@@ -198,11 +256,7 @@ def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
 
 
 def own_profile(name: str) -> Path:
-    """Return the file of a profile that may be written.
-
-    Args:
-        name: A file, or the name of a profile.
-    """
+    """Return the file of a profile that may be written, from a file or the name of a profile."""
     path = find_profile(name)
     if path in shipped_profiles().values():
         own = Path(path.name)
@@ -236,7 +290,6 @@ class Home:
     """Somebody holds the finger straight already, so do not ask."""
 
     def run(self) -> None:
-        """Pull gently and store the positions at which motion stops."""
         path = own_profile(self.profile)
         plan = load_profile(path).guard_plan()
         if not self.straight:
@@ -345,7 +398,6 @@ class SafePins:
     """The robot's profile."""
 
     def run(self) -> None:
-        """Put the outputs at rest and print failures."""
         plan = load_profile(find_profile(self.profile)).guard_plan()
         require_pins(plan)
         with closing(connect(REAL, "")) as hardware:
