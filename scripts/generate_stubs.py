@@ -18,7 +18,7 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
-from mujoco import _specs
+import mujoco
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _MODULES: Final = (
@@ -57,7 +57,7 @@ def _plural(name: str) -> str:
 # The element type of each list that a spec or a body gives, such as `bodies`.
 _LISTS: Final = {
     _plural(name.removeprefix("Mjs").lower()): f"list[{name}]"
-    for name in dir(_specs)
+    for name in dir(mujoco)
     if name.startswith("Mjs")
 }
 
