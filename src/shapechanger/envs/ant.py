@@ -131,7 +131,7 @@ class _Ant(Binding):
         # Joining memory is four times as fast as joining arrays of this size.
         after = (data.qpos, data.qvel, self.main_xy, self.healthy_z_range, self.forces.ravel())
         self.after = [memoryview(cast("Any", view)) for view in after]
-        self._main_xy = memoryview(cast("Any", self.main_xy))
+        self._main_xy = memoryview(self.main_xy)
 
     def remember(self) -> bytes:
         """Return the main body's place, which `conclude` needs from before the physics."""
