@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import sync_playwright
 
 from benchmarks.row import Row
-from shapechanger.cli.suite import Run as RunSuite
+from shapechanger.cli.suite import SuiteRun
 from shapechanger.envs.suite_file import load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.files import read_json, write_json
@@ -231,7 +231,7 @@ def _suite(name: str) -> dict[str, Study]:
     """Run the missing studies of a suite and write the values of its runs."""
     suite, out = load_suite(name), Path("results", name)
     seeds = int(os.environ.get("SEEDS", suite.seeds))
-    RunSuite(name=name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()
+    SuiteRun(name=name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()
     studies = _finished(name)
     write_json(RESULTS / f"atlas-{name}-runs.json", {one: _runs(s) for one, s in studies.items()})
     return studies

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.row import Row
-from shapechanger.cli.suite import Run as RunSuite
+from shapechanger.cli.suite import SuiteRun
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.metrics.intervals import estimate_difference
 from shapechanger.transfer.report.verdict import estimate_text
@@ -176,7 +176,7 @@ def _evaluations(runs: Path, kind: str) -> dict[int, list[Evaluation]]:
 
 def _suite(name: Literal["vehicles", "lenses", "waypoints"]) -> list[StudyOutcome]:
     out = Path("results", name)
-    RunSuite(name=name, seeds=_seeds(), out=out).run()
+    SuiteRun(name=name, seeds=_seeds(), out=out).run()
     return msgspec.json.decode((out / "suite.json").read_bytes(), type=list[StudyOutcome])
 
 

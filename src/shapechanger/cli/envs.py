@@ -37,7 +37,7 @@ def summaries() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class List:
+class EnvsList:
     """List all envs."""
 
     odrl: bool = False
@@ -63,7 +63,7 @@ class List:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Show(OneEnv):
+class EnvsShow(OneEnv):
     """Show the name, unit and range of each number of an env's observation and action."""
 
     def run(self) -> None:
@@ -78,7 +78,7 @@ class Show(OneEnv):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compare(TwoEnvs):
+class EnvsCompare(TwoEnvs):
     """Compare two envs: what the shift from one to the other changes."""
 
     def run(self) -> None:
@@ -89,7 +89,7 @@ class Compare(TwoEnvs):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check(OneEnv):
+class EnvsCheck(OneEnv):
     """Check that an env satisfies the contract that learners rely on."""
 
     def run(self) -> None:
@@ -98,7 +98,7 @@ class Check(OneEnv):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Render(OneEnv):
+class EnvsRender(OneEnv):
     """Render an env's body in its start pose."""
 
     out: Path

@@ -43,7 +43,7 @@ _MOST_BYTES: Final = 1 << 20
 
 
 @dataclass(frozen=True)
-class Identify:
+class FingerIdentify:
     """Identify a finger's parameters from a log, with confidence intervals."""
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
@@ -103,7 +103,7 @@ def _table(found: IdentifiedFinger) -> Table:
 
 
 @dataclass(frozen=True)
-class Record:
+class FingerRecord:
     """Excite all joints of a finger and log the motion."""
 
     env: EnvId
@@ -152,7 +152,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Export:
+class FingerExport:
     """Export a finger as MJCF, which MuJoCo loads without Shapechanger."""
 
     out: Path

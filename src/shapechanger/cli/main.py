@@ -44,10 +44,10 @@ class Group:
     commands: Mapping[str, str | Group]
 
 
-def _group(summary: str, modules: Mapping[str, Sequence[str]]) -> Group:
-    """Return a group from the names of commands in each module, whose classes have these names."""
+def _group(group: str, summary: str, modules: Mapping[str, Sequence[str]]) -> Group:
+    """Return a group from the commands in each module; `envs list` has the class `EnvsList`."""
     places = {
-        name: f"{module}:{name.title().replace('-', '')}"
+        name: f"{module}:{group.title()}{name.title().replace('-', '')}"
         for module, names in modules.items()
         for name in names
     }
@@ -60,6 +60,7 @@ COMMANDS: Final = Group(
     "--quick`; each command has --help.",
     {
         "envs": _group(
+            "envs",
             "Look at the envs: list, show, compare, check, render.",
             {"envs": ("list", "show", "compare", "check", "render")},
         ),
@@ -67,15 +68,18 @@ COMMANDS: Final = Group(
         "play": "play:Play",
         "transfer": "transfer:Transfer",
         "suite": _group(
+            "suite",
             "Run, watch and merge suites: many studies with one page.",
             {"suite": ("run", "watch", "merge", "list")},
         ),
         "methods": "transfer:Methods",
         "policies": _group(
+            "policies",
             "List, inspect, watch, evaluate, export, convert and share policies.",
             {"policies": ("list", "show", "play", "evaluate", "export", "convert", "push", "pull")},
         ),
         "robot": _group(
+            "robot",
             "Set up, serve, find, drive and test robots.",
             {
                 "robot.setup": ("init", "install", "key", "home", "safe-pins"),
@@ -88,6 +92,7 @@ COMMANDS: Final = Group(
             },
         ),
         "demos": _group(
+            "demos",
             "Record, inspect, edit and share demonstrations, and learn from them.",
             {
                 "demos.record": ("record", "replay"),
@@ -99,6 +104,7 @@ COMMANDS: Final = Group(
             },
         ),
         "finger": _group(
+            "finger",
             "Record, identify and export a finger.",
             {"finger": ("record", "identify", "export")},
         ),

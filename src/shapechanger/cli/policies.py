@@ -76,7 +76,7 @@ class _InEnv(_OfPolicy):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Show(_OfPolicy):
+class PoliciesShow(_OfPolicy):
     """Print where a policy comes from, and what it senses and does."""
 
     def run(self) -> None:
@@ -140,7 +140,7 @@ def layouts_in(card: Any) -> tuple[Layout | None, Layout | None]:
 
 
 @dataclass(frozen=True)
-class List:
+class PoliciesList:
     """List the policies in a folder and its subfolders."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")] = Path("results")
@@ -183,7 +183,7 @@ class List:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(_InEnv):
+class PoliciesEvaluate(_InEnv):
     """Play a policy for some episodes, and print its measures."""
 
     episodes: int = 10
@@ -209,7 +209,7 @@ class Evaluate(_InEnv):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Play(_InEnv, Watching):
+class PoliciesPlay(_InEnv, Watching):
     """Watch a policy in the env of its training, in a window or as a video."""
 
     def run(self) -> None:
@@ -217,7 +217,7 @@ class Play(_InEnv, Watching):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(_InEnv):
+class PoliciesExport(_InEnv):
     """Export a policy for other programs, which need neither PyTorch nor Shapechanger.
 
     A robot runs a clone on board. --env and --body name the body that a policy of limbs is exported
@@ -265,7 +265,7 @@ def _learned_with(card: CloneCard) -> tuple[str, float | None]:
 
 
 @dataclass(frozen=True)
-class Convert:
+class PoliciesConvert:
     """Convert a zip of PPO, SAC or TQC from Stable-Baselines3; loading it can run code from it."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -298,7 +298,7 @@ _MAX_BYTES: Final = 256 << 20  # As for the files of policies.
 
 
 @dataclass(frozen=True)
-class Push:
+class PoliciesPush:
     """Upload a policy to the Hugging Face Hub, with a card that describes it."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -316,7 +316,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class Pull:
+class PoliciesPull:
     """Download a policy from the Hugging Face Hub; nothing else of the repository is read."""
 
     repo: RepoName

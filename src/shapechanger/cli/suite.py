@@ -64,7 +64,7 @@ _FILE_WIDTH: Final = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(StudyRuns):
+class SuiteRun(StudyRuns):
     """Run a suite of studies: one study and report per pair, and a joint page.
 
     Run the same command again to resume, or with more seeds to add to it.
@@ -135,7 +135,7 @@ def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
 
 
 @dataclass(frozen=True)
-class Watch:
+class SuiteWatch:
     """Watch a suite that runs elsewhere: progress and last evaluations of its runs."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
@@ -159,7 +159,7 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Merge:
+class SuiteMerge:
     """Merge folders of one suite that were run on several machines, and write its page."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
@@ -200,7 +200,7 @@ class Merge:
 
 
 @dataclass(frozen=True)
-class List:
+class SuiteList:
     """List the suites that come with Shapechanger."""
 
     def run(self) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.demos.recordings import Export, Import
+from shapechanger.cli.demos.recordings import DemosExport, DemosImport
 from shapechanger.demos.episodes import drop
 from shapechanger.errors import UnknownName
 from tests.cli.running import Cli
@@ -15,7 +15,7 @@ from tests.demos.exchange.small import drive, keys_folder, tub_folder
 
 
 def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Import(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
+    DemosImport(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
     assert capsys.readouterr().out == (
         f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 images\nwrote {tmp_path / 'data'}\n"
     )
@@ -56,30 +56,30 @@ def test_export_prints_a_summary_and_how_to_load(
     """Dropped steps are counted, and the Minari path is given."""
     path = drive(tmp_path / "data")
     drop(path, 1, 2, "bad")
-    Export(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
+    DemosExport(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
     output = capsys.readouterr().out
     assert "3 steps of 2 episodes\n" in output
     assert "note: Episodes are split at excluded or missing steps (1 times)" in output
     assert "left out 2 dropped steps; --dropped includes them" in output
     assert f"MINARI_DATASETS_PATH={tmp_path / 'sets'}" in output
     assert "minari.load_dataset('drive-v0')" in output
-    Export(tmp_path / "data", tmp_path / "csv", "csv", dropped=True).run()
+    DemosExport(tmp_path / "data", tmp_path / "csv", "csv", dropped=True).run()
     assert "5 steps of 1 episode\n" in capsys.readouterr().out
 
 
 def test_an_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'minari'"):
-        Export(drive(tmp_path / "data"), tmp_path / "out", "mniari").run()
+        DemosExport(drive(tmp_path / "data"), tmp_path / "out", "mniari").run()
 
 
 def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """How to load a LeRobot dataset is printed, and what takes dropped steps."""
     drop(drive(tmp_path / "data"), 0, 0, "bad")
-    Export(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
+    DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out
     assert "4 steps of 1 episode\nleft out 1 dropped steps\n" in output
     assert f"LeRobotDataset('set', root='{tmp_path / 'set'}')" in output
-    Import(tmp_path / "set", tmp_path / "back", camera="camera").run()
+    DemosImport(tmp_path / "set", tmp_path / "back", camera="camera").run()
     assert "(lerobot): 1 episode, 4 steps, 4 images" in capsys.readouterr().out
-    Export(tmp_path / "data", tmp_path / "logs", "mcap").run()
+    DemosExport(tmp_path / "data", tmp_path / "logs", "mcap").run()
     assert "left out 1 dropped steps; --dropped includes them" in capsys.readouterr().out

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.cli.demos.train import Evaluate, Train
+from shapechanger.cli.demos.train import DemosEvaluate, DemosTrain
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
@@ -44,7 +44,7 @@ def test_a_recording_becomes_a_policy_with_a_report(
     """`train` writes policy, report and exports; `evaluate` prints the accuracy last."""
     data = _record(tmp_path / "drive", 150, 0)
     out = tmp_path / "made" / "policy.safetensors"
-    Train(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
+    DemosTrain(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
     made = sorted(path.name for path in out.parent.iterdir())
     assert made == ["policy.html", "policy.json", "policy.safetensors", "ppo.zip"]
     page = out.with_suffix(".html").read_text()
@@ -59,11 +59,13 @@ def test_a_recording_becomes_a_policy_with_a_report(
         assert told in " ".join(html.unescape(page).split())
     assert CameraPolicy.load(out).card.data["learned"] == 120
     capsys.readouterr()
-    Evaluate(out, data).run()
+    DemosEvaluate(out, data).run()
     lines = capsys.readouterr().out.splitlines()
     assert "learned from the first 120 of these 150 steps" in " ".join(lines)
     capsys.readouterr()
-    Evaluate(out, _record(tmp_path / "other", 60, 1), report=tmp_path / "r" / "page.html").run()
+    DemosEvaluate(
+        out, _record(tmp_path / "other", 60, 1), report=tmp_path / "r" / "page.html"
+    ).run()
     lines = capsys.readouterr().out.splitlines()
     report = json.loads((tmp_path / "r" / "page.json").read_text())
     assert lines[-1] == f"accuracy {report['evaluation']['accuracy']:.3f}"
@@ -76,7 +78,7 @@ def test_regression_prints_errors_and_accuracy(
     data = _record(tmp_path / "drive", 90, 0, STEERS)
     _record(data, 30, 1, STEERS)
     out = tmp_path / "policy.safetensors"
-    Train(data, out, split="episode", sac=tmp_path / "sac.zip").run()
+    DemosTrain(data, out, split="episode", sac=tmp_path / "sac.zip").run()
     assert CameraPolicy.load(out).card.data["learned"] == 90
     text = capsys.readouterr().out
     assert "steering: mean absolute error" in text
@@ -88,15 +90,15 @@ def test_invalid_arguments_are_refused_before_training(tmp_path: Path) -> None:
     data = _record(tmp_path / "drive", 20, 0)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match="it is a folder"):
-        Train(data, tmp_path / "taken").run()
+        DemosTrain(data, tmp_path / "taken").run()
     with pytest.raises(OutputError, match="two files"):
-        Train(data, tmp_path / "p.safetensors", sac=tmp_path / "p.safetensors").run()
+        DemosTrain(data, tmp_path / "p.safetensors", sac=tmp_path / "p.safetensors").run()
     with pytest.raises(CloningError, match="one episode only"):
-        Train(data, tmp_path / "p.safetensors", split="episode").run()
+        DemosTrain(data, tmp_path / "p.safetensors", split="episode").run()
     with pytest.raises(DemosError):
-        Train(tmp_path / "nowhere", tmp_path / "p.safetensors").run()
+        DemosTrain(tmp_path / "nowhere", tmp_path / "p.safetensors").run()
     with pytest.raises(PolicyError, match="no policy file"):
-        Evaluate(tmp_path / "p.safetensors", data).run()
+        DemosEvaluate(tmp_path / "p.safetensors", data).run()
     assert not (tmp_path / "p.safetensors").exists()
 
 
@@ -104,4 +106,4 @@ def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
     policy = CameraPolicy.fresh(QUICK, 0)
     policy.save(tmp_path / "p.safetensors")
     with pytest.raises(PolicyError, match=r"policy are steering, throttle, but .* forward"):
-        Evaluate(tmp_path / "p.safetensors", _record(tmp_path / "drive", 10, 0)).run()
+        DemosEvaluate(tmp_path / "p.safetensors", _record(tmp_path / "drive", 10, 0)).run()

@@ -14,7 +14,7 @@ import simplejpeg
 
 from shapechanger.cli import main
 from shapechanger.cli.demos import train
-from shapechanger.cli.demos.train import Evaluate, Train
+from shapechanger.cli.demos.train import DemosEvaluate, DemosTrain
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
@@ -95,7 +95,7 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     A recording is labelled in an evaluation as in training, so its own one is recognised.
     """
     data, out = _record(tmp_path / "drive"), tmp_path / "policy.safetensors"
-    Train(data, out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
+    DemosTrain(data, out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
     card = CameraPolicy.load(out).card
     assert card.action_layout == ACTION_LAYOUT
     assert card.data["response"] == pytest.approx([_PER_METRE, 0.0], abs=0.01)
@@ -106,15 +106,15 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     assert "fitted to the recorded motion" in printed
     assert "16.7% of the steps are left out: it stands still" in printed
     assert "outside the image, which ends 31 degrees to each side" in printed
-    Evaluate(out, data).run()
+    DemosEvaluate(out, data).run()
     printed = " ".join(capsys.readouterr().out.split())
     assert "fitted to the recorded motion" in printed
     assert "learned from the first 40 of these 50 steps" in printed
     assert "waypoint/bearing: mean absolute error" in printed
     other = _record(tmp_path / "other", state=None)
     with pytest.raises(DemosError, match="give --response"):
-        Evaluate(out, other).run()
-    Evaluate(out, other, response=(1.9, 0.0)).run()
+        DemosEvaluate(out, other).run()
+    DemosEvaluate(out, other, response=(1.9, 0.0)).run()
     assert "as given" in " ".join(capsys.readouterr().out.split())
 
 
@@ -187,7 +187,7 @@ def test_unsuitable_recordings_are_refused(
     """One sentence names everything missing, and nothing is written."""
     data, out = _record(tmp_path / "drive", **changes), tmp_path / "policy.safetensors"
     with pytest.raises((DemosError, WorldError), match=why):
-        Train(data, out, waypoints=True).run()
+        DemosTrain(data, out, waypoints=True).run()
     assert not out.exists()
 
 
@@ -211,11 +211,11 @@ def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     """Options of waypoints need `--waypoints`, and their kind of policy is given."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
     with pytest.raises(DemosError, match="belong to --waypoints"):
-        Train(data, out, camera=(0.0, 48.8)).run()
+        DemosTrain(data, out, camera=(0.0, 48.8)).run()
     with pytest.raises(DemosError, match="leave out --head, --inputs"):
-        Train(data, out, waypoints=True, inputs="state").run()
+        DemosTrain(data, out, waypoints=True, inputs="state").run()
     with pytest.raises(WorldError, match="from 0 to 180, got 95 and 48"):
-        Train(data, out, waypoints=True, camera=(95.0, 48.0)).run()
+        DemosTrain(data, out, waypoints=True, camera=(95.0, 48.0)).run()
 
 
 @pytest.mark.gl

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.setup import Init, Install
+from shapechanger.cli.robot.setup import RobotInit
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile, shipped_profiles
 from shapechanger.robot.setup.install import Machine
@@ -42,7 +42,7 @@ def test_enter_takes_the_defaults(asked: tuple[list[str], list[str]]) -> None:
     """The profile is then the shipped one."""
     questions, answers = asked
     answers += [""] * 4
-    Init().run()
+    RobotInit().run()
     assert len(questions) == 4
     assert all(question.endswith("]: ") for question in questions)
     assert Path("car.toml").read_text() == shipped_profiles()["car"].read_text()
@@ -67,7 +67,7 @@ def test_answers_are_checked_one_by_one(
         "me",
         "Any",
     ]
-    Init().run()
+    RobotInit().run()
     said = capsys.readouterr().out
     for words in (
         "  car         The New Bright car of 2017: two small motors",
@@ -95,9 +95,9 @@ def test_on_a_pi_the_fifth_question_installs(
     questions, answers = asked
     installed: list[str] = []
     monkeypatch.setattr(Machine, "require_pi", lambda _: None)
-    monkeypatch.setattr(Install, "run", lambda self: installed.append(self.profile))
+    monkeypatch.setattr(RobotInstall, "run", lambda self: installed.append(self.profile))
     answers += ["tank", "", "usb", "", "maybe", ""]
-    Init().run()
+    RobotInit().run()
     assert installed == ["tank.toml"]
     assert "robot install" not in capsys.readouterr().out
     assert len(set(questions)) == 5
@@ -105,7 +105,7 @@ def test_on_a_pi_the_fifth_question_installs(
     assert camera is not None
     assert camera.driver == "v4l2"
     answers += ["tank", "second", "", "", "no"]
-    Init().run()
+    RobotInit().run()
     assert installed == ["tank.toml"]
 
 
@@ -116,7 +116,7 @@ def test_the_end_of_the_answers_writes_nothing(
     _, answers = asked
     answers += ["car", "rover"]
     with pytest.raises(RobotError, match="nothing was written"):
-        Init().run()
+        RobotInit().run()
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
@@ -125,10 +125,10 @@ def test_arguments_ask_nothing(
 ) -> None:
     """A script can choose the same; it needs the kind, as a command without a terminal does."""
     with pytest.raises(RobotError, match=r"`shapechanger robot init car`. There are: .*boat"):
-        Init(name="rover").run()
-    Init("car", "bench", camera="none").run()
+        RobotInit(name="rover").run()
+    RobotInit("car", "bench", camera="none").run()
     assert load_profile("bench.toml").camera is None
     monkeypatch.setattr("sys.stdin", io.StringIO())
     with pytest.raises(RobotError, match="Name the kind"):
-        Init().run()
+        RobotInit().run()
     assert asked[0] == []

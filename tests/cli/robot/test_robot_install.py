@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.setup import Install
+from shapechanger.cli.robot.setup import RobotInstall
 from shapechanger.errors import RobotError
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.profile.load import load_profile, write_profile
@@ -39,7 +39,7 @@ def said(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> Said:
     """Install the car with some options, and return the printed lines."""
 
     def run(**options: bool) -> list[str]:
-        Install("rover.toml", **options).install(car, pi.machine)
+        RobotInstall("rover.toml", **options).install(car, pi.machine)
         return capsys.readouterr().out.splitlines()
 
     return run
@@ -97,16 +97,16 @@ def test_the_profile_of_this_folder_is_named(
     """A shipped name is meant for the file of that name, if it exists."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RobotError, match="`shapechanger robot init car` writes your own"):
-        Install("car").run()
+        RobotInstall("car").run()
     Path("car.toml").touch()
     with pytest.raises(RobotError, match=r"car\.toml in this folder is your own"):
-        Install("car").run()
+        RobotInstall("car").run()
 
 
 def test_who_is_refused(pi: FakePi, car: Profile, said: Said, tmp_path: Path) -> None:
     """Root, a unit of another profile or user, a robot without its key, and another computer."""
     with pytest.raises(RobotError, match="without sudo"):
-        Install("rover.toml").install(car, replace(pi.machine, user="root"))
+        RobotInstall("rover.toml").install(car, replace(pi.machine, user="root"))
     unit = car.path.with_name("shapechanger-rover.service")
     unit.write_text("[Service]\n")
     with pytest.raises(RobotError, match=r"does not name .*rover\.toml: remove it"):

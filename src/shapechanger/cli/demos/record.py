@@ -26,7 +26,7 @@ from shapechanger.transfer.executor import use_one_thread
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record(OneEnv):
+class DemosRecord(OneEnv):
     """Record an expert or a policy in an env."""
 
     out: Path
@@ -120,7 +120,7 @@ class Record(OneEnv):
 
 
 @dataclass(frozen=True)
-class Replay:
+class DemosReplay:
     """Replay an episode as a video, in an env or on a robot."""
 
     episode: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EPISODE")]

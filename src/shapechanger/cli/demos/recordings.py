@@ -57,7 +57,7 @@ _To = Annotated[int | None, tyro.conf.arg(name="to", metavar="STEP")]
 
 
 @dataclass(frozen=True)
-class List:
+class DemosList:
     """List the episodes of a recording."""
 
     data: _Data
@@ -109,7 +109,7 @@ class List:
 
 
 @dataclass(frozen=True)
-class Show:
+class DemosShow:
     """Summarise a recording in numbers, or as an HTML page with frames."""
 
     data: _Data
@@ -185,7 +185,7 @@ class _Steps:
         return episode, first, last
 
 
-class Cut(_Steps):
+class DemosCut(_Steps):
     """Keep a range of steps of an episode and drop the rest."""
 
     def run(self) -> None:
@@ -198,7 +198,7 @@ class Cut(_Steps):
         _tell(episode.path)
 
 
-class Bad(_Steps):
+class DemosBad(_Steps):
     """Drop steps of an episode, or all of them."""
 
     def run(self) -> None:
@@ -207,7 +207,7 @@ class Bad(_Steps):
         _tell(episode.path)
 
 
-class Good(_Steps):
+class DemosGood(_Steps):
     """Restore dropped steps of an episode, or all of them."""
 
     def run(self) -> None:
@@ -217,7 +217,7 @@ class Good(_Steps):
 
 
 @dataclass(frozen=True)
-class Mark:
+class DemosMark:
     """Mark a step of an episode."""
 
     episode: _Episode
@@ -239,7 +239,7 @@ def _tell(path: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Merge:
+class DemosMerge:
     """Copy the episodes of several recordings into one; nothing is overwritten."""
 
     data: Annotated[
@@ -264,7 +264,7 @@ class Merge:
 
 
 @dataclass(frozen=True)
-class Repair:
+class DemosRepair:
     """Repair a recording after a crash: keep complete steps and move the rest aside."""
 
     data: _Data
@@ -303,7 +303,7 @@ PARTLY_IMPORTED: Final = 3
 
 
 @dataclass(frozen=True)
-class Import:
+class DemosImport:
     """Import a recording from another format, leaving the source unchanged.
 
     What is whole is imported, and the rest is listed. The exit code is 0 if all was imported, 3 if
@@ -348,7 +348,7 @@ class Import:
 
 
 @dataclass(frozen=True)
-class Export:
+class DemosExport:
     """Export a recording to another format, leaving the recording unchanged."""
 
     data: _Data
@@ -392,7 +392,7 @@ _MOST_HASHES: Final = 50
 
 
 @dataclass(frozen=True)
-class Push:
+class DemosPush:
     """Upload a recording to the Hugging Face Hub, with a card that describes it."""
 
     data: _Data
@@ -418,7 +418,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class Pull:
+class DemosPull:
     """Download a recording from the Hugging Face Hub; nothing else of the repository is read."""
 
     repo: RepoName

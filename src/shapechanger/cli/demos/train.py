@@ -56,7 +56,7 @@ class _Waypoints:
 
 
 @dataclass(frozen=True)
-class Train(_Waypoints):
+class DemosTrain(_Waypoints):
     """Clone a driver from demonstrations; write the policy and a report."""
 
     data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
@@ -209,7 +209,7 @@ def _print_evaluation(evaluation: EvaluationResult) -> None:
 
 
 @dataclass(frozen=True)
-class Evaluate(_Waypoints):
+class DemosEvaluate(_Waypoints):
     """Compare a policy with a driver's demonstrations; the last line is the accuracy."""
 
     policy: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]

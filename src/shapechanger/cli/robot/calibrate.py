@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Calibrate:
+class RobotCalibrate:
     """Calibrate servo ends and centres, motor directions and wheel circumferences."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]

@@ -35,7 +35,7 @@ _JPEG: Final = b"\xff\xd8\xff"  # Begins each JPEG.
 
 
 @dataclass(frozen=True)
-class Camera:
+class RobotCamera:
     """Measure pitch and field of view of the camera, write them into the profile, and draw them.
 
     With neither --board nor --horizon it draws what the profile says.

@@ -31,7 +31,7 @@ _PORT: Final = 5000
 
 
 @dataclass(frozen=True)
-class Check:
+class RobotCheck:
     """Check a robot's computer and wires, and then, with its wheels off the ground, that it stops.
 
     It exits with 1 if anything is bad.

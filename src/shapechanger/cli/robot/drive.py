@@ -32,7 +32,7 @@ _LOOK_EVERY_S: Final = 0.2
 
 
 @dataclass(frozen=True)
-class Drive:
+class RobotDrive:
     """Drive a robot in its web console, or with the keys of this terminal.
 
     People take precedence over programs. With --policy, a policy drives once a person permits it,

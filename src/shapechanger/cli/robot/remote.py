@@ -35,7 +35,7 @@ _LocalName = Annotated[
 
 
 @dataclass(frozen=True)
-class Find:
+class RobotFind:
     """List the robots on this network."""
 
     seconds: float = 2.0
@@ -66,7 +66,7 @@ class Find:
 
 
 @dataclass(frozen=True)
-class Remember:
+class RobotRemember:
     """Store a robot's address and key under a name."""
 
     name: _LocalName
@@ -83,7 +83,7 @@ class Remember:
 
 
 @dataclass(frozen=True)
-class Forget:
+class RobotForget:
     """Remove a known robot."""
 
     name: _LocalName
@@ -110,7 +110,7 @@ _CONFIRMED_WITHIN_S: Final = 2.0
 
 
 @dataclass(frozen=True)
-class Stop:
+class RobotStop:
     """Stop a robot immediately, whoever drives it, until a person arms it again."""
 
     robot: RobotName
@@ -140,7 +140,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Fetch:
+class RobotFetch:
     """Download a robot's recordings to this machine, or only what is new."""
 
     robot: RobotName

@@ -39,7 +39,7 @@ _ROOM: Final = "room"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Serve(Service):
+class RobotServe(Service):
     """Run a robot's guard and daemon, on its hardware or on a twin."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]

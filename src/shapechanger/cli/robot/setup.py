@@ -53,7 +53,7 @@ from shapechanger.robot.setup.install import (
 
 
 @dataclass(frozen=True)
-class Init:
+class RobotInit:
     """Create the profile, key and certificate of a new robot; at a terminal, by questions."""
 
     kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[KIND]")] = ""
@@ -72,7 +72,7 @@ class Init:
     """Who may arm it: only a person, or programs, too; as its kind has it if not given."""
 
     def run(self) -> None:
-        if self == Init() and sys.stdin.isatty():
+        if self == RobotInit() and sys.stdin.isatty():
             self._ask()
             return
         if not self.kind:
@@ -93,7 +93,7 @@ class Init:
         stated = load_profile(kinds[kind])
 
         def free(name: str) -> str:
-            Init(kind, name)._checked()
+            RobotInit(kind, name)._checked()
             return name
 
         name = _answer("Its name", kind, free)
@@ -116,10 +116,10 @@ class Init:
             "camera": "" if camera == has else camera,
             "arming": "" if arming == stated.arming else arming,
         }
-        made = Init(kind, name, **chosen)._write(installs=installs == "yes")
+        made = RobotInit(kind, name, **chosen)._write(installs=installs == "yes")
         if installs == "yes":
             say("")
-            Install(str(made)).run()
+            RobotInstall(str(made)).run()
 
     def _checked(self) -> tuple[str, Path]:
         """Return name and file of the profile, after all checks."""
@@ -157,7 +157,7 @@ class Init:
 
 
 @dataclass(frozen=True)
-class Key:
+class RobotKey:
     """Show the key and fingerprint of a robot that was set up on this machine."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
@@ -279,7 +279,7 @@ _CYCLE_S: Final = 0.01
 
 
 @dataclass(frozen=True)
-class Home:
+class RobotHome:
     """Find the zeros of a rig's tendons and joints while a person holds the finger straight."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
@@ -309,7 +309,7 @@ _AFTERWARDS = {
 
 
 @dataclass(frozen=True)
-class Install:
+class RobotInstall:
     """Put a robot's service, groups, buses and camera in place on a Raspberry Pi."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
@@ -391,7 +391,7 @@ def require_port(port: int) -> None:
 
 
 @dataclass(frozen=True)
-class SafePins:
+class RobotSafePins:
     """Put every output of a robot at rest after a crash, as systemd's ExecStopPost."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
