@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.setup import RobotInit
+from shapechanger.cli.robot.setup import RobotInit, RobotInstall
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile, shipped_profiles
 from shapechanger.robot.setup.install import Machine
