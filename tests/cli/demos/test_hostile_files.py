@@ -405,6 +405,18 @@ def test_a_hostile_lerobot_dataset_is_refused(tmp_path: Path, jail: Jail, name: 
 
 REWARDS = "episode_0/rewards"
 ACTIONS = "episode_0/actions"
+
+
+def endless(file: h5py.File, place: str) -> None:
+    """Claim 10^12 steps in all columns."""
+    file.create_dataset(place, (1 << 40,), "f8", chunks=(1 << 10,))
+    group = file["episode_0"]
+    group.attrs["total_steps"] = 1 << 40
+    infos = ("infos/step", "infos/frame", "observations/image", "observations/state")
+    for name in ("actions", "terminations", "truncations", *infos):
+        group[name].resize(1 << 40, axis=0)
+
+
 DATASETS: dict[str, tuple[str, Callable[[h5py.File, str], object], str]] = {
     "a soft link to itself": (
         REWARDS,
@@ -426,11 +438,7 @@ DATASETS: dict[str, tuple[str, Callable[[h5py.File, str], object], str]] = {
         lambda f, at: f.create_dataset(at, (1 << 27,), "f8", chunks=(1 << 27,), compression="gzip"),
         "more than the limit",
     ),
-    "10^12 steps": (
-        REWARDS,
-        lambda f, at: f.create_dataset(at, (1 << 40,), "f8", chunks=(1 << 10,)),
-        "claims at least",
-    ),
+    "10^12 steps": (REWARDS, endless, "claims at least"),
     "10^12 values in a step": (
         ACTIONS,
         lambda f, at: f.create_dataset(at, (5, 1 << 40), "f8", chunks=(1, 1 << 10)),

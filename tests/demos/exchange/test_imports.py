@@ -235,15 +235,6 @@ def test_images_of_other_minari_datasets(
             assert stored == bytes(file["episode_0/observations"][0])
 
 
-def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
-    keys_folder(tmp_path / "keys")
-    before = snapshot(tmp_path)
-    ((head, steps),) = list(import_episodes(tmp_path / "keys"))
-    assert head.source == "csv"
-    assert [(step.index, jpeg) for step, jpeg in steps] == [(n, picture(n)) for n in range(3)]
-    assert snapshot(tmp_path) == before
-
-
 def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> None:
     records = [r | {"_timestamp_ms": 1000 + 50 * n} for n, r in enumerate(_RECORDS[:3] * 4)]
     folder = tub_folder(tmp_path / "tub", records)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 from typing import Any
 
@@ -153,6 +154,7 @@ def every(change: Any) -> Any:
         ({"rows": row(9, timestamp=None)}, [], "timestamp that is empty"),
         # The entries.
         ({"places": place(0, length=7)}, [1], r"another length.*a length of 7"),
+        ({"places": place(0, dataset_to_index=9)}, [1], r"length is not dataset_to_index - .*9\)"),
         (
             {"places": place(1, dataset_from_index=7, dataset_to_index=15)},
             [0],
@@ -161,7 +163,6 @@ def every(change: Any) -> Any:
         ({"places": lambda entries: entries[:1]}, [0], "meta/episodes does not have: 1"),
         ({"places": lambda entries: entries[1:]}, [1], "meta/episodes does not have: 0"),
         ({"places": lambda entries: [*entries, entries[0]]}, [1], "has twice: 0"),
-        ({"places": place(1, **{"data/file_index": 7})}, [0], "There is no"),
         ({"rows": lambda rows: rows[:8]}, [0], "without rows in the data: 1"),
     ],
 )
@@ -169,8 +170,6 @@ def test_contradictions_are_left_out(
     tmp_path: Path, options: dict[str, Any], episodes: list[int], reason: str
 ) -> None:
     """An episode whose keys disagree is not imported, and the report states by how much."""
-    import re
-
     pairs, context = pairs_of(write_set(tmp_path / "set", **options))
     assert pairs == [BOTH[number] for number in episodes]
     assert re.search(reason, "\n".join(context.left_out_lines())), context.left_out_lines()
@@ -212,7 +211,7 @@ def test_rows_in_any_order_and_in_several_files(tmp_path: Path) -> None:
     pq.write_table(table.slice(5), (folder / DATA).with_name("file-001.parquet"))
     pairs, context = pairs_of(folder)
     assert pairs == BOTH
-    assert "Rows of 2 episodes are in other files" in context.warnings[0]
+    assert not context.warnings
 
 
 def test_a_missing_row_is_a_missing_step(tmp_path: Path) -> None:

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext
-from shapechanger.demos.exchange.exports import kept_steps
+from shapechanger.demos.exchange.format import kept_steps
 from shapechanger.demos.exchange.imports import (
     SourceRecord,
-    episode_of,
+    rows_of,
     stretches,
     with_pictures,
 )
@@ -41,7 +41,7 @@ def test_each_record_is_a_step_with_its_picture_or_left_out(
         )
         for n, (data, finite, fine) in enumerate(shown)
     ]
-    rows = episode_of(iter(records), header(), context, name="x", what="record").rows
+    rows = rows_of(iter(records), header().image_size, context, "record")
     kept = [(int(step.action[1]), jpeg) for step, jpeg in kept_steps(rows)]
     good = [n for n, (data, *fine) in enumerate(shown) if data in GOOD and all(fine)]
     assert kept == [(n, shown[n][0]) for n in good]
@@ -78,7 +78,7 @@ def test_stretches_are_all_records_in_order_and_without_jumps(times_ns: list[int
         for n, ns in enumerate(times_ns)
     ]
     found = stretches([records], "record", ImportContext())
-    assert [record for part in found for record in part.records] == records
-    for part in found:
-        times = [record.step.captured_ns for record in part.records]
-        assert times == (sorted(times) if part.timed else [None] * len(times))
+    assert [record for part, _, _ in found for record in part] == records
+    for part, _, timed in found:
+        times = [record.step.captured_ns for record in part]
+        assert times == (sorted(times) if timed else [None] * len(times))

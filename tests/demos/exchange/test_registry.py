@@ -10,7 +10,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.demos.exchange import formats
-from shapechanger.demos.exchange.format import as_markdown
+from shapechanger.demos.exchange.format import COLUMNS, FORMATS
 from shapechanger.errors import DemosError
 from tests.demos.exchange.small import all_of
 
@@ -99,4 +99,9 @@ def test_a_format_of_a_name_that_is_taken(installed: Path) -> None:
 
 
 def test_the_columns_are_documented() -> None:
-    assert as_markdown() in DOCS.read_text()
+    lines = [("Field", *FORMATS), ("---",) * (1 + len(FORMATS))]
+    for field, column in COLUMNS.items():
+        named = (f"`{name}`" if (name := column.names.get(form)) else "" for form in FORMATS)
+        lines.append((f"`{field}`", *named))
+    table = "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines)
+    assert table in DOCS.read_text()

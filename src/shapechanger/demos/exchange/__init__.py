@@ -2,8 +2,8 @@
 
 A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
 `Format` (`format`), which `convert` finds among our own and in the entry points
-`shapechanger.formats`. `columns` names each column of a step in all formats. `files` and `pictures`
-load what strangers made, within one budget; `times` measures rates.
+`shapechanger.formats`. `format.COLUMNS` names each column of a step. `files` and `pictures`
+load what strangers made, within one budget; `imports` measures rates.
 Sources are never changed, and targets appear atomically.
 """
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from functools import cache
 from importlib.metadata import entry_points
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -17,6 +18,7 @@ from typing import Final
 from msgspec import structs
 
 from shapechanger.demos.episodes import (
+    Episode,
     EpisodeHeader,
     EpisodeWriter,
     Step,
@@ -25,17 +27,20 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.demos.episodes.files import is_episode
+from shapechanger.demos.episodes.records import Keep, longest_period_s
 from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
-from shapechanger.demos.exchange.exports import consecutive_parts, exchange_episode, kept_steps
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
+    ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
+    kept_steps,
 )
 from shapechanger.errors import DemosError, OutputError, UnknownName
 from shapechanger.files import cannot_write
+from shapechanger.layout import Layout
 
 _GROUP: Final = "shapechanger.formats"
 _OWN: Final = (tub.FORMAT, minari.FORMAT, lerobot.FORMAT, csv_files.FORMAT, mcap.FORMAT)
@@ -144,11 +149,11 @@ def export_recording(
     chosen = [(episode, episode.steps if dropped else episode.kept) for episode in read]
     if not any(steps for _, steps in chosen):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
-    notes: list[str] = []
     if form.consecutive:
-        episodes, notes = consecutive_parts(chosen, form)
+        episodes, notes = _consecutive_parts(chosen, form)
+        _require_alike(episodes, form.title)
     else:
-        episodes = [exchange_episode(episode, steps) for episode, steps in chosen]
+        episodes, notes = [_exchanged(episode, steps) for episode, steps in chosen], list[str]()
     rewarded = all(step.reward is not None for one in read for step in one.kept)
     context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
     with new_folder(out, data) as folder:
@@ -162,6 +167,120 @@ def export_recording(
             raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
     total = sum(len(episode.steps) for episode in read)
     return Exported(format, len(episodes), steps, total - steps, tuple(notes))
+
+
+def _exchanged(episode: Episode, steps: Sequence[Step]) -> ExchangeEpisode:
+    rows, name = _rows(episode, steps), episode.path.name
+    return ExchangeEpisode(header=episode.header, rows=rows, name=name, outcome=episode.outcome)
+
+
+def _rows(episode: Episode, steps: Sequence[Step]) -> Iterator[ExchangeStep]:
+    newest = episode.steps[-1].index if episode.steps else -1
+    kept = {step.index for step in episode.kept}
+    why = {
+        index: drop.why
+        for drop in episode.drops
+        if not isinstance(drop, Keep)
+        for index in range(max(0, drop.first), min(drop.last, newest) + 1)
+    }
+    marks: dict[int, list[str]] = defaultdict(list)
+    for mark in episode.marks:
+        marks[mark.step].append(mark.text)
+    frame = ""
+    for step in steps:
+        yield ExchangeStep(
+            step=step,
+            jpeg=episode.jpeg(step) if step.frame != frame else None,
+            marks=tuple(marks.get(step.index, ())),
+            dropped=None if step.index in kept else why.get(step.index, ""),
+        )
+        frame = step.frame
+
+
+def _consecutive_parts(
+    episodes: Sequence[tuple[Episode, Sequence[Step]]], form: Format
+) -> tuple[list[ExchangeEpisode], list[str]]:
+    """Split episodes where steps are excluded or missing, and at pauses; return notes, too."""
+    parts: list[ExchangeEpisode] = []
+    off_s: list[float] = []
+    pauses_s: list[float] = []
+    missing = 0
+    for episode, steps in episodes:
+        hz, starts = episode.header.control_hz, [0] if steps else []
+        for number, (one, two) in enumerate(pairwise(steps), 1):
+            passed_s = _passed_s(one, two)
+            if two.index != one.index + 1:
+                missing += 1
+            elif passed_s is not None and passed_s > longest_period_s(hz):
+                pauses_s.append(passed_s)
+            else:
+                continue
+            starts.append(number)
+        for start, end in pairwise([*starts, len(steps)]):
+            part = _exchanged(episode, steps[start:end])
+            header = replace(part.header, created=_started(episode, steps[start]))
+            outcome = episode.outcome if end == len(steps) else ""
+            parts.append(replace(part, header=header, outcome=outcome))
+            times_s = enumerate(_passed_s(steps[start], step) for step in steps[start:end])
+            by_s = max(0.0 if at is None else abs(at - n / hz) for n, at in times_s)
+            off_s += [by_s] if by_s > 0.5 / hz else []
+    notes: list[str] = []
+    whole = sum(bool(steps) for _, steps in episodes)
+    if len(parts) > whole:
+        where = [f"excluded or missing steps ({missing} times)"] if missing else []
+        if pauses_s:
+            where.append(f"pauses ({len(pauses_s)}, up to {max(pauses_s):.4g} s)")
+        notes.append(
+            f"Episodes are split at {' and '.join(where)}, because {form.title} takes each "
+            f"step for the successor of the one before: {whole} became {len(parts)}."
+        )
+    if off_s and not form.timed:
+        notes.append(
+            f"{form.title} takes the time of a step to be its number divided by the rate, "
+            f"which is off by more than half a period in {len(off_s)} of {len(parts)} "
+            f"episodes, by up to {max(off_s):.4g} s."
+        )
+    return parts, notes
+
+
+def _passed_s(one: Step, two: Step) -> float | None:
+    """Return the time between two steps on the robot's clock, s; None if it is unknown."""
+    for now, later in ((one.decided_ns, two.decided_ns), (one.captured_ns, two.captured_ns)):
+        if now is not None and later is not None:
+            return (later - now) / 1e9
+    return None
+
+
+def _started(episode: Episode, first: Step) -> str:
+    """Return when a part of an episode began, ISO 8601; the episode's start if unknown."""
+    since_s = _passed_s(episode.steps[0], first) or 0.0
+    try:
+        began = datetime.fromisoformat(episode.header.created) + timedelta(seconds=since_s)
+    except (ValueError, OverflowError):
+        return episode.header.created
+    return began.isoformat(timespec="milliseconds")
+
+
+def _require_alike(episodes: Sequence[ExchangeEpisode], title: str) -> None:
+    first, *others = [(episode.name, _kind(episode.header)) for episode in episodes]
+    for name, kind in others:
+        for what, ours in first[1].items():
+            if ours != kind[what]:
+                raise DemosError(
+                    f"{first[0]} has {what} {ours}, and {name} {kind[what]}: a {title} "
+                    "dataset has one kind of episode, so export each kind to a dataset of its own."
+                )
+
+
+def _kind(header: EpisodeHeader) -> dict[str, str]:
+    """Describe what all episodes of a dataset have in common."""
+    action, state = (
+        ", ".join(map(str, Layout.from_json(layout))) if layout else "none"
+        for layout in (header.action_layout, header.state_layout)
+    )
+    size = "no size" if header.image_size is None else "{} x {}".format(*header.image_size)
+    about = {"the actions": action, "the state": state, "images of": size}
+    return about | {"steps a second:": f"{header.control_hz:g}"}
 
 
 def _with_option(option: str, word: str = "or") -> str:
@@ -229,12 +348,13 @@ def import_recording(
     """
     context = ImportContext(camera=camera, hz=hz, strict=strict)
     found, read = _read(path, format, context)
-    named_after: datetime | None = None
+    now: datetime | None = None
     episodes = steps = pictures = 0
     with new_folder(out, path) as folder:
         for episode in read:
-            named_after = named_after or _began(episode.header)
-            added, shown = _write(episode, folder, named_after, context)
+            # The folders of all episodes begin with the same time, so that their order is kept.
+            now = now or _began(episode.header)
+            added, shown = _write(episode, folder, now, context)
             whole = added > 0 or not context.left_out
             episodes, steps, pictures = episodes + whole, steps + added, pictures + shown
         if strict:
@@ -326,14 +446,13 @@ def _formats_of(path: Path) -> list[str]:
 
 
 def _write(
-    episode: ExchangeEpisode, folder: Path, named_after: datetime, context: ImportContext
+    episode: ExchangeEpisode, folder: Path, now: datetime, context: ImportContext
 ) -> tuple[int, int]:
     """Write one episode of a recording; return its numbers of steps and images."""
     pictures = 0
     excluded: list[tuple[int, str]] = []
-    # The folders of all episodes begin with the same time, so that their order is kept.
     with EpisodeWriter.create(
-        folder, episode.header, now=lambda: named_after, created=episode.header.created
+        folder, episode.header, now=lambda: now, created=episode.header.created
     ) as writer:
         for row in episode.rows:
             try:

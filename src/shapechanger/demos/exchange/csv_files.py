@@ -14,57 +14,40 @@ import csv
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final, cast
 
+import msgspec
+
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.exports import value_names
-from shapechanger.demos.exchange.files import (
-    cannot_read,
-    is_inside,
-    read_json_object,
-    read_table,
-)
+from shapechanger.demos.exchange import files, imports
 from shapechanger.demos.exchange.format import (
     COLUMNS,
     COMMANDS,
-    Column,
     ExchangeEpisode,
     ExportContext,
     Format,
     ImportContext,
-    fields_of,
-    name_in,
+    value_names,
 )
-from shapechanger.demos.exchange.imports import (
-    SourceRecord,
-    as_json,
-    episode_of,
-    features_of,
-    stretches,
-    with_pictures,
-)
-from shapechanger.errors import DemosError, LayoutError
+from shapechanger.demos.exchange.imports import SourceRecord
+from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
-_VECTORS: Final = fields_of("action", "state")
-_NAMES: Final = {column.field: column.names["csv"] for column in COLUMNS}
-_MUST_BE: Final = {
-    "index": "an integer",
-    "time": "a time",
-    "flag": "true or false",
-    "text": "a JSON string",
-    "terms": "a JSON object",
-    "marks": "a JSON array",
+_NAMES: Final = {field: column.names["csv"] for field, column in COLUMNS.items()}
+_VECTORS: Final = [f for f, column in COLUMNS.items() if column.kind in {"action", "state"}]
+_MUST_BE: Final = {"index": "an integer", "time": "a time", "flag": "true or false"}
+_JSON: Final[dict[str, tuple[Any, str]]] = {
+    "terms": (dict[str, float], "a JSON object of numbers"),
+    "marks": (list[str], "a JSON array of strings"),
+    "stop_reason": (str, "a JSON string"),
+    "dropped": (str, "a JSON string"),
 }
-_FLAGS: Final = {"true": True, "1": True, "false": False, "0": False}
-_MAX_NAMED: Final = 5
-_MAX_QUOTED: Final = 60
 _MAX_TIME: Final = 1 << 62  # ns, as in a step.
 
 
@@ -75,17 +58,17 @@ def _tables_of(folder: Path) -> list[Path]:
     try:
         return sorted(path for path in folder.iterdir() if (path / _TABLE).is_file())
     except OSError as error:
-        raise cannot_read(folder, error) from error
+        raise files.cannot_read(folder, error) from error
 
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
     """Return the names of the columns of each field of a step, in order."""
-    of_action = value_names(Layout.from_json(header.action_layout))
-    of_state = value_names(Layout.from_json(header.state_layout)) if header.state_layout else []
-    values = {"action": of_action, "state": of_state}
+    states = Layout.from_json(header.state_layout) if header.state_layout else ()
+    actions = Layout.from_json(header.action_layout)
+    values = {"action": value_names(actions), "state": value_names(states)}
     return {
-        column.field: [column.names["csv"] + name for name in values.get(column.kind, [""])]
-        for column in COLUMNS
+        field: [_NAMES[field] + name for name in values.get(column.kind, [""])]
+        for field, column in COLUMNS.items()
     }
 
 
@@ -101,8 +84,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
 def _write_episode(episode: ExchangeEpisode, folder: Path) -> int:
     columns = _columns(episode.header)
-    header = episode.header.to_json() | {"outcome": episode.outcome}
-    text = json.dumps(header, indent=1, ensure_ascii=False)
+    text = json.dumps(files.own_fields(episode), indent=1, ensure_ascii=False)
     (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
     frame, number = "", 0
     with (folder / _TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
@@ -141,89 +123,81 @@ def _cell(value: Any) -> str:
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    """Yield the episodes of a folder."""
     for place in _tables_of(folder):
-        path = place / _HEADER
-        if path.is_file():
-            yield _own(place, path, context)
+        if (place / _HEADER).is_file():
+            yield _own(place, context)
         else:
             yield from _others(place, context)
 
 
-def _own(folder: Path, path: Path, context: ImportContext) -> ExchangeEpisode:
-    """Return the episode of a folder that Shapechanger exported."""
+def _own(folder: Path, context: ImportContext) -> ExchangeEpisode:
     if context.hz is not None:
         raise DemosError("The format csv states the rate itself: leave out --hz.")
-    fields = read_json_object(path)
-    try:
-        header = EpisodeHeader.from_json(fields)
-        columns = _columns(header)
-    except (DemosError, LayoutError) as error:
-        raise DemosError(f"{path}: {error}") from error
-    table = _Table(folder / _TABLE, columns, context)
+    path = folder / _HEADER
+    header, outcome = files.own_header(files.read_json_object(path), path)
+    columns = _columns(header)
     expected = list(chain.from_iterable(columns.values()))
+    table = _Table(folder / _TABLE, context, len(expected))
+    table.columns = columns
     if table.names != expected:
         missing = [name for name in expected if name not in table.names]
         surplus = [repr(name) for name in table.names if name not in expected]
-        problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
-        problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
+        problems = [f"lacks {', '.join(missing[:5])}"] if missing else []
+        problems += [f"has the unknown {', '.join(surplus[:5])}"] if surplus else []
         what = " and ".join(problems) or "has its columns in another order"
         raise DemosError(f"{table.path} {what}: the columns must be those of {_HEADER}.")
     records = table.records(folder / _FRAMES)
     if header.image_size is None and any(record.frame for record in records):
         raise DemosError(f"{table.path} has images, but {path} has no image_size.")
-    outcome = str(fields.get("outcome", ""))
-    return episode_of(records, header, context, name=str(folder), what="line", outcome=outcome)
+    rows = imports.rows_of(records, header.image_size, context, "line")
+    return ExchangeEpisode(header=header, rows=rows, name=str(folder), outcome=outcome)
 
 
 def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a table without a header."""
-    table = _Table(folder / _TABLE, {}, context)
-    known = [_known_name(name) for name in table.names]
-    table.names = [name for name, _ in known]
-    table.factors = dict(known)
-    values = {
-        field: [name for name in table.names if name.startswith(_NAMES[field])]
-        for field in _VECTORS
-    }
-    if not values["action"]:
+    table = _Table(folder / _TABLE, context)
+    table.factors = dict(map(_known_name, table.names))
+    table.names = [_known_name(name)[0] for name in table.names]
+    for field, name in _NAMES.items():
+        known = [other for other in table.names if other.startswith(name)]
+        table.columns[field] = known if field in _VECTORS else [name]
+    if not table.columns["action"]:
         raise DemosError(
             f"There is no {_HEADER} next to {table.path}, and no column of an action: restore it, "
             f"or name columns action/NAME, or {', '.join(COMMANDS)}."
         )
-    table.columns = {field: values.get(field, [name]) for field, name in _NAMES.items()}
     taken = set(chain.from_iterable(table.columns.values()))
     if others := [name for name in table.names if name not in taken]:
         context.note(f"Columns that are not imported: {', '.join(others)}.")
     if len(set(table.names)) < len(table.names):
         raise DemosError(f"{table.path} has two columns of one name: rename one of them.")
-    records, size = with_pictures(table.records(folder), "line", context)
-
-    def layout(field: str) -> str:
-        names = [name.removeprefix(_NAMES[field]) for name in values[field]]
-        return as_json([COMMANDS.get(name) or features_of(name, 1)[0] for name in names])
-
-    for part, hz, _, timed in stretches([records] if records else [], "line", context):
+    records, size = imports.with_pictures(table.records(folder), "line", context)
+    layouts: list[str] = []
+    for field in ("action", "state"):
+        names = [name.removeprefix(_NAMES[field]) for name in table.columns[field]]
+        features = [COMMANDS.get(name) or imports.features_of(name, 1)[0] for name in names]
+        layouts.append(imports.as_json(features))
+    for part, hz, timed in imports.stretches([records] if records else [], "line", context):
         header = EpisodeHeader(
-            action_layout=layout("action"),
-            state_layout=layout("state"),
+            action_layout=layouts[0],
+            state_layout=layouts[1],
             image_size=size,
             control_hz=hz,
             clock="real" if timed else "none",
             source="csv",
         )
-        name = f"{folder}, from {part[0].name}"
-        yield episode_of(part, header, context, name=name, what="line")
+        rows = imports.rows_of(part, size, context, "line")
+        yield ExchangeEpisode(header=header, rows=rows, name=f"{folder}, from {part[0].name}")
 
 
 def _known_name(name: str) -> tuple[str, int]:
     """Return the name of a column of others as in `steps.csv`, and its factor to that unit."""
     plain = name.strip().lower()
     if plain in COMMANDS:
-        return name_in("csv", "action") + COMMANDS[plain].name, 1
-    for column in COLUMNS:
+        return _NAMES["action"] + COMMANDS[plain].name, 1
+    for field, column in COLUMNS.items():
         if plain in column.aliases:
-            return column.names["csv"], int(column.aliases[plain])
+            return _NAMES[field], column.aliases[plain]
     return name.strip(), 1
 
 
@@ -235,18 +209,15 @@ class _Table:
     Attributes:
         path: The file.
         names: Names of its columns.
-        columns: Those of each field of a step.
+        columns: Names of the columns of each field of a step.
         factors: Factors to ns; only of a table of others, which may lack columns.
     """
 
-    def __init__(
-        self, path: Path, columns: Mapping[str, Sequence[str]], context: ImportContext
-    ) -> None:
-        expected = sum(map(len, columns.values()))
-        self._separator, table = read_table(path, expected or 1)
+    def __init__(self, path: Path, context: ImportContext, columns: int = 1) -> None:
+        self._separator, table = files.read_table(path, columns)
         self.path = path
         self.names = table[0][1] if table else []
-        self.columns = columns
+        self.columns: dict[str, list[str]] = {}
         self.factors: Mapping[str, int] = {}
         self._lines = table[1:]
         self._context = context
@@ -267,9 +238,8 @@ class _Table:
             before = record.number
             found.append(record)
             frame = cast("str", record.frame)
-            if frame:
-                record.picture = frames / frame
-            if frame and not is_inside(frames, frame):
+            record.picture = frames / frame if frame else None
+            if frame and not files.is_inside(frames, frame):
                 record.fault = "with an image name that leaves the folder"
             elif frame != shown and frame in known:
                 record.fault = f"that returns to the image {frame!r} of an earlier step"
@@ -285,70 +255,54 @@ class _Table:
             hint = " (decimal commas need another separator)" if self._separator == "," else ""
             raise DemosError(f"{len(cells)} cells instead of {len(self.names)}{hint}.")
         found = dict(zip(self.names, cells, strict=True))
-        fields = {column.field: self._value(column, found) for column in COLUMNS}
+        fields = {field: self._value(field, found) for field in COLUMNS}
         number = position if self.factors else fields["step"]
         if number is None or fields["action"] is None:
             raise DemosError(f"the {'step' if number is None else 'action'} is empty.")
-        marks, dropped = fields.pop("marks"), fields.pop("dropped")
-        frame = fields.pop("frame") or ""
-        del fields["step"]
-        fields["driver"] = fields["driver"] or ("person" if self.factors else "")
+        marks, dropped, frame, _ = map(fields.pop, ("marks", "dropped", "frame", "step"))
         if fields["state"] is None:
             fields["state"] = (math.nan,) * len(self.columns["state"])
         known = {field: value for field, value in fields.items() if value is not None}
-        try:
-            terms = {term: float(value) for term, value in known.pop("terms", {}).items()}
-        except (ValueError, TypeError) as error:
-            raise DemosError(f"terms must be numbers ({error}).") from error
+        known.setdefault("driver", "person" if self.factors else "")
         return SourceRecord(
             name=name,
-            step=Step(terms=terms, **known),
+            step=Step(**known),
             number=number,
-            frame=frame,
-            marks=tuple(map(str, marks or ())),
+            frame=frame or "",
+            marks=tuple(marks or ()),
             dropped=dropped,
         )
 
-    def _value(self, column: Column, cells: Mapping[str, str]) -> Any:
-        """Return the value of a field; None for empty cells."""
-        names = self.columns[column.field]
-        if column.field not in _VECTORS:
+    def _value(self, field: str, cells: Mapping[str, str]) -> Any:
+        names = self.columns[field]
+        if field not in _VECTORS:
             cell = cells.get(names[0], "")
-            if column.kind == "flag" and not cell and not self.factors:
-                cell = "an empty cell"
-            return self._parsed(column, names[0], cell) if cell else None
-        values = [self._parsed(column, name, cells[name]) for name in names if cells[name]]
+            must_be_there = COLUMNS[field].kind == "flag" and not self.factors
+            return self._parsed(field, names[0], cell) if cell or must_be_there else None
+        values = [self._parsed(field, name, cells[name]) for name in names if cells[name]]
         if values and len(values) < len(names):
-            raise DemosError(f"some values of {column.field} are empty, but not all.")
-        return tuple(values) if values or (column.kind == "state" and not names) else None
+            raise DemosError(f"some values of {field} are empty, but not all.")
+        return tuple(values) or None
 
-    def _parsed(self, column: Column, name: str, cell: str) -> Any:
-        plain = cell if self._separator == "," else cell.replace(",", ".")
-        factor = self.factors.get(name, 1)
-        expected = _MUST_BE.get(column.kind, "a number")
+    def _parsed(self, field: str, name: str, cell: str) -> Any:
+        kind, factor = COLUMNS[field].kind, self.factors.get(name, 1)
+        plain = cell.strip() if self._separator == "," else cell.strip().replace(",", ".")
         try:
-            match column.kind:
-                case "text" | "json" if name not in {"driver"}:
-                    expected = _MUST_BE.get(column.field, expected)
-                    value = json.loads(cell)
-                    kind = {"terms": dict, "marks": list}.get(column.field, str)
-                    if isinstance(value, kind):
-                        return cast("Any", value)
-                case "text" | "picture":
-                    return cell
-                case "flag":
-                    return _FLAGS[cell.strip().lower()]  # Spreadsheets write TRUE.
-                case "time" | "index":
-                    value = Decimal(plain) * factor
-                    whole = factor > 1 or value == value.to_integral_value()
-                    if abs(value) <= _MAX_TIME and whole:
-                        return int(value)
-                case _:
-                    return float(plain)
-        except (ValueError, KeyError, InvalidOperation, RecursionError) as error:
-            why = f"{name} must be {expected}, got {cell[:_MAX_QUOTED]!r}."
-            raise DemosError(why) from error
-        raise DemosError(f"{name} must be {expected}, got {cell[:_MAX_QUOTED]!r}.")
+            if field in _JSON:
+                return msgspec.json.decode(cell, type=_JSON[field][0], strict=False)
+            if kind in {"text", "picture"}:
+                return cell
+            if kind == "flag":  # Spreadsheets write TRUE.
+                return msgspec.convert(plain, bool, strict=False)
+            if kind not in {"time", "index"}:
+                return float(plain)
+            value = Decimal(plain) * factor
+            if abs(value) <= _MAX_TIME and (factor > 1 or value == value.to_integral_value()):
+                return int(value)
+        except (ValueError, ArithmeticError, RecursionError, msgspec.MsgspecError):
+            pass
+        expected = _JSON[field][1] if field in _JSON else _MUST_BE.get(kind, "a number")
+        raise DemosError(f"{name} must be {expected}, got {cell[:60]!r}.")
 
 
 FORMAT: Final = Format(

@@ -25,9 +25,18 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.demos.episodes.files import MAX_TEXT_BYTES, read_file
-from shapechanger.errors import DemosError, MissingExtra, OutputError
+from shapechanger.demos.exchange.format import ExchangeEpisode
+from shapechanger.errors import (
+    DemosError,
+    LayoutError,
+    MissingExtra,
+    OutputError,
+    translate_errors,
+)
 from shapechanger.files import cannot_write
+from shapechanger.layout import Layout
 
 MAX_UNPACKED: Final = 64 << 20
 """Bytes in memory at once, and allowed for any file. An image of `MAX_PIXELS` has 48 MiB."""
@@ -38,12 +47,6 @@ MAX_PACKED: Final = 64
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
-MAX_FEATURES: Final = 512
-"""Largest number of features that values become one by one; more become one array feature."""
-
-UNIT_UNKNOWN: Final = "?"
-
-_SEPARATORS: Final = (",", "\t", ";")
 _SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # As Excel writes it.
 _ROWS: Final = 256  # Of Parquet in memory at once; fewer if the values of a column are large.
 _MAX_TEXT: Final = 4096  # Characters of a text in Parquet.
@@ -78,16 +81,12 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
         raise DemosError(f"{out} lies in {source}, which is never changed: choose another place.")
     made = [parent for parent in out.absolute().parents if not parent.exists()]
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
-    try:
+    with translate_errors(OSError, to=lambda error: cannot_write(out, error)):
         part.mkdir(parents=True)
-    except OSError as error:
-        raise cannot_write(out, error) from error
     try:
         yield part
-        try:
+        with translate_errors(OSError, to=lambda error: cannot_write(out, error)):
             part.rename(out)
-        except OSError as error:
-            raise cannot_write(out, error) from error
     except BaseException as error:
         shutil.rmtree(part, ignore_errors=True)
         for parent in made:
@@ -126,12 +125,10 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
     return folder / name
 
 
-def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
+def read_bytes(path: Path) -> bytes:
     """Return the content of a regular file."""
-    try:
-        return read_file(path, most)
-    except OSError as error:
-        raise cannot_read(path, error) from error
+    with translate_errors(OSError, to=lambda error: cannot_read(path, error)):
+        return read_file(path, MAX_TEXT_BYTES)
 
 
 def read_text(path: Path) -> str:
@@ -139,12 +136,9 @@ def read_text(path: Path) -> str:
     data = read_bytes(path)
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise DemosError(f"{path} is not text in UTF-8 but in UTF-16: save it as UTF-8.")
-    try:
+    why = "{} is not text in UTF-8 (byte {}): save it as UTF-8."
+    with translate_errors(UnicodeDecodeError, to=lambda e: DemosError(why.format(path, e.start))):
         return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise DemosError(
-            f"{path} is not text in UTF-8 (byte {error.start}): save it as UTF-8."
-        ) from error
 
 
 def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[str]]]]:
@@ -152,9 +146,9 @@ def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[
     text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip()), "")
     stated = _SEPARATOR_LINE.fullmatch(first.strip())
-    found = [mark for mark in _SEPARATORS if first.count(mark) >= max(1, columns - 1)]
+    found = [mark for mark in ",\t;" if first.count(mark) >= max(1, columns - 1)]
     # Decimal commas stand between semicolons, so the last one that fits separates.
-    separator = stated[1] if stated else found[-1] if found else _SEPARATORS[0]
+    separator = stated[1] if stated else found[-1] if found else ","
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
     lines: list[tuple[int, list[str]]] = []
     try:
@@ -182,17 +176,34 @@ def read_json_object(path: Path) -> dict[str, Any]:
     return cast("dict[str, Any]", value)
 
 
-def own_headers(section: object, where: object, count: int) -> list[dict[str, Any]]:
-    """Return the headers of the `count` episodes of a data set that Shapechanger exported."""
+def own_fields(episode: ExchangeEpisode) -> dict[str, Any]:
+    """Return what `own_header` reads of an episode that is exported."""
+    return episode.header.to_json() | {"outcome": episode.outcome}
+
+
+def own_header(fields: object, where: object) -> tuple[EpisodeHeader, str]:
+    """Return the header and the outcome of an episode that Shapechanger exported."""
+    if not isinstance(fields, dict):
+        raise DemosError(f"{where} has a header that is not a JSON object.")
+    plain = cast("dict[str, Any]", fields)
+    with translate_errors(
+        DemosError, LayoutError, to=lambda error: DemosError(f"{where}: {error}")
+    ):
+        header = EpisodeHeader.from_json(plain)
+        for layout in filter(None, (header.action_layout, header.state_layout)):
+            Layout.from_json(layout)
+    return header, str(plain.get("outcome", ""))
+
+
+def own_episodes(section: object, where: object, count: int) -> list[Any]:
+    """Return the `own_fields` of the `count` episodes of a dataset that Shapechanger exported."""
     fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
-    headers = fields.get("episodes")
-    if fields.get("format") != 1 or not isinstance(headers, list):
+    episodes = fields.get("episodes")
+    if fields.get("format") != 1 or not isinstance(episodes, list):
         raise DemosError(
             f"{where} was written by another version of Shapechanger: this one reads format 1 only."
         )
-    found = cast("list[Any]", headers)
-    if not all(isinstance(header, dict) for header in found):
-        raise DemosError(f"{where} has a header that is not a JSON object.")
+    found = cast("list[Any]", episodes)
     if len(found) != count:
         raise DemosError(
             f"{where} describes {len(found)} episodes, and the dataset has {count}: remove it if "
@@ -209,11 +220,10 @@ def cannot_read(path: Path, error: OSError) -> DemosError:
 @contextmanager
 def open_hdf5(path: Path) -> Generator[Any]:
     """Open an HDF5 file for reading, as an `h5py.File`."""
-    h5py = library("h5py")
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise DemosError(f"{path} is not an intact HDF5 file: {error}.") from error
+    with translate_errors(
+        OSError, to=lambda error: DemosError(f"{path} is not an intact HDF5 file: {error}.")
+    ):
+        file = library("h5py").File(path, "r")
     try:
         yield file
     except (OSError, RuntimeError) as error:  # Raised by h5py for inconsistent bytes.
@@ -222,38 +232,32 @@ def open_hdf5(path: Path) -> Generator[Any]:
         file.close()
 
 
-def _row_bytes(column: Any) -> int:
-    """Return the memory of one entry of a dataset, bytes."""
-    return math.prod(column.shape[1:]) * column.dtype.itemsize
-
-
 def chunk_of(columns: Iterable[Any], most: int) -> int:
     """Return how many entries of columns to read at once: at most as many as fit, at least one."""
     return max(1, min(most, MAX_UNPACKED // max(1, sum(map(_row_bytes, columns)))))
 
 
-def column(file: Any, name: str, length: int = 0) -> Any:
-    """Return a dataset in an HDF5 file; no link is followed.
+def _row_bytes(column: Any) -> int:
+    return math.prod(column.shape[1:]) * column.dtype.itemsize
 
-    Args:
-        file: An open `h5py.File`.
-        name: Path of the dataset in the file.
-        length: Minimum number of entries.
-    """
+
+def column(file: Any, name: str) -> Any:
+    """Return an array in an open `h5py.File` by its path there; no link is followed."""
     h5py = library("h5py")
-    where, found = file.filename, file
+    where, found, link = file.filename, file, None
     for part in name.split("/"):
         link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
-        if isinstance(link, h5py.ExternalLink):
-            raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
         if isinstance(link, h5py.SoftLink):  # It may lead through a link to another file.
             raise DemosError(f"{where} has a link for {name!r}, and links are not followed.")
+        if isinstance(link, h5py.ExternalLink):
+            break
         if link is None or (found := found.get(part)) is None:
             raise DemosError(f"{where} has no {name!r}, so the dataset is incomplete.")
-    if not isinstance(found, h5py.Dataset):
-        raise DemosError(f"{where}: {name!r} is not an array.")
-    if found.external or found.is_virtual:
+    is_array = isinstance(found, h5py.Dataset)
+    if isinstance(link, h5py.ExternalLink) or (is_array and (found.external or found.is_virtual)):
         raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
+    if not is_array or not found.shape:
+        raise DemosError(f"{where}: {name!r} is not an array.")
     # HDF5 unpacks whole chunks, and a step may claim any shape.
     unpacked = max(_row_bytes(found), math.prod(found.chunks or ()) * found.dtype.itemsize)
     if unpacked > MAX_UNPACKED:
@@ -261,9 +265,6 @@ def column(file: Any, name: str, length: int = 0) -> Any:
             f"{where}: {name!r} unpacks to {unpacked} bytes at once, more than the limit of "
             f"{MAX_UNPACKED}."
         )
-    if not found.shape or found.shape[0] < length:
-        have = found.shape[0] if found.shape else 0
-        raise DemosError(f"{where}: {name!r} has {have} entries, but {length} are needed.")
     return found
 
 
@@ -272,10 +273,8 @@ def names_in(file: Any, *groups: str) -> list[str]:
     h5py = library("h5py")
     found: Any = file
     for part in groups:
-        if not isinstance(found.get(part, getlink=True), h5py.HardLink):
-            return []
-        found = found[part]
-        if not isinstance(found, h5py.Group):
+        is_there = isinstance(found.get(part, getlink=True), h5py.HardLink)
+        if not is_there or not isinstance(found := found[part], h5py.Group):
             return []
     return [str(name) for name in found]
 
@@ -301,7 +300,6 @@ def _open_parquet(path: Path) -> Generator[Any]:
 
 
 def _sizes_of(file: Any, groups: Iterable[int]) -> Iterator[int]:
-    """Yield the size of each column of some row groups, bytes."""
     for group in map(file.metadata.row_group, groups):
         for column in map(group.column, range(group.num_columns)):
             yield max(column.total_uncompressed_size, 8 * column.num_values)
@@ -374,11 +372,10 @@ def rows_at(
             raise DemosError(f"{path} has no column {missing[0]!r}, which meta/info.json names.")
         counts = [file.metadata.row_group(n).num_rows for n in range(file.metadata.num_row_groups)]
         starts = np.cumsum([0, *counts])
-        groups = sorted({int(n) for n in np.searchsorted(starts, rows, "right") - 1})
-        places = np.array([r for n in groups for r in range(starts[n], starts[n + 1])], np.int64)
-        done = 0
-        for batch in _batches(file, wanted, groups):
-            here = np.flatnonzero(np.isin(places[done : done + batch.num_rows], rows))
+        first, last = (int(n) for n in np.searchsorted(starts, rows[[0, -1]], "right") - 1)
+        done = int(starts[first])
+        for batch in _batches(file, wanted, range(first, last + 1)):
+            here = rows[(rows >= done) & (rows < done + batch.num_rows)] - done
             done += batch.num_rows
             # Not of the images: a copy of them may not fit into memory.
             part = batch.select(list(sizes)).take(library("pyarrow", "lerobot").array(here))
@@ -389,5 +386,5 @@ def rows_at(
             for number, row in enumerate(here.tolist()):
                 vectors = {key: values[number] for key, values in numbers.items()}
                 yield vectors | {key: batch.column(key)[row].as_py() for key in stored}
-            if places[done - 1] >= rows[-1]:
+            if done > rows[-1]:
                 return

@@ -1,13 +1,17 @@
-"""Formats of datasets: their declaration, the names of their columns, and findings."""
+"""Formats of datasets: their declaration, the names of their columns, and steps on their way."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 
@@ -19,19 +23,17 @@ class Column:
     """A column of a step.
 
     Attributes:
-        field: Its name in a step.
         kind: Its type; "action" and "state" are vectors, "time" is a whole number of ns.
         names: Its name in each format that has it.
         aliases: Names in tables of others, each with its factor to the unit of the field.
     """
 
-    field: str
     kind: Kind
     names: Mapping[str, str]
-    aliases: Mapping[str, float]
+    aliases: Mapping[str, int]
 
 
-_FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
+FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
 _NAMES: Final = """
 step        | index   | step        |                    | frame_index               | _index          | /step
 frame       | picture | frame       | observations/image | observation.images.camera | cam/image_array | /camera
@@ -51,23 +53,27 @@ stop_reason | text    | stop_reason | infos/step         |                      
 marks       | json    | marks       | infos/step         |                           |                 | /step
 dropped     | text    | dropped     | infos/step         |                           |                 | /step
 """  # noqa: E501
-_ALIASES: Final[dict[str, dict[str, float]]] = {
-    "frame": dict.fromkeys(("file", "image", "picture", "filename"), 1.0),
-    "captured_ns": {"timestamp": 1e9, "time": 1e9, "timestamp_ms": 1e6, "milliseconds": 1e6},
-    "terminated": {"done": 1.0},
+_ALIASES: Final[dict[str, dict[str, int]]] = {
+    "frame": dict.fromkeys(("file", "image", "picture", "filename"), 1),
+    "captured_ns": {
+        "timestamp": 10**9,
+        "time": 10**9,
+        "timestamp_ms": 10**6,
+        "milliseconds": 10**6,
+    },
+    "terminated": {"done": 1},
 }
 
 
-def _column(line: str) -> Column:
-    field, kind, *names = (cell.strip() for cell in line.split("|"))
-    named = {form: name for form, name in zip(_FORMATS, names, strict=True) if name}
-    return Column(field, cast("Kind", kind), named, _ALIASES.get(field, {}))
+def _columns() -> Iterator[tuple[str, Column]]:
+    for line in _NAMES.strip().splitlines():
+        key, kind, *names = (cell.strip() for cell in line.split("|"))
+        named = {form: name for form, name in zip(FORMATS, names, strict=True) if name}
+        yield key, Column(cast("Kind", kind), named, _ALIASES.get(key, {}))
 
 
-COLUMNS: Final = tuple(map(_column, _NAMES.strip().splitlines()))
-"""All columns of a step, in the order of `steps.csv`."""
-
-BY_FIELD: Final = {column.field: column for column in COLUMNS}
+COLUMNS: Final = dict(_columns())
+"""All columns of a step by the names of their fields, in the order of `steps.csv`."""
 
 COMMANDS: Final = {
     "steering": Feature("steering", "1", -1.0, 1.0),
@@ -78,29 +84,13 @@ COMMANDS: Final = {
 """Values of an action by their names in tables of others; a key that is held is 1."""
 
 
-def fields_of(*kinds: Kind) -> tuple[str, ...]:
-    """Return the names of the fields of some kinds."""
-    return tuple(column.field for column in COLUMNS if column.kind in kinds)
-
-
 def name_in(form: str, field: str) -> str:
     """Return the name of a field in a format."""
-    return BY_FIELD[field].names[form]
-
-
-def as_markdown() -> str:
-    """Return the table for the documentation."""
-    lines = [("Field", *_FORMATS), ("---",) * (1 + len(_FORMATS))]
-    for column in COLUMNS:
-        named = (f"`{name}`" if (name := column.names.get(form)) else "" for form in _FORMATS)
-        lines.append((f"`{column.field}`", *named))
-    return "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines)
+    return COLUMNS[field].names[form]
 
 
 DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
-
-_MAX_NAMED: Final = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,6 +127,7 @@ class ExchangeEpisode:
     outcome: str = ""
 
 
+@dataclass(slots=True, kw_only=True)
 class ImportContext:
     """Options of an import, and its findings so far.
 
@@ -144,24 +135,23 @@ class ImportContext:
     source contradicts itself or is implausible, and `note` for what is neither lost nor wrong. With
     `strict`, the import is refused at the end if there is anything of the first two kinds.
 
-    Args:
+    Attributes:
         camera: Name of the camera to take, if there are several; "" for the only one.
         hz: Steps per second, as stated by the user; None to read or measure them.
         strict: Whether to refuse a source that is incomplete or contradicts itself.
-
-    Attributes:
         left_out: Names of the parts that are left out, by what they are and by the reason.
         warnings: Contradictions, as sentences that state their size.
         notes: Further facts, as sentences.
     """
 
-    def __init__(self, *, camera: str = "", hz: float | None = None, strict: bool = False) -> None:
-        self.camera = camera
-        self.hz = hz
-        self.strict = strict
-        self.left_out: dict[tuple[str, str], list[str]] = {}
-        self.warnings: list[str] = []
-        self.notes: list[str] = []
+    camera: str = ""
+    hz: float | None = None
+    strict: bool = False
+    left_out: dict[tuple[str, str], list[str]] = field(
+        default_factory=dict[tuple[str, str], list[str]]
+    )
+    warnings: list[str] = field(default_factory=list[str])
+    notes: list[str] = field(default_factory=list[str])
 
     def leave_out(self, what: str, reason: str, name: object) -> None:
         """Note that a part is left out."""
@@ -183,10 +173,7 @@ class ImportContext:
         The reason with most parts is first.
         """
         groups = sorted(self.left_out.items(), key=lambda group: -len(group[1]))
-        return [
-            f"{counted(len(names), what)} {reason}: {few(names)}"
-            for (what, reason), names in groups
-        ]
+        return [f"{counted(len(n), what)} {reason}: {few(n)}" for (what, reason), n in groups]
 
     def require_whole(self, source: object) -> None:
         """Refuse a source of which something is left out, or which contradicts itself."""
@@ -252,6 +239,56 @@ def counted(number: int, what: str) -> str:
 
 def few(names: Sequence[object]) -> str:
     """List the first few names and count the rest, such as "12, 15, 20, and 286 more"."""
-    shown = ", ".join(map(str, names[:_MAX_NAMED]))
-    more = len(names) - _MAX_NAMED
-    return f"{shown}, and {more} more" if more > 0 else shown
+    shown = ", ".join(map(str, names[:3]))
+    return f"{shown}, and {len(names) - 3} more" if len(names) > 3 else shown
+
+
+def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | None]]:
+    """Yield the steps that are not excluded, each with its image, even where it is shared."""
+    picture: bytes | None = None
+    for row in rows:
+        picture = picture if row.jpeg is None else row.jpeg
+        if row.dropped is None:
+            yield row.step, picture
+
+
+def decoded_steps(
+    rows: Iterable[ExchangeStep], size: tuple[int, int] | None, name: str, title: str
+) -> Iterator[tuple[ExchangeStep, bytes, NDArray[np.uint8] | None]]:
+    """Yield steps for a dataset with an image at every step, each with its image.
+
+    Args:
+        rows: The steps.
+        size: Width and height of all images; None without images.
+        name: How to name the episode in errors.
+        title: How to name the format in errors.
+
+    Yields:
+        The step; its image, also if it is shared; and its pixels if it is new, shape
+        (height, width, 3).
+    """
+    jpeg = b""
+    for number, row in enumerate(rows):
+        pixels, where = None, f"of step {number} of {name}"
+        if size is not None and row.jpeg is not None:
+            jpeg, pixels = row.jpeg, decode_picture(row.jpeg, where)
+            if pixels.shape[1::-1] != size:
+                raise DemosError(
+                    "The image {} has {} x {} pixels, and not {} x {} like the others: a {} "
+                    "dataset has one size.".format(where, *pixels.shape[1::-1], *size, title)
+                )
+        if size is not None and not jpeg:
+            raise DemosError(
+                f"There is no image {where}, but {title} needs one at every step: drop the "
+                "steps before the first image, or export to csv."
+            )
+        yield row, jpeg, pixels
+
+
+def value_names(layout: Iterable[Feature]) -> list[str]:
+    """Return a name for each value of a layout; those of a block are numbered, as in `map[3]`."""
+    return [
+        f"{feature.name}[{place}]" if feature.shape else feature.name
+        for feature in layout
+        for place in range(feature.size)
+    ]

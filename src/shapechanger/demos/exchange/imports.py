@@ -14,22 +14,20 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from itertools import pairwise
 from math import inf, isfinite
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
+from shapechanger.demos.episodes import DRIVERS, Step
 from shapechanger.demos.episodes.records import longest_period_s
-from shapechanger.demos.exchange.files import MAX_FEATURES, UNIT_UNKNOWN, UnpacksToTooMuch
+from shapechanger.demos.exchange.files import UnpacksToTooMuch
 from shapechanger.demos.exchange.format import (
     DEFAULT_HZ,
-    ExchangeEpisode,
     ExchangeStep,
     ImportContext,
     counted,
@@ -40,12 +38,12 @@ from shapechanger.demos.jpeg import picture_size
 from shapechanger.errors import DemosError, ShapechangerError, UnknownName
 from shapechanger.layout import Feature, Layout
 
+_MAX_FEATURES: Final = 512  # That values become one by one; more become one array feature.
+_UNIT_UNKNOWN: Final = "?"
 _NS_PER_S: Final = 1e9
-_NS_PER_MS: Final = 1e6
 _PAUSE_PERIODS: Final = 30.0
 _NEAR: Final = (0.5, 1.5)  # Of the median period; one missing record is 2.
 _MIN_PERIODS: Final = 10  # A shorter drive is not evidence of its rate.
-_IRREGULAR: Final = 0.1
 # Measured rates of one setting differ slightly, those of two settings by at least a third.
 _RATE_RATIO: Final = 1.3
 _SLOWEST_HZ, _FASTEST_HZ = 1.0, 100.0  # As `control_hz` of a profile.
@@ -79,38 +77,22 @@ class SourceRecord:
     dropped: str | None = None
 
 
-def episode_of(
-    records: Iterable[SourceRecord],
-    header: EpisodeHeader,
-    context: ImportContext,
-    *,
-    name: str,
-    what: str,
-    rest: Sequence[str] = (),
-    outcome: str = "",
-) -> ExchangeEpisode:
-    """Return the episode of the records that are whole; the others are reported.
-
-    Args:
-        records: The records in order; they are read with the episode.
-        header: Its metadata, with the layouts, the rate and the size of the images.
-        context: Collects what is left out.
-        name: How to name the episode in errors.
-        what: A record, as a noun for reports.
-        rest: Names of all records, of which those are reported that a damaged file does not have.
-        outcome: How it ended; "" if unspecified.
-    """
-    rows = _rows(records, header.image_size, context, what, rest)
-    return ExchangeEpisode(header=header, rows=rows, name=name, outcome=outcome)
-
-
-def _rows(
+def rows_of(
     records: Iterable[SourceRecord],
     size: tuple[int, int] | None,
     context: ImportContext,
     what: str,
-    rest: Sequence[str],
+    rest: Sequence[str] = (),
 ) -> Iterator[ExchangeStep]:
+    """Yield the steps of the records that are whole; the others are reported.
+
+    Args:
+        records: The records of an episode in order.
+        size: Width and height of the images, pixels; None to leave out images.
+        context: Collects what is left out.
+        what: A record, as a noun for reports.
+        rest: Names of all records, of which those are reported that a damaged file does not have.
+    """
     read: object = None
     shown: object = None
     jpeg: bytes | None = None
@@ -133,11 +115,9 @@ def _rows(
                 context.leave_out(what, fault, record.name)
                 continue
             shown = frame if new else shown
+            picture = jpeg if new else None
             yield ExchangeStep(
-                step=record.step,
-                jpeg=jpeg if new else None,
-                marks=record.marks,
-                dropped=record.dropped,
+                step=record.step, jpeg=picture, marks=record.marks, dropped=record.dropped
             )
     except UnpacksToTooMuch:
         raise
@@ -188,33 +168,31 @@ def with_pictures(
     return [record for record in records if not record.fault], common
 
 
-class TimedRecords(NamedTuple):
-    """Records that follow each other without a pause, with their rate.
-
-    `has_times` tells whether the source states them, and `timed` whether they are believed.
-    """
-
-    records: list[SourceRecord]
-    hz: float
-    has_times: bool
-    timed: bool
-
-
 def stretches(
     parts: Sequence[list[SourceRecord]],
     what: str,
     context: ImportContext,
     stated_hz: float | None = None,
-) -> list[TimedRecords]:
+) -> list[tuple[list[SourceRecord], float, bool]]:
     """Measure the rates of sessions, or take a stated one, and split them where time jumps.
 
     What is odd about the times is reported. Times that contradict the stated rate are left out.
+
+    Returns:
+        Records that follow each other without a pause, with their rate in Hz and whether their
+        times are known and believed.
     """
     times = [_times_ns(part, what, context) for part in parts]
-    periods = [_periods_ns(*pair) for pair in zip(times, parts, strict=True)]
+    periods = [  # From one record to the next, ns, per number that they are apart.
+        [
+            (later - now) / max(1, b.number - a.number)
+            for (now, later), (a, b) in zip(pairwise(ns), pairwise(part), strict=False)
+        ]
+        for ns, part in zip(times, parts, strict=True)
+    ]
     names = [f"{what} {part[0].name}" for part in parts]
     rates, believed = _rates(names, periods, context, stated_hz)
-    found: list[TimedRecords] = []
+    found: list[tuple[list[SourceRecord], float, bool]] = []
     pauses_s: list[float] = []
     backwards: list[tuple[float, str]] = []
     for known, part, hz in zip(times, parts, rates, strict=True):
@@ -232,8 +210,7 @@ def stretches(
             else:
                 continue
             starts.append(number)
-        for start, end in pairwise([*starts, len(part)]):
-            found.append(TimedRecords(part[start:end], hz, bool(known), timed))
+        found += [(part[one:two], hz, timed) for one, two in pairwise([*starts, len(part)])]
     if pauses_s:
         context.note(
             f"A new episode begins after {counted(len(pauses_s), 'pause')}, of "
@@ -256,12 +233,6 @@ def _times_ns(part: Sequence[SourceRecord], what: str, context: ImportContext) -
             "valid time: the times of the others are left out."
         )
     return times if len(times) == len(part) else []
-
-
-def _periods_ns(times: Sequence[int], part: Sequence[SourceRecord]) -> list[float]:
-    """Return the time from one record to the next, ns, per number that they are apart."""
-    pairs = zip(pairwise(times), pairwise(part), strict=False)
-    return [(later - now) / max(1, b.number - a.number) for (now, later), (a, b) in pairs]
 
 
 def _rates(
@@ -309,14 +280,6 @@ def _rates(
             f"The records are {_described(hz)}, which no robot has ({_SLOWEST_HZ:g} to "
             f"{_FASTEST_HZ:g} Hz): perhaps a conversion set their times. State the rate with --hz."
         )
-    driven, near = _typical(pool)
-    if len(driven) >= _MIN_PERIODS and len(driven) - len(near) > _IRREGULAR * len(driven):
-        least, most = np.percentile(driven, [5, 95]) / _NS_PER_MS
-        context.note(
-            f"The records are irregular: {100 - 100 * len(near) / len(driven):.0f} % come more "
-            f"than half a period early or late (the middle 90 % of the periods are {least:.3g} to "
-            f"{most:.3g} ms)."
-        )
     return rates, True
 
 
@@ -326,22 +289,17 @@ def measured_hz(periods_ns: Sequence[float]) -> float | None:
     Args:
         periods_ns: Times from step to step, ns.
     """
-    driven, near = _typical(periods_ns)
-    if not driven:
+    positive = [period for period in periods_ns if period > 0.0]
+    if not positive:
         return None
-    if 2 * sum(period > 0.0 for period in periods_ns) < len(periods_ns):
-        return _NS_PER_S * len(periods_ns) / sum(driven)  # The clock is coarser than a period.
+    typical = statistics.median_low(positive)
+    driven = [period for period in positive if period <= _PAUSE_PERIODS * typical]
+    if 2 * len(positive) < len(periods_ns):  # The clock is coarser than a period.
+        return _NS_PER_S * len(periods_ns) / sum(driven)
+    low, high = _NEAR
+    near = [period for period in driven if low * typical <= period <= high * typical]
     # If no period prevails, all count.
     return _NS_PER_S / statistics.fmean(near if 2 * len(near) > len(driven) else driven)
-
-
-def _typical(periods_ns: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Return the periods that are not pauses, and those of them that are near the median."""
-    positive = [period for period in periods_ns if period > 0.0]
-    typical = statistics.median_low(positive) if positive else 0.0
-    low, high = _NEAR
-    driven = [period for period in positive if period <= _PAUSE_PERIODS * typical]
-    return driven, [period for period in driven if low * typical <= period <= high * typical]
 
 
 def _nominal_hz(measured: float) -> float:
@@ -351,15 +309,6 @@ def _nominal_hz(measured: float) -> float:
         if abs(measured / nominal - 1.0) <= tolerance:
             return nominal
     return float(f"{measured:.4g}")
-
-
-def iso_time(unix_ns: int) -> str:
-    """Return a Unix time as ISO 8601 in UTC; "" if it is beyond the calendar."""
-    try:
-        at = datetime.fromtimestamp(unix_ns / _NS_PER_S, UTC)
-    except (OverflowError, ValueError, OSError):
-        return ""
-    return at.isoformat(timespec="milliseconds")
 
 
 def _described(hz: float) -> str:
@@ -376,11 +325,11 @@ def features_of(
     high: Sequence[float] = (),
 ) -> list[Feature]:
     """Return the features of the values of a column of others: named, numbered, or one array."""
-    units = units if len(units) == size and all(units) else (UNIT_UNKNOWN,) * size
+    units = units if len(units) == size and all(units) else (_UNIT_UNKNOWN,) * size
     lows = low or (-inf,) * size
     highs = high or (inf,) * size
-    if not names and size > MAX_FEATURES:
-        unit = units[0] if len(set(units)) == 1 else UNIT_UNKNOWN
+    if not names and size > _MAX_FEATURES:
+        unit = units[0] if len(set(units)) == 1 else _UNIT_UNKNOWN
         return [Feature(key, unit, min(lows), max(highs), shape=(size,))]
     names = names or ([f"{key}/{n}" for n in range(size)] if size > 1 else [key])
     return [Feature(*about) for about in zip(names, units, lows, highs, strict=True)]

@@ -14,36 +14,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import DRIVERS, Driver, EpisodeHeader, Step
-from shapechanger.demos.exchange.files import (
-    MAX_PACKED,
-    MAX_UNPACKED,
-    MAX_VALUES,
-    UnpacksToTooMuch,
-    all_rows,
-    inside,
-    own_headers,
-    read_json_object,
-    rows_at,
-)
+from shapechanger.demos.episodes import Driver, EpisodeHeader, Step
+from shapechanger.demos.exchange import files, imports
 from shapechanger.demos.exchange.format import ExchangeEpisode, Format, ImportContext, name_in
-from shapechanger.demos.exchange.imports import (
-    SourceRecord,
-    as_json,
-    choose_camera,
-    episode_of,
-    features_of,
-)
+from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
 from shapechanger.demos.exchange.lerobot_index import Index, Located
 from shapechanger.demos.exchange.pictures import read_pictures
 from shapechanger.demos.jpeg import MAX_PIXELS
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 
 _ACTION, _STATE, _REWARD, _TERMINATED = (
@@ -82,7 +67,7 @@ class _Feature:
     @property
     def is_number(self) -> bool:
         """Whether its values are numbers, and not those of an image."""
-        plain = bool(_NUMBERS.fullmatch(self.kind)) and self.size <= MAX_VALUES
+        plain = bool(_NUMBERS.fullmatch(self.kind)) and self.size <= files.MAX_VALUES
         return plain and not self.is_image
 
     @property
@@ -111,7 +96,6 @@ class _Feature:
 
 
 def _read_features(info: Mapping[str, Any], path: Path) -> list[_Feature]:
-    """Return the features of `info.json`."""
     plain = info.get("features")
     if not isinstance(plain, dict):
         raise DemosError(f"{path} has no features.")
@@ -124,7 +108,7 @@ def _read_features(info: Mapping[str, Any], path: Path) -> list[_Feature]:
             is_depth = any(about.get(flag) for flag in _DEPTH)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise DemosError(f"{path}: the feature {key!r} has no dtype and shape.") from error
-        too_large = key in {_ACTION, _STATE} and math.prod(shape) > MAX_VALUES
+        too_large = key in {_ACTION, _STATE} and math.prod(shape) > files.MAX_VALUES
         if too_large or any(n < 1 for n in shape):
             raise DemosError(f"{path}: the feature {key!r} has the shape {list(shape)}.")
         stated = tuple(map(str, cast("list[Any]", units))) if isinstance(units, list) else ()
@@ -146,8 +130,7 @@ def _flat_names(plain: Any) -> tuple[str, ...]:
     return tuple(map(str, cast("list[Any]", plain))) if isinstance(plain, list) else ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Kept:
+class _Kept(NamedTuple):
     """The features that are imported; `columns` has those of single numbers."""
 
     action: _Feature
@@ -167,7 +150,7 @@ def _chosen(features: Sequence[_Feature], context: ImportContext, path: Path) ->
     columns = frozenset({_REWARD, DONE, _TERMINATED} & single)
     cameras = {f.key.removeprefix(_CAMERAS): f for f in features if f.is_picture}
     context.camera = context.camera.removeprefix(_CAMERAS)
-    camera = cameras.get(choose_camera(path.parent.parent, list(cameras), context))
+    camera = cameras.get(imports.choose_camera(path.parent.parent, list(cameras), context))
     taken = {_ACTION, *(f.key for f in states), *columns, *_BOOKKEEPING}
     for feature in features:
         if feature.key in taken or feature is camera:
@@ -195,17 +178,16 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
                     "values, which are numbered."
                 )
             named = ()
-        found += features_of(key, feature.size, names=named, units=feature.units)
+        found += imports.features_of(key, feature.size, names=named, units=feature.units)
     if len({feature.name for feature in found}) < len(found):
         context.note("Names of several features are the same: their values are numbered.")
-        found = features_of("value", sum(feature.size for feature in found))
-    return as_json(found)
+        found = imports.features_of("value", sum(feature.size for feature in found))
+    return imports.as_json(found)
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    """Yield the episodes of a dataset."""
     path = folder / INFO
-    info = read_json_object(path)
+    info = files.read_json_object(path)
     version = str(info.get("codebase_version", "unknown"))
     if not version.startswith("v3."):
         raise DemosError(
@@ -228,7 +210,8 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         source="lerobot",
         notes=notes if camera is None else notes | {"camera": camera.key},
     )
-    rows = all_rows(inside(folder, TASKS, path), None) if (folder / TASKS).is_file() else []
+    has_tasks = (folder / TASKS).is_file()
+    rows = files.all_rows(files.inside(folder, TASKS, path), None) if has_tasks else []
     texts = [[value for value in row.values() if isinstance(value, str)] for row in rows]
     tasks = [text[0] for text in texts if text]
     video = camera.key if camera is not None and camera.kind == "video" else ""
@@ -236,47 +219,38 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     for key, count in (("total_episodes", len(index.places)), ("total_frames", index.steps)):
         if info.get(key, count) != count:
             context.warn(f"{INFO} has {key} {info[key]}, and {EPISODES} {count}.")
-    ours: list[dict[str, Any]] = []
+    ours: list[Any] = []
     if (folder / OURS).is_file():
         count = max(index.places, default=-1) + 1
-        ours = own_headers(read_json_object(folder / OURS), folder / OURS, count)
+        ours = files.own_episodes(files.read_json_object(folder / OURS), folder / OURS, count)
     unpacked: dict[Path, int] = {}
     for located in index.locate():
-        number, about, drivers, outcome = located.number, header, list[Driver](), ""
-        task = index.places[number].get("tasks")
+        number, task = located.place.number, located.place.tasks
+        about, drivers, outcome = header, list[Driver](), ""
         said = ", ".join(map(str, cast("list[Any]", task))) if isinstance(task, list) else ""
         if said or len(tasks) == 1:
             about = replace(about, notes=about.notes | {"task": said or tasks[0]})
         if ours:
-            about, drivers = _own_header(ours[number], about, f"{folder / OURS}, episode {number}")
-            outcome = str(ours[number].get("outcome", ""))
-        yield episode_of(
-            _records(located, kept, about, drivers, unpacked),
-            about,
-            context,
-            name=f"{folder}, episode {number}",
-            what="step",
-            rest=[f"{frame} of episode {number}" for frame in located.steps["frame"].tolist()],
-            outcome=outcome,
-        )
+            about, outcome, drivers = _own(
+                ours[number], about, f"{folder / OURS}, episode {number}"
+            )
+        records = _records(located, kept, about, drivers, unpacked)
+        rest = [f"{frame} of episode {number}" for frame in located.steps["frame"].tolist()]
+        rows = imports.rows_of(records, about.image_size, context, "step", rest)
+        name = f"{folder}, episode {number}"
+        yield ExchangeEpisode(header=about, rows=rows, name=name, outcome=outcome)
 
 
-def _own_header(
-    plain: dict[str, Any], found: EpisodeHeader, where: str
-) -> tuple[EpisodeHeader, list[Driver]]:
-    """Return the header of an own episode, and the driver of each step."""
+def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, str, list[Driver]]:
+    """Return the header and the outcome of an own episode, and the driver of each step."""
+    header, outcome = files.own_header(plain, where)
     try:
-        header = EpisodeHeader.from_json(plain)
-        runs = [(str(driver), int(count)) for driver, count in plain.get("drivers", [])]
-    except (DemosError, TypeError, ValueError) as error:
-        raise DemosError(f"{where}: {error}") from error
-    drivers: list[Driver] = []
-    for driver, count in runs:
-        if driver not in DRIVERS:
-            raise DemosError(f"{where}: {UnknownName('driver', driver, DRIVERS)}")
-        if not 0 <= count <= _MAX_STEPS - len(drivers):
-            raise DemosError(f"{where}: {count} steps of a driver cannot be.")
-        drivers.extend(driver for _ in range(count))
+        runs = msgspec.convert(plain.get("drivers", []), list[tuple[Driver, int]])
+    except msgspec.ValidationError as error:
+        raise DemosError(f"{where}: the drivers are invalid ({error}).") from error
+    if any(count < 0 for _, count in runs) or sum(count for _, count in runs) > _MAX_STEPS:
+        raise DemosError(f"{where}: the drivers have less than no step, or more than {_MAX_STEPS}.")
+    drivers: list[Driver] = [driver for driver, count in runs for _ in range(count)]
     ours, theirs = ((one.action_size, one.state_size, one.image_size) for one in (header, found))
     if ours != theirs:
         raise DemosError(
@@ -285,7 +259,7 @@ def _own_header(
         )
     # The times come from the dataset.
     clock = "real" if header.clock == "none" else header.clock
-    return replace(header, clock=clock, notes=found.notes | header.notes), drivers
+    return replace(header, clock=clock, notes=found.notes | header.notes), outcome, drivers
 
 
 def _records(
@@ -302,18 +276,18 @@ def _records(
     if located.video is not None and times is not None and header.image_size is not None:
         ticks = located.steps["tick"].tolist()
         videos = read_pictures(located.video, times, ticks, header.image_size)
-    rows = _in_order(located, kept, stored)
     paths = [path for path, _, _ in located.rows_by_file()]
     first, sizes = paths[0], sum(path.stat().st_size for path in paths)
-    most = MAX_UNPACKED + MAX_PACKED * sizes
+    most = files.MAX_UNPACKED + files.MAX_PACKED * sizes
     read = b""
+    rows = _in_order(located, kept, stored)
     for step, row, picture in zip(located.steps, rows, videos, strict=True):
         frame = int(step["frame"])
         reward = float(row[_REWARD][0]) if _REWARD in row else math.nan
         done = DONE in row and bool(row[DONE][0])
         ended = bool(row[_TERMINATED][0]) if _TERMINATED in row else done
         record = SourceRecord(
-            name=f"{frame} of episode {located.number}",
+            name=f"{frame} of episode {located.place.number}",
             step=Step(
                 action=tuple(row[_ACTION].tolist()),
                 driver=drivers[frame] if frame < len(drivers) else "person",
@@ -330,7 +304,9 @@ def _records(
             record.picture = data = _bytes(row[stored])
             unpacked[first] = unpacked.get(first, 0) + (len(data) if data != read else 0)
             if unpacked[first] > most:  # One image can stand in any number of rows.
-                raise UnpacksToTooMuch(f"{first} unpacks to more than {most} bytes of images.")
+                raise files.UnpacksToTooMuch(
+                    f"{first} unpacks to more than {most} bytes of images."
+                )
             read = data
             record.fault = "" if data else "whose image is not in the table"
         yield record
@@ -342,7 +318,7 @@ def _in_order(located: Located, kept: _Kept, stored: str) -> Iterator[dict[str, 
     waiting: dict[int, dict[str, Any]] = {}  # Rows of a file that is not in order.
     due = held = 0
     for path, places, rows in located.rows_by_file():
-        found = rows_at(path, rows, sizes, [stored] if stored else [])
+        found = files.rows_at(path, rows, sizes, [stored] if stored else [])
         for place, row in zip(places.tolist(), found, strict=True):
             waiting[place] = row
             held += len(_bytes(row.get(stored)))
@@ -351,12 +327,11 @@ def _in_order(located: Located, kept: _Kept, stored: str) -> Iterator[dict[str, 
                 held -= len(_bytes(row.get(stored)))
                 yield row
                 due += 1
-            if held > MAX_UNPACKED:  # Many rows may share one large value.
+            if held > files.MAX_UNPACKED:  # Many rows may share one large value.
                 raise DemosError(f"{path} has images too far out of order: sort its rows.")
 
 
 def _bytes(value: Any) -> bytes:
-    """Return the bytes of an image of a table; b"" if it has none."""
     data = cast("dict[str, Any]", value).get("bytes") if isinstance(value, dict) else None
     return data if isinstance(data, bytes) else b""
 

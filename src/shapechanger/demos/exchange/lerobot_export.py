@@ -2,7 +2,7 @@
 
 ```
 data/chunk-000/file-000.parquet                                numbers, a row for each step
-videos/observation.images.camera/chunk-000/file-000.mp4        pictures, one episode after another
+videos/observation.images.camera/chunk-000/file-000.mp4        images, one episode after another
 meta/info.json, meta/stats.json                                rate, features, statistics
 meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet   tasks, and where each episode is
 meta/shapechanger.json                                         headers and drivers of the episodes
@@ -21,9 +21,9 @@ LeRobot's squares overflow 8 bits.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from itertools import groupby
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,9 +31,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.exports import decoded_steps, require_alike, value_names
-from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExportContext, name_in
+from shapechanger.demos.exchange.files import library, own_fields
+from shapechanger.demos.exchange.format import (
+    ExchangeEpisode,
+    ExportContext,
+    decoded_steps,
+    name_in,
+    value_names,
+)
 from shapechanger.demos.exchange.pictures import VideoWriter
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
@@ -51,13 +56,10 @@ DONE: Final = name_in("lerobot", "truncated")
 _ACTION, _STATE, _CAMERA, _REWARD, _TERMINATED = (
     name_in("lerobot", field) for field in ("action", "state", "frame", "reward", "terminated")
 )
-_VERSION: Final = "v3.0"
 _DATA_PATH: Final = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _VIDEO_PATH: Final = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 _FILES_PER_CHUNK: Final = 1000
 _DATA_FILE_MB: Final = 100
-_VIDEO_FILE_MB: Final = 200
-_MB: Final = 1 << 20
 # LeRobot finds an image by its time in the file, in 32 bits and to 0.1 ms: enough for 1000 s.
 _VIDEO_FILE_S: Final = 500.0
 _ROWS: Final = 256  # In memory at once, because they may hold images.
@@ -65,16 +67,12 @@ _SMALLEST_FRACTION: Final = 10_000  # Denominator of a rate: 19.98 Hz is 999/50.
 _QUANTILES: Final = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 _COLOURS: Final = 3
 _LEVELS: Final = 256
-# LeRobot thins out large images for its statistics.
-_LARGE_PICTURE: Final = 300
-_THINNED_PICTURE: Final = 150
 
 _Stats = dict[str, NDArray[Any]]
 
 
 def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
     """Write episodes into an existing folder, as one dataset, and return the number of steps."""
-    require_alike(episodes, "LeRobot")
     dataset = _Dataset(episodes[0].header, folder, context)
     try:
         for episode in episodes:
@@ -116,62 +114,65 @@ class _Dataset:
 
     def add(self, episode: ExchangeEpisode, task: str) -> None:
         """Append an episode."""
-        steps: list[Step] = []
-        stored: list[dict[str, Any]] = []
-        parts: list[dict[str, NDArray[Any]]] = []
-        shown, counts = np.empty(0, np.uint8), np.zeros((_LEVELS, _COLOURS), np.int64)
-        histograms = np.zeros_like(counts)
-        rows = decoded_steps(episode.rows, self._size, episode.name, "LeRobot")
         self._open_files()
-        for number, (row, jpeg, pixels) in enumerate(rows):
-            if pixels is not None:
-                shown, counts = pixels, _histograms(pixels)
-            histograms += counts
-            if self._video is not None:
-                self._video.add(shown)
-            steps.append(row.step)
-            stored.append({"bytes": jpeg, "path": f"frame-{number:06d}.jpg"})
-            if len(stored) == _ROWS:
-                parts.append(self._write_rows(steps, stored, task, episode.name))
-        if stored:
-            parts.append(self._write_rows(steps, stored, task, episode.name))
+        if task not in self._tasks:
+            self._tasks.append(task)
+        histograms = np.zeros((_LEVELS, _COLOURS), np.int64)
+        steps = self._with_images(episode, histograms)
+        parts: list[dict[str, NDArray[Any]]] = []
+        drivers: list[str] = []
+        while chunk := list(islice(steps, _ROWS)):
+            parts.append(self._write_rows(chunk, len(drivers), task, episode.name))
+            drivers += [step.driver for step, _ in chunk]
         numbers = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
         stats = {key: _stats_of(values.astype(np.float64)) for key, values in numbers.items()}
         if self._size is not None:
             levels = np.repeat(np.arange(_LEVELS)[:, None] / (_LEVELS - 1), _COLOURS, axis=1)
             found = _stats_of(levels, histograms)
             stats[_CAMERA] = {name: value.reshape(-1, 1, 1) for name, value in found.items()}
-            stats[_CAMERA]["count"] = np.array([len(steps)])
+            stats[_CAMERA]["count"] = np.array([len(drivers)])
+        chunk_index, file_index = divmod(self._tables, _FILES_PER_CHUNK)
         place: dict[str, Any] = {
             "episode_index": len(self.places),
             "tasks": [task],
-            "length": len(steps),
-            "data/chunk_index": self._tables // _FILES_PER_CHUNK,
-            "data/file_index": self._tables % _FILES_PER_CHUNK,
+            "length": len(drivers),
+            "data/chunk_index": chunk_index,
+            "data/file_index": file_index,
             "dataset_from_index": self.steps,
-            "dataset_to_index": self.steps + len(steps),
+            "dataset_to_index": self.steps + len(drivers),
         }
         if self._video is not None:
             end = self._video.frames
+            chunk_index, file_index = divmod(self._videos, _FILES_PER_CHUNK)
             place |= {
-                f"videos/{_CAMERA}/chunk_index": self._videos // _FILES_PER_CHUNK,
-                f"videos/{_CAMERA}/file_index": self._videos % _FILES_PER_CHUNK,
-                f"videos/{_CAMERA}/from_timestamp": float((end - len(steps)) / self._rate),
+                f"videos/{_CAMERA}/chunk_index": chunk_index,
+                f"videos/{_CAMERA}/file_index": file_index,
+                f"videos/{_CAMERA}/from_timestamp": float((end - len(drivers)) / self._rate),
                 f"videos/{_CAMERA}/to_timestamp": float(end / self._rate),
             }
-        place |= {
-            f"stats/{key}/{name}": value.tolist()
-            for key, found in stats.items()
-            for name, value in found.items()
-        }
-        place |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
-        self.places.append(place)
+        for key, found in stats.items():
+            place |= {f"stats/{key}/{name}": value.tolist() for name, value in found.items()}
+        self.places.append(place | {f"meta/episodes/{kind}_index": 0 for kind in ("chunk", "file")})
         self._stats.append(stats)
-        runs = [[who, len(list(group))] for who, group in groupby(step.driver for step in steps)]
-        self._headers.append(
-            episode.header.to_json() | {"outcome": episode.outcome, "drivers": runs}
-        )
-        self.steps += len(steps)
+        runs = [[driver, len(list(group))] for driver, group in groupby(drivers)]
+        self._headers.append(own_fields(episode) | {"drivers": runs})
+        self.steps += len(drivers)
+
+    def _with_images(
+        self, episode: ExchangeEpisode, histograms: NDArray[np.int64]
+    ) -> Iterator[tuple[Step, bytes]]:
+        """Yield steps with their images, and add the images to the video and the histograms."""
+        shown, counts = np.empty(0, np.uint8), np.zeros_like(histograms)
+        for row, jpeg, pixels in decoded_steps(episode.rows, self._size, episode.name, "LeRobot"):
+            if pixels is not None:
+                each = [
+                    np.bincount(pixels[..., n].ravel(), minlength=_LEVELS) for n in range(_COLOURS)
+                ]
+                shown, counts = pixels, np.stack(each, axis=1)
+            histograms += counts
+            if self._video is not None:
+                self._video.add(shown)
+            yield row.step, jpeg
 
     def close_files(self) -> None:
         """Close the files of the numbers and the images."""
@@ -182,12 +183,9 @@ class _Dataset:
 
     def write_meta(self) -> None:
         """Write `meta/`."""
-        arrow = self._arrow
-        (self._folder / EPISODES / "chunk-000").mkdir(parents=True)
-        self._parquet.write_table(
-            arrow.Table.from_pylist(self.places),
-            self._folder / EPISODES / "chunk-000" / "file-000.parquet",
-        )
+        arrow, path = self._arrow, self._folder / EPISODES / "chunk-000/file-000.parquet"
+        path.parent.mkdir(parents=True)
+        self._parquet.write_table(arrow.Table.from_pylist(self.places), path)
         # LeRobot reads this table with pandas, which finds the task of a row in its index.
         tasks = arrow.table(
             {
@@ -208,27 +206,27 @@ class _Dataset:
             key: {name: value.tolist() for name, value in _combined(self._stats, key).items()}
             for key in self._features
         }
-        self._write_json("meta/stats.json", stats)
-        self._write_json(OURS, {"format": 1, "episodes": self._headers})
         info: dict[str, Any] = {
-            "codebase_version": _VERSION,
+            "codebase_version": "v3.0",
             "robot_type": self._header.body or self._header.robot or None,
             "total_episodes": len(self.places),
             "total_frames": self.steps,
             "total_tasks": len(self._tasks),
             "chunks_size": _FILES_PER_CHUNK,
             "data_files_size_in_mb": _DATA_FILE_MB,
-            "video_files_size_in_mb": _VIDEO_FILE_MB,
+            "video_files_size_in_mb": 200,  # For LeRobot, which continues the dataset.
             "fps": self._fps,
             "splits": {"train": f"0:{len(self.places)}"},
             "data_path": _DATA_PATH,
             "video_path": _VIDEO_PATH if self._filmed else None,
             "features": self._features,
         }
-        self._write_json(INFO, info)
+        own = {"format": 1, "episodes": self._headers}
+        for name, value in (("meta/stats.json", stats), (OURS, own), (INFO, info)):
+            text = json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False)
+            (self._folder / name).write_text(text, encoding="utf-8", errors="replace")
 
     def _describe(self) -> dict[str, dict[str, Any]]:
-        """Return the features of `info.json`."""
         found = {_ACTION: _vector(Layout.from_json(self._header.action_layout))}
         if self._states is not None:
             found[_STATE] = _vector(self._states)
@@ -257,83 +255,72 @@ class _Dataset:
         return found | plain
 
     def _type(self, feature: Mapping[str, Any]) -> Any:
-        """Return the type of the column of a feature."""
         arrow, kind, size = self._arrow, feature["dtype"], feature["shape"][0]
         if kind == "image":
             return arrow.struct([("bytes", arrow.binary()), ("path", arrow.string())])
         plain = arrow.bool_() if kind == "bool" else getattr(arrow, kind)()
         return plain if size == 1 else arrow.list_(plain, size)
 
-    def _next_file(self, template: str, number: int) -> Path:
-        chunk, file = divmod(number, _FILES_PER_CHUNK)
-        names = {"video_key": _CAMERA, "chunk_index": chunk, "file_index": file}
-        path = self._folder / template.format(**names)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path
-
     def _open_files(self) -> None:
         """Continue in new files once the present ones are full."""
         table, video = self._table, self._video
-        if table is None or self._table_path.stat().st_size >= _DATA_FILE_MB * _MB:
+        if table is None or self._table_path.stat().st_size >= _DATA_FILE_MB << 20:
             if table is not None:
                 table.close()
             self._tables += 1
-            self._table_path = path = self._next_file(_DATA_PATH, self._tables)
+            self._table_path = path = self._new_file(_DATA_PATH, self._tables)
             self._table = self._parquet.ParquetWriter(path, self._schema, compression="snappy")
-        full = video is None or (
-            video.bytes_written >= _VIDEO_FILE_MB * _MB
-            or video.frames >= _VIDEO_FILE_S * self._rate
-        )
-        if self._filmed and self._size is not None and full:
+        is_full = video is None or video.frames >= _VIDEO_FILE_S * self._rate
+        if self._filmed and self._size is not None and is_full:
             if video is not None:
                 video.close()
             self._videos += 1
-            path = self._next_file(_VIDEO_PATH, self._videos)
+            path = self._new_file(_VIDEO_PATH, self._videos)
             self._video = VideoWriter(path, self._size, self._rate)
 
+    def _new_file(self, template: str, number: int) -> Path:
+        chunk, file = divmod(number, _FILES_PER_CHUNK)
+        name = template.format(video_key=_CAMERA, chunk_index=chunk, file_index=file)
+        (self._folder / name).parent.mkdir(parents=True, exist_ok=True)
+        return self._folder / name
+
     def _write_rows(
-        self, steps: Sequence[Step], stored: list[dict[str, Any]], task: str, name: str
+        self, chunk: Sequence[tuple[Step, bytes]], first: int, task: str, name: str
     ) -> dict[str, NDArray[Any]]:
-        """Append the newest steps, those with the `stored` images, and return their columns."""
-        count, end = len(stored), len(steps)
-        newest, frames = steps[end - count :], np.arange(end - count, end)
-        if task not in self._tasks:
-            self._tasks.append(task)
+        """Append steps with their images, the first one with a number, and return their columns."""
+        steps, frames = [step for step, _ in chunk], np.arange(first, first + len(chunk))
         columns: dict[str, NDArray[Any]] = {
-            _ACTION: _in_32_bits([step.action for step in newest]),
-            DONE: np.array([[step.terminated or step.truncated] for step in newest]),
-            _TERMINATED: np.array([[step.terminated] for step in newest]),
+            _ACTION: _in_32_bits([step.action for step in steps]),
+            DONE: np.array([[step.terminated or step.truncated] for step in steps]),
+            _TERMINATED: np.array([[step.terminated] for step in steps]),
             "timestamp": (frames / float(self._rate)).astype(np.float32)[:, None],
             "frame_index": frames[:, None],
-            "episode_index": np.full((count, 1), len(self.places)),
+            "episode_index": np.full((len(chunk), 1), len(self.places)),
             "index": frames[:, None] + self.steps,
-            "task_index": np.full((count, 1), self._tasks.index(task)),
+            "task_index": np.full((len(chunk), 1), self._tasks.index(task)),
         }
         if self._states is not None:
-            states = np.array([step.state for step in newest])
+            states = np.array([step.state for step in steps])
             middles = np.repeat([f.middle for f in self._states], [f.size for f in self._states])
             columns[_STATE] = _in_32_bits(np.where(np.isfinite(states), states, middles))
         if self._rewarded:
-            columns[_REWARD] = _in_32_bits([[step.reward] for step in newest])
+            columns[_REWARD] = _in_32_bits([[step.reward] for step in steps])
         for key, values in columns.items():
             if not np.isfinite(values).all():
                 raise DemosError(
                     f"{name} has a number in {key} that is not finite in 32 bits: export it to csv."
                 )
-        arrays: list[Any] = []
-        for column in self._schema:
-            plain = columns.get(column.name)
-            values: Any = stored if plain is None else list(plain)
-            if plain is not None and plain.shape[1] == 1:
-                values = plain[:, 0]
-            arrays.append(self._arrow.array(values, column.type))
+        stored: dict[str, Any] = {
+            key: values[:, 0] if values.shape[1] == 1 else list(values)
+            for key, values in columns.items()
+        }
+        stored[_CAMERA] = [
+            {"bytes": jpeg, "path": f"frame-{number:06d}.jpg"}
+            for number, (_, jpeg) in enumerate(chunk, first)
+        ]
+        arrays = [self._arrow.array(stored[field.name], field.type) for field in self._schema]
         self._table.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
-        stored.clear()
         return columns
-
-    def _write_json(self, name: str, value: Any) -> None:
-        text = json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False)
-        (self._folder / name).write_text(text, encoding="utf-8", errors="replace")
 
 
 def _in_32_bits(values: Any) -> NDArray[np.float32]:
@@ -347,16 +334,6 @@ def _vector(layout: Layout) -> dict[str, Any]:
     units = [feature.unit for feature in layout for _ in range(feature.size)]
     names = value_names(layout)
     return {"dtype": "float32", "shape": [layout.size], "names": names, "units": units}
-
-
-def _histograms(pixels: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return the number of pixels of each value, shape (256, 3)."""
-    height, width, _ = pixels.shape
-    if max(width, height) >= _LARGE_PICTURE:
-        stride = max(1, max(width, height) // _THINNED_PICTURE)
-        pixels = pixels[::stride, ::stride]
-    counts = [np.bincount(pixels[..., n].ravel(), minlength=_LEVELS) for n in range(_COLOURS)]
-    return np.stack(counts, axis=1)
 
 
 def _stats_of(values: NDArray[Any], weights: NDArray[np.int64] | None = None) -> _Stats:
@@ -378,20 +355,13 @@ def _stats_of(values: NDArray[Any], weights: NDArray[np.int64] | None = None) ->
 
 def _combined(episodes: Sequence[Mapping[str, _Stats]], key: str) -> _Stats:
     """Return the statistics of a feature over all episodes, each weighted by its count."""
-    stats = [episode[key] for episode in episodes]
-    counts = np.array([found["count"][0] for found in stats], np.float64)
-    weights = counts / counts.sum()
-
-    def mean(values: Sequence[NDArray[Any]]) -> NDArray[Any]:
-        return np.tensordot(weights, np.stack(values), axes=1)
-
-    centre = mean([found["mean"] for found in stats])
-    spread = mean([found["std"] ** 2 + (found["mean"] - centre) ** 2 for found in stats])
-    return {
-        "min": np.min([found["min"] for found in stats], axis=0),
-        "max": np.max([found["max"] for found in stats], axis=0),
-        "mean": centre,
-        "std": np.sqrt(spread),
-        "count": np.array([counts.sum()], np.int64),
-        **{name: mean([found[name] for found in stats]) for name in _QUANTILES},
+    every = {name: np.stack([one[key][name] for one in episodes]) for name in episodes[0][key]}
+    weights = every["count"][:, 0].reshape(-1)
+    found = {name: np.average(values, axis=0, weights=weights) for name, values in every.items()}
+    spread = every["std"] ** 2 + (every["mean"] - found["mean"]) ** 2
+    return found | {
+        "min": every["min"].min(axis=0),
+        "max": every["max"].max(axis=0),
+        "std": np.sqrt(np.average(spread, axis=0, weights=weights)),
+        "count": every["count"].sum(axis=0),
     }

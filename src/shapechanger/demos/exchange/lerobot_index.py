@@ -16,17 +16,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.files import (
-    UnpacksToTooMuch,
-    all_rows,
-    inside,
-    is_inside,
-    number_columns,
-)
-from shapechanger.demos.exchange.format import ImportContext, few
+from shapechanger.demos.exchange import files
+from shapechanger.demos.exchange.format import ImportContext
+from shapechanger.demos.exchange.imports import unreadable
 from shapechanger.demos.exchange.lerobot_export import EPISODES, INFO
 from shapechanger.demos.exchange.pictures import VideoTimes, read_times
 from shapechanger.errors import DemosError
@@ -38,13 +34,28 @@ lerobot 0.4.4. Rounding to 32 bits and to the ticks of the video is allowed in a
 _EPISODE, _FRAME, _TIME, _INDEX = "episode_index", "frame_index", "timestamp", "index"
 _RATE: Final = 0.05  # Largest difference between the stated rate and that of the times, as a share.
 _NS_PER_S: Final = 1e9
-_SPAN: Final = ("from_timestamp", "to_timestamp")
-_FILE: Final = ("chunk_index", "file_index")
 _MAX_EPISODES: Final = 1 << 20
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
 _STEP: Final = np.dtype([(name, np.int64) for name in ("frame", "time_ns", "file", "row", "tick")])
 
-_Place = dict[str, Any]
+
+class Place(msgspec.Struct, kw_only=True):
+    """A row of `meta/episodes`."""
+
+    number: int = msgspec.field(name="episode_index")
+    length: int
+    tasks: Any = None
+    first: int | None = msgspec.field(default=None, name="dataset_from_index")
+    end: int | None = msgspec.field(default=None, name="dataset_to_index")
+
+
+class _FilmedPlace(Place):
+    """The same with the part of the video."""
+
+    chunk_index: int
+    file_index: int
+    from_timestamp: float
+    to_timestamp: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +63,7 @@ class Located:
     """An episode whose keys agree.
 
     Attributes:
-        number: Its `episode_index`.
+        place: Its row of `meta/episodes`.
         steps: Its steps in order, a structured array: `frame_index`, time since the start in ns,
             number of the file in `paths`, row in it, and time of the image in ticks.
         paths: All data files.
@@ -60,7 +71,7 @@ class Located:
         times: Its times; None without one.
     """
 
-    number: int
+    place: Place
     steps: NDArray[Any]
     paths: Sequence[Path]
     video: Path | None = None
@@ -108,16 +119,13 @@ class Index:
     ) -> None:
         self._folder = folder
         self._info = info
-        self._video = f"videos/{camera}" if camera else ""
+        self._video = f"videos/{camera}/" if camera else ""
         self._size = size
         self._context = context
         self._rate_hz = float(info["fps"])
         self.places, twice = self._read_places()
-        self.steps = sum(place["length"] for place in self.places.values())
-        self._named = {n: self._path("data", place) for n, place in self.places.items()}
-        others = sorted((folder / "data").glob("*/*.parquet"))
-        self._paths = list(dict.fromkeys([*self._named.values(), *others]))
-        self._broken: dict[Path, str] = {}
+        self.steps = sum(place.length for place in self.places.values())
+        self._paths = self._data_files()
         self._unknown: set[str] = set()
         keys = np.concatenate([np.empty((0, 6)), *map(self._read, range(len(self._paths)))])
         for column in sorted(self._unknown):
@@ -127,53 +135,35 @@ class Index:
         numbers, starts, counts = np.unique(self._keys[:, 0], return_index=True, return_counts=True)
         ends = starts + counts
         self._spans = dict(zip(numbers.astype(int).tolist(), map(slice, starts, ends), strict=True))
-        for path in self._broken.keys() - self._named.values():
-            context.leave_out("file", "that cannot be read", path.relative_to(folder))
         for number in sorted(self._spans.keys() - self.places.keys() - twice):
             context.leave_out("episode", f"that {EPISODES} does not have", number)
-        moved = [
-            number
-            for number, path in self._named.items()
-            if number in self._spans
-            and (self._keys[self._spans[number], 4] != self._paths.index(path)).any()
-        ]
-        if moved:
-            context.warn(
-                f"Rows of {len(moved)} episodes are in other files than {EPISODES} says: "
-                f"{few(moved)}."
-            )
         self._videos: dict[Path, VideoTimes | str] = {}
-        self._filmed: dict[Path, list[_Place]] = defaultdict(list)
+        self._filmed: dict[Path, list[_FilmedPlace]] = defaultdict(list)
         self._overlaps: dict[int, str] = {}
-        for place in self.places.values() if camera else ():
-            self._filmed[self._path("video", place)].append(place)
+        for place in self.places.values():
+            if isinstance(place, _FilmedPlace):
+                self._filmed[self._video_path(place)].append(place)
 
-    def _read_places(self) -> tuple[dict[int, _Place], set[int]]:
+    def _read_places(self) -> tuple[dict[int, Place], set[int]]:
         """Return the rows of `meta/episodes` in order, and the numbers that are there twice."""
         paths = sorted((self._folder / EPISODES).glob("*/*.parquet"))
         if not paths:
             raise DemosError(f"There is no {EPISODES}/*/*.parquet in {self._folder}: restore it.")
-        needed = {_EPISODE, "length", *(f"data/{key}" for key in _FILE)}
-        if self._video:
-            needed |= {f"{self._video}/{key}" for key in (*_FILE, *_SPAN)}
-        more = {"tasks", "dataset_from_index", "dataset_to_index"}
-        found: dict[int, _Place] = {}
+        kind = _FilmedPlace if self._video else Place
+        own = {field.encode_name for field in msgspec.structs.fields(Place)}
+        names = own | {self._video + name for name in _FilmedPlace.__struct_fields__ if self._video}
+        found: dict[int, Place] = {}
         twice: set[int] = set()
         for path in paths:
-            place = inside(self._folder, str(path.relative_to(self._folder)), path)
-            for row in all_rows(place, needed | more):
-                if missing := sorted(column for column in needed if row.get(column) is None):
-                    raise DemosError(f"{path} has no {missing[0]!r}.")
+            inner = files.inside(self._folder, str(path.relative_to(self._folder)), path)
+            for row in files.all_rows(inner, names):
+                plain = {name.removeprefix(self._video): value for name, value in row.items()}
                 try:
-                    row |= {
-                        key: float(value) if key.endswith(_TIME) else int(value)
-                        for key, value in row.items()
-                        if key != "tasks" and value is not None
-                    }
-                except (TypeError, ValueError, OverflowError) as error:
-                    raise DemosError(f"{path} has an index or a time that is no number.") from error
-                twice |= {row[_EPISODE]} & found.keys()
-                found[row[_EPISODE]] = row
+                    place = msgspec.convert(plain, kind, strict=False)
+                except msgspec.ValidationError as error:
+                    raise DemosError(f"{path} is not a table of episodes: {error}.") from error
+                twice |= {place.number} & found.keys()
+                found[place.number] = place
         if not found or not 0 <= min(found) <= max(found) < _MAX_EPISODES:
             raise DemosError(f"{self._folder / EPISODES} has no episodes with numbers from 0.")
         for number in sorted(twice):
@@ -182,37 +172,47 @@ class Index:
             self._context.leave_out("episode", f"that {EPISODES} does not have", number)
         return {number: found[number] for number in sorted(found.keys() - twice)}, twice
 
-    def _path(self, kind: str, place: _Place) -> Path:
-        """Return a file that a template of `info.json` names, without Python's own formats."""
-        template = self._info.get(f"{kind}_path")
+    def _data_files(self) -> list[Path]:
+        """Return the files that fit the template of `info.json`."""
+        pattern = self._named("data_path", defaultdict(lambda: "*"))
+        found = sorted(self._folder.glob(pattern))
+        if not found:
+            raise DemosError(f"There is no {self._folder / pattern}: restore it.")
+        return found
+
+    def _video_path(self, place: _FilmedPlace) -> Path:
+        values = {name: str(getattr(place, name)) for name in ("chunk_index", "file_index")}
+        key = self._video.removeprefix("videos/").rstrip("/")
+        return self._folder / self._named("video_path", values | {"video_key": key})
+
+    def _named(self, key: str, values: Mapping[str, str]) -> str:
+        """Fill in a template of `info.json`, without Python's own formats."""
+        template = self._info.get(key)
         if not isinstance(template, str):
             raise DemosError(
                 f"{self._folder / INFO} does not say where the files are (data_path, video_path)."
             )
-        part = "data" if kind == "data" else self._video
-        values = {"video_key": part.removeprefix("videos/")}
-        values |= {key: str(place[f"{part}/{key}"]) for key in _FILE}
         name = _PLACE.sub(lambda match: values[match[1]].rjust(int(match[2] or 0), "0"), template)
-        if not is_inside(self._folder, name):
+        if not files.is_inside(self._folder, name):
             raise DemosError(f"{self._folder / INFO}: the name {name!r} leaves the folder.")
-        return self._folder / name
+        return name
 
     def _read(self, number: int) -> NDArray[np.float64]:
         """Return the keys of a file, its number and the numbers of its rows, shape (n, 6)."""
         path = self._paths[number]
         names = (_EPISODE, _FRAME, _TIME, _INDEX)
+        inner = str(path.relative_to(self._folder))
         try:
-            name = str(path.relative_to(self._folder))
-            keys, columns = number_columns(inside(self._folder, name, EPISODES), names)
+            keys, columns = files.number_columns(files.inside(self._folder, inner, INFO), names)
             if missing := [key for key in names[:3] if key not in keys]:
                 raise DemosError(f"{path} has no column {missing[0]!r}.")
             for key, values in keys.items():
                 if not np.isfinite(values).all() or (key != _TIME and (values % 1.0).any()):
                     raise DemosError(f"{path} has a {key} that is empty or no number.")
-        except UnpacksToTooMuch:
+        except files.UnpacksToTooMuch:
             raise
         except DemosError as error:
-            self._broken[path] = str(error).removesuffix(".")
+            self._context.leave_out("file", unreadable(error), inner)
             return np.empty((0, 6))
         unknown = columns - self._info["features"].keys()
         self._unknown |= {c for c in unknown if not c.startswith("__index_level_")}  # Of pandas.
@@ -225,21 +225,19 @@ class Index:
         """Yield the episodes whose keys agree; the others are reported."""
         for number, place in self.places.items():
             try:
-                steps = self._steps(number, place)
-                located = Located(number, steps, self._paths)
-                yield self._with_pictures(located, place) if self._video else located
+                located = Located(place, self._steps(place), self._paths)
+                filmed = isinstance(place, _FilmedPlace)
+                yield self._with_pictures(located, place) if filmed else located
             except _Contradiction as found:
                 self._context.leave_out("episode", found.reason, f"{number}{found.size}")
 
-    def _steps(self, number: int, place: _Place) -> NDArray[Any]:
+    def _steps(self, place: Place) -> NDArray[Any]:
         """Return the steps whose rows agree with each other and with `meta/episodes`."""
-        length = place["length"]
-        if (path := self._named[number]) in self._broken:
-            raise _Contradiction(f"whose data cannot be read: {self._broken[path]}")
-        if number not in self._spans:
+        length, rate_hz = place.length, self._rate_hz
+        if place.number not in self._spans:
             raise _Contradiction("without rows in the data")
-        span = self._spans[number]
-        _, steps, times_s, indexes, files, rows = self._keys[span].T
+        span = self._spans[place.number]
+        _, steps, times_s, indexes, paths, rows = self._keys[span].T
         frames = steps.astype(np.int64)
         again = frames[1:][np.diff(frames) == 0]
         if again.size:
@@ -250,46 +248,27 @@ class Index:
                 f"{len(frames)} rows with a frame_index up to {frames[-1]}, and a length of "
                 f"{length}",
             )
-        first, end = place.get("dataset_from_index"), place.get("dataset_to_index")
-        if first is not None and end is not None:
-            if end - first != length:
+        if place.first is not None and place.end is not None:
+            if place.end - place.first != length:
                 raise _Contradiction(
                     "whose length is not dataset_to_index - dataset_from_index",
-                    f"{length} and {end - first}",
+                    f"{length} and {place.end - place.first}",
                 )
-            off = np.abs(np.nan_to_num(indexes - frames - first))
+            off = np.abs(np.nan_to_num(indexes - frames - place.first))
             if off.any():
                 raise _Contradiction(
                     "whose index is not dataset_from_index + frame_index",
                     f"off by up to {off.max():.0f}",
                 )
-        self._require_times(number, frames, times_s)
-        for missing in sorted(set(range(length)).difference(frames.tolist())):
-            name = f"{missing} of episode {number}"
-            self._context.leave_out("step", "without a row in the data", name)
-        if (np.diff(self._order[span]) < 0).any():
-            self._context.note("Rows are not in the order of frame_index: they are sorted by it.")
-        nominal_s = frames / self._rate_hz
-        exact = np.abs(times_s - nominal_s) <= _tolerance_s(times_s)
-        found = np.zeros(len(frames), _STEP)
-        found["frame"], found["file"], found["row"] = frames, files, rows
-        chosen_s = np.asarray(np.where(exact, nominal_s, times_s), np.float64)
-        found["time_ns"] = np.round(chosen_s * _NS_PER_S)
-        return found
-
-    def _require_times(
-        self, number: int, frames: NDArray[np.int64], times_s: NDArray[np.float64]
-    ) -> None:
-        """Refuse times that contradict the number of the step or the rate."""
-        rate_hz = self._rate_hz
         steps_s = np.diff(times_s)
         if (steps_s <= 0.0).any():
             at = int(steps_s.argmin())
             raise _Contradiction(
                 "whose time runs backwards", f"{-steps_s[at]:.4g} s after step {frames[at]}"
             )
-        off_s = times_s - frames / rate_hz
-        if abs(off_s[0]) > 0.5 / rate_hz:
+        nominal_s = frames / rate_hz
+        off_s = np.abs(times_s - nominal_s)
+        if off_s[0] > 0.5 / rate_hz:
             raise _Contradiction(
                 "whose time does not begin at 0", f"{times_s[0]:.6g} s at step {frames[0]}"
             )
@@ -300,14 +279,22 @@ class Index:
                     f"with another rate than the {rate_hz:g} Hz of {INFO}",
                     f"{measured_hz:.4g} Hz by the times",
                 )
-        if (most_s := float(np.abs(off_s).max())) > 0.5 / rate_hz:
+        if (most_s := float(off_s.max())) > 0.5 / rate_hz:
             self._context.warn(
-                f"The times of episode {number} differ from frame_index / fps by up to "
+                f"The times of episode {place.number} differ from frame_index / fps by up to "
                 f"{most_s:.3g} s: they are imported as they are."
             )
-
-    def _span(self, place: _Place) -> tuple[float, float]:
-        return place[f"{self._video}/from_timestamp"], place[f"{self._video}/to_timestamp"]
+        for missing in sorted(set(range(length)).difference(frames.tolist())):
+            name = f"{missing} of episode {place.number}"
+            self._context.leave_out("step", "without a row in the data", name)
+        if (np.diff(self._order[span]) < 0).any():
+            self._context.note("Rows are not in the order of frame_index: they are sorted by it.")
+        found = np.zeros(len(frames), _STEP)
+        found["frame"], found["file"], found["row"] = frames, paths, rows
+        exact = off_s <= _tolerance_s(times_s)
+        chosen_s = np.asarray(np.where(exact, nominal_s, times_s), np.float64)
+        found["time_ns"] = np.round(chosen_s * _NS_PER_S)
+        return found
 
     def _period_s(self, times: VideoTimes) -> float:
         """Return the time from one image to the next, s; that of the steps for a single one."""
@@ -318,21 +305,20 @@ class Index:
         """Return the times of a video, or why its episodes are left out."""
         name = str(path.relative_to(self._folder))
         try:
-            times = read_times(inside(self._folder, name, self._folder / EPISODES))
+            times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
         except DemosError as error:
             return f"whose video cannot be read: {str(error).removesuffix('.')}"
         if self._size is not None and times.size != self._size:
             sizes = "{} x {} pixels, but meta/info.json says {} x {}"
             return f"whose images in {name} have {sizes.format(*times.size, *self._size)}"
-        places = sorted(self._filmed[path], key=self._span)
+        places = sorted(self._filmed[path], key=lambda p: (p.from_timestamp, p.to_timestamp))
         period_s = self._period_s(times)
         for one, two in pairwise(places):
-            if (by_s := self._span(one)[1] - self._span(two)[0]) > 0.5 * period_s:
-                for place in (one, two):
-                    self._overlaps[place[_EPISODE]] = f"{by_s:.4g} s"
+            if (by_s := one.to_timestamp - two.from_timestamp) > 0.5 * period_s:
+                self._overlaps |= dict.fromkeys((one.number, two.number), f"{by_s:.4g} s")
         shown_s, end_s = float(times.seconds[0]), float(times.seconds[-1])
-        early_s = self._span(places[0])[0] - shown_s
-        late_s = end_s + period_s - max(self._span(place)[1] for place in places)
+        early_s = places[0].from_timestamp - shown_s
+        late_s = end_s + period_s - max(place.to_timestamp for place in places)
         moved = "so that each step may have the image of another one"
         if early_s < -0.5 * period_s:
             return f"of {name}, which begins {-early_s:.4g} s later than {EPISODES} says, {moved}"
@@ -342,26 +328,25 @@ class Index:
                     f"{name} {where} than its episodes in {EPISODES}, by {off_s:.4g} s."
                 )
         if times.is_cut_off:
-            reason = "that is cut off, without the images after that"
-            self._context.leave_out("file", reason, name)
+            self._context.leave_out("file", "that is cut off, without the images after that", name)
         elif late_s < -0.5 * period_s:
-            steps_s = max(self._span(p)[0] + (p["length"] - 1) / self._rate_hz for p in places)
+            steps_s = max(p.from_timestamp + (p.length - 1) / self._rate_hz for p in places)
             if (by_s := steps_s - end_s) > 0.5 * period_s:
                 return f"of {name}, which ends {by_s:.4g} s before its last step, {moved}"
             self._context.warn(f"{name} ends {-late_s:.4g} s earlier than {EPISODES} says.")
         return times
 
-    def _with_pictures(self, located: Located, place: _Place) -> Located:
+    def _with_pictures(self, located: Located, place: _FilmedPlace) -> Located:
         """Return an episode with the image of each step, without steps that have none."""
-        number, steps = located.number, located.steps
-        path = self._path("video", place)
+        number, steps = place.number, located.steps
+        path = self._video_path(place)
         if path not in self._videos:
             self._videos[path] = self._times(path)
         if isinstance(times := self._videos[path], str):
             raise _Contradiction(times)
         if by := self._overlaps.get(number):
             raise _Contradiction("whose part of a video overlaps with that of another", by)
-        first_s, end_s = self._span(place)
+        first_s, end_s = place.from_timestamp, place.to_timestamp
         at_s = first_s + steps["time_ns"] / _NS_PER_S
         most_s = _tolerance_s(at_s) + 0.5 * float(times.tick_s)
         period_s = self._period_s(times)
@@ -390,7 +375,7 @@ class Index:
                 f"without an image within {TOLERANCE_S * 1e3:g} ms",
                 f"{frame} of episode {number} ({by_s:.3g} s)",
             )
-        return Located(number, steps[shown], located.paths, path, times)
+        return Located(place, steps[shown], located.paths, path, times)
 
 
 def _tolerance_s(times_s: NDArray[np.float64]) -> NDArray[np.float64]:

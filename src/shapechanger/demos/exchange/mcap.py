@@ -60,8 +60,8 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
             writer = library("mcap.writer").Writer(file)
             writer.start(profile="", library="shapechanger")
             steps += _write_episode(episode, writer)
-            header = json.dumps(episode.header.to_json(), ensure_ascii=False)
-            about = {"header": _text(header), "outcome": _text(episode.outcome)}
+            outcome = episode.outcome.encode(errors="replace").decode()  # A lone surrogate.
+            about = {"header": json.dumps(episode.header.to_json()), "outcome": outcome}
             writer.add_metadata("shapechanger", about)
             writer.finish()
     return steps
@@ -82,9 +82,8 @@ def _write_episode(episode: ExchangeEpisode, writer: Any) -> int:
     channels: dict[str, int] = {}
     for topic, (name, properties) in schemas.items():
         schema = {"title": name, "type": "object", "properties": properties}
-        number = writer.register_schema(
-            name=name, encoding="jsonschema", data=json.dumps(schema).encode()
-        )
+        data = json.dumps(schema).encode()
+        number = writer.register_schema(name=name, encoding="jsonschema", data=data)
         channels[topic] = writer.register_channel(
             topic=f"/{topic}", message_encoding="json", schema_id=number
         )
@@ -122,7 +121,6 @@ def _timed(episode: ExchangeEpisode) -> Iterator[tuple[ExchangeStep, int]]:
 def _messages(
     row: ExchangeStep, seen_ns: int, actions: Layout, states: Layout | None
 ) -> dict[str, dict[str, Any]]:
-    """Return the messages of a step by topic."""
     step = row.step
     found: dict[str, dict[str, Any]] = {}
     if row.jpeg is not None:
@@ -176,11 +174,6 @@ def _by_name(layout: Layout, values: Sequence[float]) -> dict[str, Any]:
 def _known(value: float) -> float | None:
     """Return a number as JSON can hold it: null if it is not finite."""
     return value if math.isfinite(value) else None
-
-
-def _text(value: str) -> str:
-    """Replace characters that have no UTF-8 encoding."""
-    return value.encode(errors="replace").decode()
 
 
 FORMAT: Final = Format(name="mcap", title="MCAP", write=_write, options=frozenset({"dropped"}))

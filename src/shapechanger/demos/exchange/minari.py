@@ -24,7 +24,6 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import chain
@@ -37,18 +36,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.exports import decoded_steps, require_alike
-from shapechanger.demos.exchange.files import (
-    chunk_of,
-    column,
-    inside,
-    library,
-    names_in,
-    open_hdf5,
-    own_headers,
-    parse_json,
-    read_json_object,
-)
+from shapechanger.demos.exchange import files, imports, minari_spaces
 from shapechanger.demos.exchange.format import (
     DEFAULT_HZ,
     ExchangeEpisode,
@@ -56,20 +44,11 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     Format,
     ImportContext,
+    decoded_steps,
     few,
     name_in,
 )
-from shapechanger.demos.exchange.imports import SourceRecord, as_json, episode_of, unreadable
-from shapechanger.demos.exchange.minari_spaces import (
-    box_of,
-    is_imported,
-    is_stored_as_jpeg,
-    leaves_in,
-    picture_size_of,
-    pixels_of,
-    space_features,
-    space_of,
-)
+from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.jpeg import is_grey
 from shapechanger.errors import DemosError
 
@@ -84,6 +63,7 @@ _ACTION, _STATE, _PICTURE, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
     for field in ("action", "state", "frame", "reward", "terminated", "truncated", "driver")
 )
 _IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys of a step that its JSON lacks.
+_STORAGE: Final = "minari.dataset.minari_storage"
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
 
@@ -94,62 +74,46 @@ def _data_folder(folder: Path) -> Path | None:
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    """Yield the episodes of a dataset."""
     place = _data_folder(folder) or folder
     path = place / _METADATA
-    metadata = read_json_object(path)
+    metadata = files.read_json_object(path)
     if metadata.get("data_format", "hdf5") != "hdf5":
         raise DemosError(
             f"{folder} is stored as {metadata['data_format']!r}, but only 'hdf5' is supported: "
             "create it with data_format='hdf5'."
         )
-    main = inside(place, _MAIN, path)
-    count = metadata.get("total_episodes")
-    if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+    main = files.inside(place, _MAIN, path)
+    count, most, claimed = metadata.get("total_episodes"), main.stat().st_size, 0
+    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= most:
         raise DemosError(f"{path}: total_episodes must be a positive integer, got {count!r}.")
-    _require_stored(main, count)
-    ours = own_headers(metadata[_OURS], path, count) if _OURS in metadata else []
+    ours = files.own_episodes(metadata[_OURS], path, count) if _OURS in metadata else []
     theirs = None if ours else _foreign(main, path, metadata, context)
     for number in range(count):
         try:
-            with open_hdf5(main) as file:
-                parts = theirs or _own(file, number, ours[number])
+            header, outcome = files.own_header(ours[number], path) if ours else (None, "")
+            with files.open_hdf5(main) as file:
+                parts = theirs if header is None else _own(file, number, header)
+                assert parts is not None
                 steps = parts.count_steps(file, number, context)
         except DemosError as error:
-            context.leave_out("episode", unreadable(error), number)
+            context.leave_out("episode", imports.unreadable(error), number)
             continue
-        yield episode_of(
-            _records(main, number, steps, parts),
-            parts.header,
-            context,
-            name=f"{main}, episode_{number}",
-            what="step",
-            rest=[f"{n} of episode_{number}" for n in range(steps)],
-            outcome=str(ours[number].get("outcome", "")) if ours else "",
-        )
+        # HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
+        if (claimed := claimed + 3 * steps) > most:
+            raise DemosError(f"{main} claims at least {claimed} values, but has {most} bytes.")
+        records, size = _records(main, number, steps, parts), parts.header.image_size
+        rest = [f"{n} of episode_{number}" for n in range(steps)]
+        rows = imports.rows_of(records, size, context, "step", rest)
+        name = f"{main}, episode_{number}"
+        yield ExchangeEpisode(header=parts.header, rows=rows, name=name, outcome=outcome)
     if not ours:
-        with open_hdf5(main) as file:
-            groups = [name for name in names_in(file) if name.startswith("episode_")]
-            more = {name for group in groups for name in names_in(file, group, "infos")}
+        with files.open_hdf5(main) as file:
+            groups = [name for name in files.names_in(file) if name.startswith("episode_")]
+            more = {name for group in groups for name in files.names_in(file, group, "infos")}
         if len(groups) != count:
             context.warn(f"total_episodes is {count}, and {main.name} has {len(groups)} episodes.")
         if more:
             context.note(f"The infos are not imported: {few(sorted(more))}.")
-
-
-def _require_stored(main: Path, count: int) -> None:
-    """Refuse a file that claims more steps than it has bytes.
-
-    HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
-    """
-    size, claimed = main.stat().st_size, 0
-    with open_hdf5(main) as file:
-        for number in range(count):
-            for name in (_REWARD, _TERMINATED, _TRUNCATED):
-                with suppress(DemosError):  # It is left out later.
-                    claimed += int(column(file, f"episode_{number}/{name}").shape[0])
-            if claimed > size:
-                raise DemosError(f"{main} claims at least {claimed} values, but has {size} bytes.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,9 +135,9 @@ class _Parts:
         group = f"episode_{number}"
         names = [_TERMINATED, _TRUNCATED, *(name for name, _ in (*self.action, *self.state))]
         names += [*self.infos, *([self.picture] if self.picture else [])]
-        if self.infos or _REWARD in names_in(file, group):
+        if self.infos or _REWARD in files.names_in(file, group):
             names.append(_REWARD)
-        return {name: column(file, f"{group}/{name}") for name in names}
+        return {name: files.column(file, f"{group}/{name}") for name in names}
 
     def count_steps(self, file: Any, number: int, context: ImportContext) -> int:
         """Return the number of steps; refuse an episode whose columns have different lengths."""
@@ -198,10 +162,9 @@ class _Parts:
         return steps
 
 
-def _own(file: Any, number: int, plain: dict[str, Any]) -> _Parts:
+def _own(file: Any, number: int, header: EpisodeHeader) -> _Parts:
     """Return the parts of an episode that Shapechanger exported."""
-    header = EpisodeHeader.from_json(plain)
-    infos = names_in(file, f"episode_{number}", "infos")
+    infos = files.names_in(file, f"episode_{number}", "infos")
     pictured = "frame" in infos
     state, picture = _observed(pictured, bool(header.state_layout))
     return _Parts(
@@ -221,8 +184,11 @@ def _observed(picture: bool, state: bool) -> tuple[str, str]:
 
 def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportContext) -> _Parts:
     """Return the parts of the episodes of a dataset of others."""
-    observed, acted = (leaves_in(metadata, f"{of}_space", path) for of in ("observation", "action"))
-    pictured = {name: size for name, space in observed.items() if (size := picture_size_of(space))}
+    observed, acted = (
+        minari_spaces.leaves_in(metadata, f"{of}_space", path) for of in ("observation", "action")
+    )
+    sizes = {name: minari_spaces.picture_size_of(space) for name, space in observed.items()}
+    pictured = [name for name, size in sizes.items() if size is not None]
     if len(pictured) > 1:
         raise DemosError(
             f"An observation in {main} has {len(pictured)} images ({', '.join(pictured)}), but "
@@ -231,22 +197,23 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
     sensed = {
         name: space
         for name, space in observed.items()
-        if name not in pictured and is_imported(name, space, context)
+        if name not in pictured and minari_spaces.is_imported(name, space, context)
     }
     hz = metadata.get("control_hz", context.hz)
     known = isinstance(hz, int | float) and math.isfinite(hz) and hz > 0.0
     if not known:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-    camera = next(iter(pictured), None)
-    layouts = (
-        as_json([f for name, space in leaves.items() for f in space_features(name, space, what)])
+    camera = "".join(pictured) if pictured else None
+    action_layout, state_layout = (
+        imports.as_json(
+            [f for name, leaf in leaves.items() for f in minari_spaces.features(name, leaf, what)]
+        )
         for leaves, what in ((acted, "action"), (sensed, "observation"))
     )
-    action_layout, state_layout = layouts
     header = EpisodeHeader(
         action_layout=action_layout,
         state_layout=state_layout,
-        image_size=None if camera is None else pictured[camera],
+        image_size=None if camera is None else sizes[camera],
         control_hz=float(cast("float", hz)) if known else DEFAULT_HZ,
         clock="none",
         source="minari",
@@ -264,16 +231,15 @@ def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportCo
         picture="" if camera is None else f"{_OBSERVATIONS}/{camera}".rstrip("/"),
         is_jpeg=camera is not None
         and bool(metadata.get("jpeg_encoding", True))
-        and is_stored_as_jpeg(observed[camera]),
+        and files.library(_STORAGE).is_image_space(observed[camera]),
     )
 
 
 def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[SourceRecord]:
-    """Yield the records of an episode."""
     group, size = f"episode_{number}", parts.header.image_size
-    with open_hdf5(main) as file:
+    with files.open_hdf5(main) as file:
         columns = parts.columns(file, number)
-        count = chunk_of(columns.values(), _CHUNK)
+        count = files.chunk_of(columns.values(), _CHUNK)
         for start in range(0, steps, count):
             part = slice(start, min(start + count, steps))
             chunk = {name: values[part] for name, values in columns.items()}
@@ -295,7 +261,9 @@ def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[Sou
                 if parts.picture:
                     record.frame = int(at[_FRAME]) if _FRAME in at else step
                     stored = at[parts.picture]
-                    record.picture = bytes(stored) if parts.is_jpeg else pixels_of(stored, size)
+                    record.picture = (
+                        bytes(stored) if parts.is_jpeg else minari_spaces.pixels_of(stored, size)
+                    )
                     if record.picture is None:
                         record.fault = "whose image does not fit its space"
                 if parts.infos:
@@ -327,7 +295,7 @@ def _add_rest(record: SourceRecord, text: bytes) -> None:
     step = record.step
     columns = {"action": step.action, "state": step.state, "terminated": step.terminated}
     try:
-        rest = parse_json(text.decode(), _STEP)
+        rest = files.parse_json(text.decode(), _STEP)
         fields = rest["step"] | columns
         if "reward" in fields:
             fields["reward"] = step.reward
@@ -352,18 +320,16 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
             f"Minari loads a dataset by its name, which must end in a version: call it "
             f"{context.out.with_name(f'{better}-v0')}, not {context.out}."
         )
-    h5py = library("h5py")
-    storages = library("minari.dataset.minari_storage")
-    require_alike(episodes, "Minari")
+    h5py = files.library("h5py")
     header = episodes[0].header
     rows = [iter(episode.rows) for episode in episodes]
     first = next(rows[0])
     rows[0] = chain((first,), rows[0])
-    space, picture = space_of(header, first.jpeg, episodes[0].name)
-    storage = storages.MinariStorage.new(
+    space, picture = minari_spaces.space_of(header, first.jpeg, episodes[0].name)
+    storage = files.library(_STORAGE).MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=space,
-        action_space=box_of(header.action_layout),
+        action_space=minari_spaces.box_of(header.action_layout),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
@@ -377,21 +343,15 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
             if episode.header.seed is not None:
                 group.attrs["seed"] = episode.header.seed
             total += len(steps)
-    storage.update_metadata(
-        _metadata(name, episodes, drivers)
-        | {
-            "total_episodes": len(episodes),
-            "total_steps": total,
-            "dataset_size": storage.get_size(),
-        }
-    )
+    counts = {"total_episodes": len(episodes), "total_steps": total}
+    about = _metadata(name, episodes, drivers) | counts | {"dataset_size": storage.get_size()}
+    storage.update_metadata(about)
     return total
 
 
 def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str]) -> dict[str, Any]:
     header = episodes[0].header
     plain = header.to_json()
-    own = [e.header.to_json() | {"outcome": e.outcome} for e in episodes]
     found: dict[str, Any] = {
         "dataset_id": name,
         "minari_version": version("minari"),
@@ -403,7 +363,7 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
         "action_layout": plain["action_layout"],
         "observation_layout": plain["state_layout"],
         "control_hz": header.control_hz,
-        _OURS: {"format": 1, "episodes": own},
+        _OURS: {"format": 1, "episodes": list(map(files.own_fields, episodes))},
     }
     envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
     if header.env in gym.registry and all(env == envs[0] for env in envs):
@@ -429,12 +389,22 @@ def _write_episode(
     observed: list[Any] = []  # The columns of the images; the last one is Minari's.
     if picture is not None:
         size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
-        as_jpeg = is_stored_as_jpeg(picture)
-        blob = library("h5py").vlen_dtype(np.uint8)
-        observed.append(_empty(group, picture_at if as_jpeg else _JPEG, (), blob))
-        if not as_jpeg:
-            observed.append(_empty(group, picture_at, picture.shape, np.uint8))
+        as_jpeg = files.library(_STORAGE).is_image_space(picture)
+        blob = files.library("h5py").vlen_dtype(np.uint8)
+        kinds = {picture_at if as_jpeg else _JPEG: ((), blob)}
+        kinds |= {} if as_jpeg else {picture_at: (picture.shape, np.uint8)}
+        observed = [
+            group.create_dataset(
+                at, shape=(0, *shape), maxshape=(None, *shape), dtype=dtype, chunks=True
+            )
+            for at, (shape, dtype) in kinds.items()
+        ]
     frame, shown = -1, np.empty(0)
+
+    def append(at: Any, value: Any) -> None:
+        at.resize(len(at) + 1, axis=0)
+        at[-1] = value
+
     for row, jpeg, pixels in decoded_steps(rows, size, episode.name, "Minari"):
         if pixels is not None:
             frame, shown = frame + 1, pixels[..., 0] if grey else pixels
@@ -446,7 +416,7 @@ def _write_episode(
                     "has images of one kind."
                 )
         for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
-            _append(at, value)
+            append(at, value)
         steps.append(row.step)
         rest = {n: v for n, v in row.step.to_json().items() if n not in _IN_COLUMNS}
         rests.append(json.dumps({"step": rest, "marks": row.marks, "dropped": row.dropped}))
@@ -458,7 +428,7 @@ def _write_episode(
         group.create_dataset(name, data=data, dtype=dtype, maxshape=shape, chunks=True)
 
     if picture is not None:
-        _append(observed[-1], observed[-1][-1])
+        append(observed[-1], observed[-1][-1])
         write(_FRAME, frames, np.int64)
     if header.state_layout:
         write(state_at, [*(step.state for step in steps), steps[-1].state], np.float64)
@@ -471,19 +441,8 @@ def _write_episode(
         [*(step.truncated for step in steps[:-1]), not ended or steps[-1].truncated],
         np.bool_,
     )
-    write(_STEP, rests, library("h5py").string_dtype("utf-8"))
+    write(_STEP, rests, files.library("h5py").string_dtype("utf-8"))
     return steps
-
-
-def _empty(group: Any, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
-    return group.create_dataset(
-        name, shape=(0, *shape), maxshape=(None, *shape), dtype=dtype, chunks=True
-    )
-
-
-def _append(column: Any, value: Any) -> None:
-    column.resize(len(column) + 1, axis=0)
-    column[-1] = value
 
 
 FORMAT: Final = Format(

@@ -20,7 +20,6 @@ from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Feature, Layout
 
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
-_MIN_JPEG: Final = 32  # Pixels.
 _BRIGHTEST: Final = 255
 _CHANNELS: Final = (1, 3)
 _DEEP: Final = (np.uint16, np.int16, np.uint32)
@@ -85,7 +84,7 @@ def is_imported(name: str, space: spaces.Space[Any], context: ImportContext) -> 
     return False
 
 
-def space_features(name: str, space: spaces.Space[Any], what: str) -> list[Feature]:
+def features(name: str, space: spaces.Space[Any], what: str) -> list[Feature]:
     """Return the features of the values of a leaf, of an "action" or "observation"."""
     match space:
         case spaces.Box():
@@ -168,15 +167,3 @@ def space_of(
             "export it to csv."
         )
     return cast("spaces.Space[Any]", state if picture is None else picture), picture
-
-
-def is_stored_as_jpeg(space: spaces.Space[Any]) -> bool:
-    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
-    box = cast("Any", space)
-    return (
-        isinstance(space, spaces.Box)
-        and len(box.shape) in {2, 3}
-        and min(box.shape[:2]) >= _MIN_JPEG
-        and box.dtype == np.uint8
-        and bool(np.all(box.low == 0) and np.all(box.high == _BRIGHTEST))
-    )

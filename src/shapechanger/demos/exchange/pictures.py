@@ -176,11 +176,6 @@ class VideoWriter:
             output_params=[*coding, "-movflags", "+faststart"],
         )
 
-    @property
-    def bytes_written(self) -> int:
-        """Size of the file so far, bytes."""
-        return self._path.stat().st_size if self._path.exists() else 0
-
     def add(self, pixels: NDArray[np.uint8]) -> None:
         """Append an image, shape (height, width, 3)."""
         try:
@@ -244,8 +239,7 @@ def read_times(path: Path) -> VideoTimes:
                 raise DemosError(f"{path} claims more images than it has bytes.")
         process.wait()
         if not ticks or process.returncode:
-            why = f" ({problem})" if (problem := _last_line(log)) else ""
-            raise DemosError(f"{path} has no images{why}: restore it.")
+            raise DemosError(f"{path} has no images{_problem(log)}: restore it.")
         log.seek(0)
         said = log.read(1 << 20)
     found = _PIXELS.search(said)
@@ -310,10 +304,9 @@ def read_pictures(
                 return
             if not data or shown != tick:
                 process.kill()
-                why = f" ({problem})" if (problem := _last_line(log)) else ""
                 raise DemosError(
                     f"{path} is damaged: the image at {float(tick * times.tick_s):.3f} s "
-                    f"cannot be decoded{why}."
+                    f"cannot be decoded{_problem(log)}."
                 )
             yield np.frombuffer(data, np.uint8).reshape(height, width, 3)
 
@@ -361,9 +354,8 @@ def _running(
                 process.kill()
 
 
-def _last_line(log: object) -> str:
-    """Return the last line of FFmpeg's log, without its end."""
-    file = cast("tempfile.SpooledTemporaryFile[bytes]", log)
-    file.seek(0)
-    lines = file.read(1 << 16).decode(errors="replace").strip().splitlines()
-    return lines[-1].strip().rstrip(".") if lines else ""
+def _problem(log: IO[bytes]) -> str:
+    """Return the last line of FFmpeg's log in brackets, or nothing."""
+    log.seek(0)
+    lines = log.read(1 << 16).decode(errors="replace").strip().splitlines()
+    return f" ({lines[-1].strip().rstrip('.')})" if lines else ""

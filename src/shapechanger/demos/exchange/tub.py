@@ -21,17 +21,16 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path, PurePath
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from msgspec.structs import replace
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.exports import kept_steps
-from shapechanger.demos.exchange.files import (
-    is_inside,
-)
+from shapechanger.demos.exchange import files, imports
 from shapechanger.demos.exchange.format import (
     COMMANDS,
     ExchangeEpisode,
@@ -40,18 +39,10 @@ from shapechanger.demos.exchange.format import (
     ImportContext,
     counted,
     few,
+    kept_steps,
     name_in,
 )
-from shapechanger.demos.exchange.imports import (
-    SourceRecord,
-    as_json,
-    choose_camera,
-    episode_of,
-    features_of,
-    iso_time,
-    stretches,
-    with_pictures,
-)
+from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.exchange.tub_records import (
     IMAGES,
     LOOP_HZ,
@@ -59,9 +50,8 @@ from shapechanger.demos.exchange.tub_records import (
     NS_PER_MS,
     NS_PER_S,
     RECORD_NAME,
-    V1_TIME,
     Fields,
-    Line,
+    in_ns,
     numbered,
     read_v1,
     read_v2,
@@ -69,13 +59,11 @@ from shapechanger.demos.exchange.tub_records import (
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
+_PICTURE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 _ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
-_AXES: Final = ("angle", "throttle")
-_USER, _PILOT = ([f"{who}/{axis}" for axis in _AXES] for who in ("user", "pilot"))
+_USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
 _IMAGE, _MODE = name_in("tub", "frame"), name_in("tub", "driver")
 _PERSON_DRIVES: Final = "user"
-_POLICY_DRIVES: Final = "local"
-_POLICY_STEERS: Final = "local_angle"
 _CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
 _NUMBERS: Final = ("float", "int", "boolean")
 _KINDS: Final[dict[type[object], str]] = {str: "str", bool: "boolean", int: "float", float: "float"}
@@ -83,7 +71,6 @@ _PICTURES: Final = ("image_array", "image")
 _DEPTH: Final = "gray16_array"
 _KNOWN: Final = (*_NUMBERS, *_PICTURES, _DEPTH, "str", "list", "vector", "nparray")
 _ENDINGS: Final = (".jpg", ".jpeg", ".png", ".bmp")
-_PICTURE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
@@ -92,53 +79,59 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     if tub.deleted:
         context.note(f"{counted(tub.deleted, 'record')} deleted in the tub, and not imported.")
     columns: dict[str, str] = {}  # The type of each that a record has, declared or by its values.
-    for line in tub.lines:
-        for name, value in line.fields.items():
-            if not name.startswith("_") and name != V1_TIME and columns.get(name) not in _KNOWN:
-                declared = tub.inputs.get(name, "")
-                columns[name] = declared if declared in _KNOWN else _kind_of(value)
-    camera = _camera(columns, folder, context) if tub.lines else ""
+    for name, value in chain.from_iterable(fields.items() for fields in tub.records):
+        if not name.startswith("_") and columns.get(name) not in _KNOWN:
+            declared = tub.inputs.get(name, "")
+            columns[name] = declared if declared in _KNOWN else _kind_of(value)
+    camera = _camera(columns, folder, context) if tub.records else ""
     sensed = [
         name
         for name, kind in (tub.inputs or columns).items()
         if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
     ]
-    taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
-    if left := [f"{name} ({kind})" for name, kind in columns.items() if name and name not in taken]:
+    taken = {"", camera, _MODE, *sensed, *_USER, *_PILOT}
+    if left := [f"{name} ({kind})" for name, kind in columns.items() if name not in taken]:
         context.note(f"Columns that are not imported: {', '.join(left)}.")
-    records = [_record(line, sensed, camera, context) for line in tub.lines]
+    records = [_record(fields, sensed, camera, context) for fields in tub.records]
     if camera:
         _find_pictures(records, tub.images, context)
-    records, size = with_pictures(records, "record", context)
-    sessions = {line.number: line.session for line in tub.lines}
+    records, size = imports.with_pictures(records, "record", context)
+    sessions = {fields["_index"]: str(fields.get("_session_id", "")) for fields in tub.records}
     parts = _parts(records, sessions, restarts=not tub.is_unix)
-    for part, hz, has_times, timed in stretches(parts, "record", context, tub.stated_hz):
-        began_ns = tub.start_ns
+    states = [feature for name in sensed for feature in imports.features_of(name, 1)]
+    for part, hz, timed in imports.stretches(parts, "record", context, tub.stated_hz):
+        began_ns = part[0].step.captured_ns if timed and tub.is_unix else tub.start_ns
         for record in part:
-            at_ns = record.step.captured_ns
-            record.step = replace(record.step, wall_ns=at_ns if tub.is_unix else None)
-        if timed and tub.is_unix:
-            began_ns = part[0].step.captured_ns
+            wall_ns = record.step.captured_ns if tub.is_unix else None
+            record.step = replace(record.step, wall_ns=wall_ns)
         session = sessions[part[0].number]
         header = EpisodeHeader(
             action_layout=_ACTIONS.to_json(),
-            state_layout=as_json([f for name in sensed for f in features_of(name, 1)]),
+            state_layout=imports.as_json(states),
             image_size=size,
             control_hz=hz,
             body="car",
             clock="real" if timed else "none",
             source="tub",
             notes={"session": session} if session else {},
-            created=iso_time(began_ns) if began_ns and (timed or not has_times) else "",
+            created=_iso_time(began_ns) if began_ns else "",
         )
         name = f"{folder}, from record {part[0].name}"
-        yield episode_of(part, header, context, name=name, what="record")
+        rows = imports.rows_of(part, size, context, "record")
+        yield ExchangeEpisode(header=header, rows=rows, name=name)
 
 
 def _kind_of(value: object) -> str:
     kind = _KINDS.get(type(value), "list")
     is_picture = kind == "str" and str(value).lower().endswith(_ENDINGS)
     return _PICTURES[0] if is_picture else kind
+
+
+def _iso_time(unix_ns: int) -> str:
+    """Return a Unix time as ISO 8601 in UTC; "" if it is beyond the calendar."""
+    with suppress(OverflowError, ValueError, OSError):
+        return datetime.fromtimestamp(unix_ns / NS_PER_S, UTC).isoformat(timespec="milliseconds")
+    return ""
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
@@ -152,44 +145,46 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
         )
     if _IMAGE in cameras and not context.camera:
         return _IMAGE
-    camera = choose_camera(folder, cameras, context)
+    camera = imports.choose_camera(folder, cameras, context)
     if camera not in {_IMAGE, context.camera}:
         context.note(f"The images come from the column {camera}.")
     return camera
 
 
-def _record(line: Line, sensed: Sequence[str], camera: str, context: ImportContext) -> SourceRecord:
+def _record(
+    fields: Fields, sensed: Sequence[str], camera: str, context: ImportContext
+) -> SourceRecord:
     """Return a record; it has a fault if it has no valid action."""
-    mode = line.fields.get(_MODE, _PERSON_DRIVES)
+    mode = fields.get(_MODE, _PERSON_DRIVES)
     by_person = mode == _PERSON_DRIVES
     names = _USER if by_person else _PILOT
-    if mode == _POLICY_STEERS:
+    if mode == "local_angle":
         names = [_PILOT[0], _USER[1]]
-    action, wanted, fault = _pair(line, names), None, ""
-    if lacking := [name for name in names if line.fields.get(name) is None]:
+    action, wanted, fault = _pair(fields, names), None, ""
+    if lacking := [name for name in names if fields.get(name) is None]:
         driver = "" if by_person else ", although a pilot drove"
         fault = f"without {' and '.join(lacking)}{driver}"
     elif action is None:
         fault = f"with {' or '.join(names)} that is not a number from -1 to 1"
     elif by_person:
-        wanted = _pair(line, _PILOT)
-        if wanted is None and None not in map(line.fields.get, _PILOT):
+        wanted = _pair(fields, _PILOT)
+        if wanted is None and None not in map(fields.get, _PILOT):
             reason = "of the pilot that is not a number from -1 to 1, while a person drove"
-            context.leave_out("suggestion", reason, line.number)
+            context.leave_out("suggestion", reason, fields["_index"])
     step = Step(
         action=action or (0.0, 0.0),
         driver="person" if by_person else "policy",
         wanted=wanted,
-        state=tuple(_sensed(line.fields.get(name)) for name in sensed),
-        captured_ns=line.time_ns,
+        state=tuple(_sensed(fields.get(name)) for name in sensed),
+        captured_ns=in_ns(fields.get("_timestamp_ms"), NS_PER_MS),
     )
-    name, frame = str(line.number), line.fields.get(camera)
-    return SourceRecord(name=name, number=line.number, step=step, frame=frame, fault=fault)
+    number, frame = fields["_index"], fields.get(camera)
+    return SourceRecord(name=str(number), number=number, step=step, frame=frame, fault=fault)
 
 
-def _pair(line: Line, names: Sequence[str]) -> tuple[float, float] | None:
+def _pair(fields: Fields, names: Sequence[str]) -> tuple[float, float] | None:
     """Return two numbers from -1 to 1; None for anything else."""
-    values: list[Any] = [line.fields.get(name) for name in names]
+    values: list[Any] = [fields.get(name) for name in names]
     if all(type(value) in {int, float} and abs(value) <= 1.0 for value in values):
         return float(values[0]), float(values[1])
     return None
@@ -197,10 +192,9 @@ def _pair(line: Line, names: Sequence[str]) -> tuple[float, float] | None:
 
 def _sensed(value: Any) -> float:
     """Return a sensor value; NaN for anything that is not a number."""
-    try:
+    with suppress(OverflowError):  # An integer of hundreds of digits.
         return float(value) if isinstance(value, bool | int | float) else math.nan
-    except OverflowError:  # An integer of hundreds of digits.
-        return math.nan
+    return math.nan
 
 
 def _find_pictures(records: Sequence[SourceRecord], images: Path, context: ImportContext) -> None:
@@ -217,7 +211,7 @@ def _find_pictures(records: Sequence[SourceRecord], images: Path, context: Impor
         # Version 1 writes whole paths of the robot for the type "image".
         place = PurePath(name).name if PurePath(name).is_absolute() else name
         record.picture = images / place
-        if not is_inside(images, place):
+        if not files.is_inside(images, place):
             record.fault = "with an image name that leaves the folder"
         elif shown[name] > 1 and record.picture.is_file():
             record.fault = "with the image of another record"
@@ -250,34 +244,27 @@ def _parts(
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
     """Write episodes as the sessions of one tub of version 2.
 
-    Actions of people, experts and programs become the user's, those of policies the pilot's. Steps
-    of a simulated drive get the times of its own clock, since the recorder's tells how fast the
-    simulation ran; steps without a time follow the one before at the rate of the episode.
+    Actions of people, experts and programs become the user's, those of policies the pilot's.
     """
     states = [_state_names(episode) for episode in episodes]
     if any(state != states[0] for state in states):
         raise DemosError("The episodes have different states: export each kind to its own tub.")
     (folder / IMAGES).mkdir()
     records: list[Fields] = []
-    sessions: list[str] = []
-    for number, episode in enumerate(episodes):
-        began = _began(episode.header)
-        sessions.append(f"{began:%y-%m-%d}_{number}")
-        last_ns: int | None = None
-        first_ns: int | None = None
-        for step, jpeg in kept_steps(episode.rows):
+    began = [_began(episode.header) for episode in episodes]
+    sessions = [f"{at:%y-%m-%d}_{number}" for number, at in enumerate(began)]
+    for episode, at, session in zip(episodes, began, sessions, strict=True):
+        for step, jpeg, time_ns in _timed(episode, round(at.timestamp() * NS_PER_S)):
             if jpeg is None:
                 raise DemosError(f"A step of {episode.name} has no image: export it to csv.")
-            first_ns = step.clock_ns if first_ns is None else first_ns
-            last_ns = _time_ns(step, episode.header, began, first_ns, last_ns)
             name = f"{len(records)}_cam_image_array_.jpg"
             (folder / IMAGES / name).write_bytes(jpeg)
             fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
-            fields |= {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
-            records.append(fields | {"_timestamp_ms": round(last_ns / NS_PER_MS)})
-    created_s = _began(episodes[0].header).timestamp()
-    floats = ("user/angle", "user/throttle", "pilot/angle", "pilot/throttle", *states[0])
-    inputs = {_IMAGE: "image_array", _MODE: "str"} | dict.fromkeys(floats, "float")
+            fields |= {_IMAGE: name, "_session_id": session, "_index": len(records)}
+            records.append(fields | {"_timestamp_ms": round(time_ns / NS_PER_MS)})
+    created_s = began[0].timestamp()
+    inputs = {_IMAGE: "image_array", _MODE: "str"}
+    inputs |= dict.fromkeys((*_USER, *_PILOT, *states[0]), "float")
     named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
     rates = {episode.header.control_hz for episode in episodes}
     catalogs: Fields = {"paths": _write_catalogs(folder, records, created_s)}
@@ -290,7 +277,6 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
 
 def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
-    """Return the names of the values of the state."""
     names = Layout.from_json(episode.header.action_layout).names
     if names != _ACTIONS.names:
         raise DemosError(
@@ -309,33 +295,38 @@ def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
     by_policy = step.driver == "policy"
     if any(abs(value) > 1.0 for value in step.action):
         raise DemosError(f"{where}: the action {list(step.action)} is not from -1 to 1.")
-    fields: Fields = {_MODE: _POLICY_DRIVES if by_policy else _PERSON_DRIVES}
     # A tub always contains the user's action; while a policy drives, it is 0.
-    user = (0.0, 0.0) if by_policy else step.action
-    fields |= {f"user/{axis}": value for axis, value in zip(_AXES, user, strict=True)}
-    pilot = step.action if by_policy else step.wanted
+    user, pilot = ((0.0, 0.0), step.action) if by_policy else (step.action, step.wanted)
+    fields: Fields = {_MODE: "local" if by_policy else _PERSON_DRIVES}
+    fields |= dict(zip(_USER, user, strict=True))
     if pilot is not None and all(abs(value) <= 1.0 for value in pilot):
-        fields |= {f"pilot/{axis}": value for axis, value in zip(_AXES, pilot, strict=True)}
+        fields |= dict(zip(_PILOT, pilot, strict=True))
     known = zip(state, step.state, strict=True)
     return fields | {name: value for name, value in known if math.isfinite(value)}
 
 
-def _time_ns(
-    step: Step, header: EpisodeHeader, began: datetime, first_ns: int | None, last_ns: int | None
-) -> int:
-    """Return the Unix time of a step, ns, after the one before."""
-    began_ns = round(began.timestamp() * NS_PER_S)
-    at_ns = step.wall_ns
-    if header.clock == "twin" or (header.clock == "none" and header.env):  # Simulated.
-        clock_ns = step.clock_ns
-        at_ns = None if clock_ns is None else began_ns + clock_ns - cast("int", first_ns)
-    if at_ns is None or (last_ns is not None and at_ns <= last_ns):
-        return began_ns if last_ns is None else last_ns + round(NS_PER_S / header.control_hz)
-    return at_ns
+def _timed(episode: ExchangeEpisode, began_ns: int) -> Iterator[tuple[Step, bytes | None, int]]:
+    """Yield the steps with their images and Unix times, ns, each after the one before.
+
+    Steps of a simulated drive get the times of its own clock, since the recorder's tells how fast
+    the simulation ran; steps without a time follow the one before at the rate of the episode.
+    """
+    header = episode.header
+    is_simulated = header.clock == "twin" or (header.clock == "none" and header.env)
+    first_ns: int | None = None
+    last_ns: int | None = None
+    for step, jpeg in kept_steps(episode.rows):
+        at_ns, clock_ns = step.wall_ns, step.clock_ns
+        first_ns = clock_ns if first_ns is None else first_ns
+        if is_simulated:
+            at_ns = None if clock_ns is None else began_ns + clock_ns - (first_ns or 0)
+        if at_ns is None or (last_ns is not None and at_ns <= last_ns):
+            at_ns = began_ns if last_ns is None else last_ns + round(NS_PER_S / header.control_hz)
+        last_ns = at_ns
+        yield step, jpeg, at_ns
 
 
 def _began(header: EpisodeHeader) -> datetime:
-    """Return when an episode began; the Unix epoch if unknown."""
     try:
         return datetime.fromisoformat(header.created)
     except ValueError:

@@ -4,54 +4,39 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from itertools import groupby, pairwise
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
-from shapechanger.demos.exchange.files import (
-    cannot_read,
-    is_inside,
-    parse_json,
-    read_bytes,
-    read_json_object,
-    read_text,
-)
+from shapechanger.demos.exchange import files
 from shapechanger.demos.exchange.format import ImportContext, counted, few
-from shapechanger.errors import DemosError
+from shapechanger.demos.exchange.imports import unreadable
+from shapechanger.errors import DemosError, translate_errors
 
 MANIFEST: Final = "manifest.json"
 IMAGES: Final = "images"
 LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
+RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 NS_PER_MS: Final = 1_000_000
 NS_PER_S: Final = 1_000_000_000
-V1_TIME: Final = "milliseconds"
-_MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
-_MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two times.
-RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _CATALOG_NAME: Final = re.compile(r"catalog_([0-9]{1,9})\.catalog")
+_MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
+_MAX_NS: Final = 1 << 61
 _DAMAGED: Final = "that is not valid JSON"
 
 Fields = dict[str, Any]
 
 
-class Line(NamedTuple):
-    """The fields of a record, its `_index` or the number of its file, and its time and session."""
-
-    fields: Fields
-    number: int
-    time_ns: int | None
-    session: str = ""
-
-
 class Tub(NamedTuple):
-    """The records of a tub that were not deleted, and its declarations."""
+    """A tub; each record has a number as `_index`, and no other one has it."""
 
     inputs: dict[str, str]
-    lines: list[Line]
+    records: list[Fields]
     deleted: int
     images: Path
     start_ns: int | None
@@ -61,21 +46,19 @@ class Tub(NamedTuple):
 
 def numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, str]:
     """Return the files whose names match, in the order of their numbers."""
-    try:
+    with translate_errors(OSError, to=lambda error: files.cannot_read(folder, error)):
         names = [child.name for child in folder.iterdir()]
-    except OSError as error:
-        raise cannot_read(folder, error) from error
     return dict(sorted((int(m[1]), m[0]) for m in map(pattern.fullmatch, names) if m))
 
 
 def read_v2(folder: Path, context: ImportContext) -> Tub:
     """Read a tub of version 2: its manifest, and the catalogs that it names."""
     path = folder / MANIFEST
-    lines = [line.strip(b"\0\r ") for line in read_bytes(path).split(b"\n")]
-    inputs, types, *others = (lines + [b""] * 5)[:5]
-    inputs, types = _parsed(inputs), _parsed(types)
-    metadata, more, catalogs = (_object(line) or {} for line in others)
-    if not isinstance(inputs, list) or not isinstance(types, list):
+    lines = [line.strip(b"\0\r ") for line in files.read_bytes(path).split(b"\n")]
+    lines = (lines + [b""] * 5)[:5]
+    inputs, types = (_parsed(line, list) for line in lines[:2])
+    metadata, more, catalogs = (_parsed(line, dict) or Fields() for line in lines[2:])
+    if inputs is None or types is None:
         context.warn(f"{path} is damaged: the columns are those that the records have.")
         inputs = types = []
     if catalogs:
@@ -90,124 +73,103 @@ def read_v2(folder: Path, context: ImportContext) -> Tub:
         )
     if len(set(names)) < len(names):
         context.warn(f"{path} names a catalog twice in its paths: it is read once.")
-    rows: list[tuple[int, Fields]] = []
+    rows: list[Fields] = []
     for name in dict.fromkeys(names):
-        if not name or not is_inside(folder, name):
+        if not name or not files.is_inside(folder, name):
             raise DemosError(f"{path}: the catalog {name!r} leaves the folder.")
-        _read_catalog(folder / name, rows, context)
-    records = _with_numbers(rows, context)
-    _report_missing(records, deleted, catalogs.get("current_index"), context)
+        rows += _read_catalog(folder / name, context)
+    records = _in_order(rows, deleted, catalogs.get("current_index"), context)
+    kept = [fields for fields in records if fields["_index"] not in deleted]
     return Tub(
         inputs=_typed(inputs, types, path),
-        lines=[record for record in records if record.number not in deleted],
-        deleted=len(deleted & {record.number for record in records}),
+        records=kept,
+        deleted=len(records) - len(kept),
         images=folder / IMAGES,
-        start_ns=_in_ns(more.get("created_at"), NS_PER_S),
+        start_ns=in_ns(more.get("created_at"), NS_PER_S),
         is_unix=True,
         stated_hz=_stated_hz(metadata),
     )
 
 
-def _read_catalog(path: Path, rows: list[tuple[int, Fields]], context: ImportContext) -> None:
-    """Append the records of a catalog, each with its number by counting."""
+def _read_catalog(path: Path, context: ImportContext) -> Iterator[Fields]:
     if not path.is_file():
         context.leave_out("catalog", "that is missing", path.name)
         return
-    manifest = path.with_suffix(".catalog_manifest")
-    about = (_object(read_bytes(manifest)) if manifest.is_file() else None) or {}
-    start = about.get("start_index")
-    if type(start) is not int:
-        start = rows[-1][0] + 1 if rows else 0
     try:
-        lines = read_bytes(path).split(b"\n")
+        lines = files.read_bytes(path).split(b"\n")
     except DemosError as error:
-        context.leave_out("catalog", f"that cannot be read ({error})", path.name)
+        context.leave_out("catalog", unreadable(error), path.name)
         return
-    whole = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
-    for position, (number, line) in enumerate(whole, start):
-        if (fields := _object(line)) is not None:
-            rows.append((position, fields))
-        else:
+    for number, line in enumerate(lines, 1):
+        if (fields := _parsed(line, dict)) is not None:
+            yield fields
+        elif line.strip():
             reason = _DAMAGED if line.strip(b"\0\r") else "of NUL bytes, as after a power cut"
             context.leave_out("line", reason, f"{path.name}, line {number}")
 
 
-def _with_numbers(rows: Sequence[tuple[int, Fields]], context: ImportContext) -> list[Line]:
+def _in_order(
+    rows: Sequence[Fields], deleted: set[int], count: Any, context: ImportContext
+) -> list[Fields]:
     """Return records in the order of their `_index`, without those whose number is unclear."""
-    has_index = any("_index" in fields for _, fields in rows)
-    records: list[Line] = []
-    for position, fields in rows:
-        number = fields.get("_index") if has_index else position
-        if type(number) is not int:
+    records: list[Fields] = []
+    for position, fields in enumerate(rows):
+        if type(fields.get("_index")) is int:
+            records.append(fields)
+        else:
             context.leave_out("record", "without a valid _index", f"the one at position {position}")
-            continue
-        session = fields.get("_session_id")
-        time_ns = _in_ns(fields.get("_timestamp_ms"), NS_PER_MS)
-        records.append(Line(fields, number, time_ns, "" if session is None else str(session)))
-    falls = [(a.number, b.number) for a, b in pairwise(records) if b.number < a.number]
-    if falls:
+    numbers = [fields["_index"] for fields in records]
+    if falls := [(one, two) for one, two in pairwise(numbers) if two < one]:
         context.warn(
             f"The _index falls in {counted(len(falls), 'place')}, first from {falls[0][0]} to "
             f"{falls[0][1]}: the records are read in its order."
         )
-    unique: list[Line] = []
-    ordered = sorted(records, key=lambda record: record.number)
-    for number, group in groupby(ordered, key=lambda record: record.number):
+    unique: list[Fields] = []
+    index = itemgetter("_index")
+    for number, group in groupby(sorted(records, key=index), key=index):
         first, *others = group
-        odd = [record for record in others if record.fields != first.fields]
-        for _ in others[len(odd) :]:
-            context.leave_out("record", "that repeats another", number)
         # Of those with one number and different content, nothing says which one counts.
-        for _ in (first, *odd) if odd else ():
-            context.leave_out("record", "with the _index of another record", number)
-        unique += [] if odd else [first]
-    return unique
-
-
-def _report_missing(
-    records: Sequence[Line], deleted: set[int], count: Any, context: ImportContext
-) -> None:
-    """Report numbers that the manifest has and no record."""
-    numbers = {record.number for record in records}
+        unclear = any(fields != first for fields in others)
+        reason = "with the _index of another record" if unclear else "that repeats another"
+        for _ in (first, *others) if unclear else others:
+            context.leave_out("record", reason, number)
+        unique += [] if unclear else [first]
     last = max(numbers, default=-1)
     if type(count) is int:
         last = max(last, min(count, last + 1_000_000) - 1)
-        if last >= count:
-            context.warn(
-                f"The manifest counts {count} records, and the last one has the _index {last}."
-            )
-    ends = pairwise([-1, *sorted(numbers), last + 1])
+    ends = pairwise([-1, *sorted(set(numbers)), last + 1])
     if gaps := [(one + 1, two - 1) for one, two in ends if two - one > 1]:
         missing = sum(end - start + 1 for start, end in gaps)
         named = few([f"{start} to {end}" if end > start else f"{start}" for start, end in gaps])
         context.note(f"{missing} of the records 0 to {last} are in no catalog: {named}.")
-    if strange := sorted(number for number in deleted - numbers if not 0 <= number <= last):
+    if strange := sorted(number for number in deleted.difference(numbers) if number > last):
         context.warn(f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}.")
+    return unique
 
 
 def read_v1(folder: Path, context: ImportContext) -> Tub:
-    """Read a tub of version 1: a file for each record."""
+    """Read a tub of version 1, which has a file for each record, with the names of version 2."""
     path, exclude = folder / "meta.json", folder / "exclude.json"
-    meta = read_json_object(path) if path.is_file() else {}
-    deleted = set[int]()
+    meta = files.read_json_object(path) if path.is_file() else {}
+    gone: Any = []
     if exclude.is_file():
-        gone = parse_json(read_text(exclude), str(exclude))
-        deleted = set(_list(gone, int, f"numbers in {exclude}"))
-    start_ns = _in_ns(meta.get("start"), NS_PER_S)
+        gone = files.parse_json(files.read_text(exclude), str(exclude))
+    deleted = set(_list(gone, int, f"numbers in {exclude}"))
+    start_ns = in_ns(meta.get("start"), NS_PER_S)
     names = numbered(folder, RECORD_NAME)
-    records: list[Line] = []
+    records: list[Fields] = []
     for number in sorted(names.keys() - deleted):
-        if not is_inside(folder, names[number]):
+        if not files.is_inside(folder, names[number]):
             raise DemosError(f"{folder / names[number]} is a link that leaves the folder.")
-        if (fields := _object(read_bytes(folder / names[number]))) is None:
+        if (fields := _parsed(files.read_bytes(folder / names[number]), dict)) is None:
             context.leave_out("record", _DAMAGED, number)
             continue
-        time_ns = _in_ns(fields.get(V1_TIME), NS_PER_MS)
-        time_ns = None if time_ns is None else time_ns + (start_ns or 0)
-        records.append(Line(fields, number, time_ns))
+        since_ns = in_ns(fields.pop("milliseconds", None), NS_PER_MS)
+        time_ms = None if since_ns is None else (since_ns + (start_ns or 0)) / NS_PER_MS
+        records.append(fields | {"_index": number, "_timestamp_ms": time_ms})
     return Tub(
         inputs=_typed(meta.get("inputs", []), meta.get("types", []), path),
-        lines=records,
+        records=records,
         deleted=len(deleted & names.keys()),
         images=folder,
         start_ns=start_ns,
@@ -216,16 +178,12 @@ def read_v1(folder: Path, context: ImportContext) -> Tub:
     )
 
 
-def _parsed(line: bytes) -> Any:
-    """Return the value of a line of JSON; None if it is damaged."""
+def _parsed(line: bytes, kind: type[Any]) -> Any:
+    """Return the value of a line of JSON; None if it is damaged or of another kind."""
     with suppress(DemosError, UnicodeDecodeError):
-        return parse_json(line.decode("utf-8-sig"), "a line")
+        value = files.parse_json(line.decode("utf-8-sig"), "a line")
+        return value if isinstance(value, kind) else None
     return None
-
-
-def _object(line: bytes) -> Fields | None:
-    value = _parsed(line)
-    return cast("Fields", value) if isinstance(value, dict) else None
 
 
 def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
@@ -250,7 +208,7 @@ def _stated_hz(metadata: Fields) -> float | None:
     return None
 
 
-def _in_ns(value: Any, unit_ns: int) -> int | None:
+def in_ns(value: Any, unit_ns: int) -> int | None:
     """Return a time as ns; None for anything that cannot be a time."""
     if type(value) not in {int, float}:
         return None
