@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,9 +15,7 @@ import pytest
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import (
-    ImportContext,
     export_recording,
-    find_format,
     import_episodes,
     import_recording,
 )
@@ -338,6 +335,8 @@ def test_nothing_to_export(tmp_path: Path) -> None:
         export_recording(tmp_path / "bare", tmp_path / "out-v0", "minari")
     with pytest.raises(DemosError, match="cannot mark excluded steps"):
         export_recording(tmp_path / "bare", tmp_path / "out", "tub", dropped=True)
+    with pytest.raises(DemosError, match="are of lerobot, and not of csv"):
+        export_recording(tmp_path / "bare", tmp_path / "out", "csv", images=True)
 
 
 def test_texts_are_not_formulas(tmp_path: Path) -> None:
@@ -351,16 +350,3 @@ def test_texts_are_not_formulas(tmp_path: Path) -> None:
         reasons = [row["stop_reason"] for row in csv.DictReader(file)]
     assert [json.loads(reason) for reason in reasons] == [s.stop_reason for s, _ in steps]
     assert {reason[0] for reason in reasons} == {'"'}
-
-
-def test_a_file_that_disappears_is_named(tmp_path: Path) -> None:
-    folder = keys_folder(tmp_path / "keys")
-    context = ImportContext()
-    ((_, steps),) = list(import_episodes(folder, context=context))
-    next(steps)
-    shutil.rmtree(folder)
-    assert not list(steps)
-    with pytest.raises(DemosError, match="that is missing"):
-        context.require_whole(folder)
-    with pytest.raises(DemosError, match="There is no"):
-        find_format(folder)

@@ -11,13 +11,12 @@ import pyarrow as pa
 import pytest
 from PIL import Image
 
-from shapechanger.demos.episodes import Step
-from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
+from shapechanger.demos.exchange import ImportContext, import_recording
 from shapechanger.demos.exchange.lerobot import FORMAT
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.lerobot_set import CAMERA, SIZE, VIDEO, pairs_of, write_set, write_video
-from tests.demos.exchange.small import all_of, header, picture, record
+from tests.demos.exchange.small import all_of, picture
 
 AXES = ["height", "width", "channels"]
 COUNT = 16
@@ -200,20 +199,8 @@ def test_names_and_units_of_values(
     action = {"dtype": "float32", "shape": [2], "names": named, "units": ["rad", "deg"]}
     folder = write_set(tmp_path / "set", video=False, features={"action": action})
     done = import_recording(folder, tmp_path / "back")
-    layout = Layout.from_json(all_of(tmp_path / "back")[0].header.action_layout)
+    about = all_of(tmp_path / "back")[0].header
+    assert about.created == ""  # Unknown.
+    layout = Layout.from_json(about.action_layout)
     assert (layout.names, [feature.unit for feature in layout]) == (expected, ["rad", "deg"])
     assert any("names of action do not fit its 2 values" in note for note in done.notes) == noted
-
-
-def test_the_start_of_our_own_episodes_comes_back(tmp_path: Path) -> None:
-    record(
-        tmp_path / "data",
-        header(image_size=None),
-        [(Step(action=(0.0, 0.0), driver="person", state=(1.0, 2.0)), None)] * 3,
-    )
-    export_recording(tmp_path / "data", tmp_path / "set", "lerobot")
-    import_recording(tmp_path / "set", tmp_path / "back")
-    created = [all_of(tmp_path / name)[0].header.created for name in ("data", "back")]
-    assert created[0] == created[1] != ""
-    import_recording(write_set(tmp_path / "other", video=False), tmp_path / "theirs")
-    assert all_of(tmp_path / "theirs")[0].header.created == ""

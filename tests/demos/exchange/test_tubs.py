@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -105,16 +104,6 @@ def _lines(folder: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
     ("spoil", "expected", "kept"),
     [
         (lambda f: (f / "images/3_cam_image_array_.jpg").unlink(), "image that is missing: 3", 9),
-        (
-            lambda f: (f / "images/3_cam_image_array_.jpg").write_bytes(b""),
-            "an empty image: 3",
-            9,
-        ),
-        (
-            lambda f: (f / "images/3_cam_image_array_.jpg").write_bytes(picture(0)[:-99]),
-            "1 record with a damaged image: 3",
-            9,
-        ),
         (
             lambda f: (f / "images/0_cam_image_array_.jpg").write_bytes(picture(0, 80, 32)),
             "with an image of 80 x 32 pixels, and not 40 x 32: 0",
@@ -347,22 +336,15 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
     assert done.steps == 24
 
 
-def _image(mode: str, form: str) -> bytes:
-    pixels = np.full((32, 40), 1000 if mode.startswith("I") else 100)
-    image = Image.fromarray(pixels.astype(np.uint16 if mode.startswith("I") else np.uint8))
-    out = io.BytesIO()
-    (image if mode.startswith("I") else image.convert(mode)).save(out, form)
-    return out.getvalue()
-
-
 @pytest.mark.parametrize(
     ("mode", "form"), [("RGB", "BMP"), ("L", "PNG"), ("P", "PNG"), ("1", "BMP")]
 )
 def test_pictures_of_other_formats(tmp_path: Path, mode: str, form: str) -> None:
     made = [r | {"cam/image_array": f"{r['_index']}_cam.{form.lower()}"} for r in records(3)]
     folder = tub_folder(tmp_path / "tub", made)
+    image = Image.fromarray(np.full((32, 40), 100, np.uint8)).convert(mode)
     for record in made:
-        (folder / "images" / record["cam/image_array"]).write_bytes(_image(mode, form))
+        image.save(folder / "images" / record["cam/image_array"], form)
     _, done = imported(folder)
     assert done.pictures == 3
     assert done.notes == ("3 images encoded as JPEG of quality 100.",)

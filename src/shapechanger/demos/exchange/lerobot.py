@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Any, Final, NamedTuple, cast
+from typing import Annotated, Any, Final, NamedTuple, cast
 
 import msgspec
 import numpy as np
@@ -44,16 +44,22 @@ _AXES: Final = ["c", "h", "w"]
 _MAX_STEPS: Final = 1 << 20  # Of an episode, of which a header names the drivers.
 
 
-@dataclass(frozen=True, slots=True)
-class _Feature:
-    """A feature of `info.json`: its key, dtype and shape, and names and units of its values."""
+class _Feature(msgspec.Struct, kw_only=True):
+    """A feature of `info.json`."""
 
-    key: str
-    kind: str
-    shape: tuple[int, ...]
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    is_depth: bool
+    key: str = ""
+    kind: str = msgspec.field(name="dtype")
+    shape: tuple[Annotated[int, msgspec.Meta(ge=1)], ...]
+    names: Any = None
+    units: Any = None
+    info: dict[str, Any] | None = None
+    depth: Any = msgspec.field(default=None, name="is_depth_map")
+    video_depth: Any = msgspec.field(default=None, name="video.is_depth_map")
+
+    @property
+    def is_depth(self) -> bool:
+        about = self.info or {}
+        return bool(self.depth or self.video_depth) or any(map(about.get, _DEPTH))
 
     @property
     def size(self) -> int:
@@ -96,25 +102,15 @@ class _Feature:
 
 
 def _read_features(info: Mapping[str, Any], path: Path) -> list[_Feature]:
-    plain = info.get("features")
-    if not isinstance(plain, dict):
-        raise DemosError(f"{path} has no features.")
-    found: list[_Feature] = []
-    for key, feature in cast("dict[str, Any]", plain).items():
-        try:
-            shape = tuple(int(n) for n in feature["shape"])
-            kind, units = str(feature["dtype"]), feature.get("units")
-            about: dict[str, Any] = feature | (feature.get("info") or {})
-            is_depth = any(about.get(flag) for flag in _DEPTH)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise DemosError(f"{path}: the feature {key!r} has no dtype and shape.") from error
-        too_large = key in {_ACTION, _STATE} and math.prod(shape) > files.MAX_VALUES
-        if too_large or any(n < 1 for n in shape):
-            raise DemosError(f"{path}: the feature {key!r} has the shape {list(shape)}.")
-        stated = tuple(map(str, cast("list[Any]", units))) if isinstance(units, list) else ()
-        names = _flat_names(about.get("names"))
-        found.append(_Feature(key, kind, shape, names, stated, is_depth))
-    return found
+    try:
+        found = msgspec.convert(info.get("features"), dict[str, _Feature])
+    except msgspec.ValidationError as error:
+        raise DemosError(f"{path}: the features are invalid ({error}).") from error
+    for key, feature in found.items():
+        feature.key, feature.names = key, _flat_names(feature.names)
+        if key in {_ACTION, _STATE} and feature.size > files.MAX_VALUES:
+            raise DemosError(f"{path}: the feature {key!r} has the shape {list(feature.shape)}.")
+    return list(found.values())
 
 
 def _flat_names(plain: Any) -> tuple[str, ...]:
@@ -170,6 +166,8 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
     for feature in features:
         key = feature.key.removeprefix(_OBSERVATION)
         prefix = "" if feature.key in {_ACTION, _STATE} else f"{key}/"
+        stated = feature.units if isinstance(feature.units, list) else ()
+        units = list(map(str, cast("Sequence[Any]", stated)))
         named = tuple(prefix + name for name in feature.names)
         if len(set(named)) != feature.size or not all(feature.names):
             if named:
@@ -178,7 +176,7 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
                     "values, which are numbered."
                 )
             named = ()
-        found += imports.features_of(key, feature.size, names=named, units=feature.units)
+        found += imports.features_of(key, feature.size, names=named, units=units)
     if len({feature.name for feature in found}) < len(found):
         context.note("Names of several features are the same: their values are numbered.")
         found = imports.features_of("value", sum(feature.size for feature in found))
