@@ -34,7 +34,6 @@ from shapechanger.demos.exchange.format import (
     few,
 )
 from shapechanger.demos.exchange.pictures import PictureError, load_jpeg, other_size
-from shapechanger.demos.jpeg import picture_size
 from shapechanger.errors import DemosError, ShapechangerError, UnknownName
 from shapechanger.layout import Feature, Layout
 
@@ -107,7 +106,7 @@ def rows_of(
                 if frame != read:
                     read, reason = frame, ""
                     try:
-                        jpeg, _ = load_jpeg(record.picture, size)
+                        jpeg, *_ = load_jpeg(record.picture, size)
                     except PictureError as error:
                         reason = error.reason
                 fault = reason
@@ -151,8 +150,7 @@ def with_pictures(
     for place, record in enumerate(records):
         if record.picture is not None and not record.fault:
             try:
-                jpeg, is_new = load_jpeg(record.picture)
-                sizes[place] = picture_size(jpeg, record.name)
+                _, sizes[place], is_new = load_jpeg(record.picture)
                 encoded += is_new
             except PictureError as error:
                 record.fault = error.reason
@@ -255,26 +253,21 @@ def _rates(
     if pooled is None:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
         return [DEFAULT_HZ] * len(names), True
-    measured = {
-        name: hz
-        for name, part in zip(names, periods, strict=True)
-        if len(part) >= _MIN_PERIODS and (hz := measured_hz(part)) is not None
-    }
-    slow = min(measured, key=lambda name: measured[name], default="")
-    fast = max(measured, key=lambda name: measured[name], default="")
-    if measured and measured[fast] > _RATE_RATIO * measured[slow]:
+    known = [measured_hz(part) if len(part) >= _MIN_PERIODS else None for part in periods]
+    measured = [(hz, name) for hz, name in zip(known, names, strict=True) if hz is not None]
+    (slow_hz, slow), (fast_hz, fast) = (end(measured, default=(0.0, "")) for end in (min, max))
+    rates = [_nominal_hz(pooled)] * len(names)
+    if fast_hz > _RATE_RATIO * slow_hz:
         context.warn(
-            f"The drive from {slow} has {measured[slow]:.3g} steps a second, and the drive from "
-            f"{fast} {measured[fast]:.3g}: a policy learns from one rate at a time."
+            f"The drive from {slow} has {slow_hz:.3g} steps a second, and the drive from "
+            f"{fast} {fast_hz:.3g}: a policy learns from one rate at a time."
         )
-        rates = [_nominal_hz(measured.get(name, pooled)) for name in names]
-    else:
-        rates = [_nominal_hz(pooled)] * len(names)
-        if abs(pooled / rates[0] - 1.0) > _WHOLE[0][1]:
-            context.note(
-                f"The records are {_described(pooled)}, which is taken to be {rates[0]:g} Hz; --hz "
-                "states another rate."
-            )
+        rates = [_nominal_hz(pooled if hz is None else hz) for hz in known]
+    elif abs(pooled / rates[0] - 1.0) > _WHOLE[0][1]:
+        context.note(
+            f"The records are {_described(pooled)}, which is taken to be {rates[0]:g} Hz; --hz "
+            "states another rate."
+        )
     for hz in sorted({rate for rate in rates if not _SLOWEST_HZ <= rate <= _FASTEST_HZ}):
         context.warn(
             f"The records are {_described(hz)}, which no robot has ({_SLOWEST_HZ:g} to "

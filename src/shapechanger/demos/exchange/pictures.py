@@ -48,8 +48,10 @@ class PictureError(DemosError):
 
 def load_jpeg(
     picture: Path | bytes | NDArray[np.uint8] | None, size: tuple[int, int] | None = None
-) -> tuple[bytes, bool]:
-    """Return an intact image as JPEG, and whether it was encoded, with quality 100.
+) -> tuple[bytes, tuple[int, int], bool]:
+    """Return an intact image as JPEG, its width and height, and whether it was encoded.
+
+    Images are encoded with quality 100.
 
     Args:
         picture: A file, or the content of one: JPEG, PNG or BMP; or pixels, shape
@@ -60,7 +62,7 @@ def load_jpeg(
         PictureError: If it is missing, damaged, of another kind or size, or too large.
     """
     if isinstance(picture, np.ndarray):
-        jpeg, encoded, found = encode_picture(picture), True, picture.shape[1::-1]
+        pixels, encoded, jpeg = picture, True, encode_picture(picture)
     else:
         data = _read(picture) if isinstance(picture, Path) else picture or b""
         if not data.strip(b"\0"):
@@ -74,10 +76,11 @@ def load_jpeg(
             raise
         except DemosError as error:
             raise PictureError("with a damaged image") from error
-        jpeg, found = encode_picture(pixels) if encoded else data, pixels.shape[1::-1]
+        jpeg = encode_picture(pixels) if encoded else data
+    found = (pixels.shape[1], pixels.shape[0])
     if size is not None and found != size:
         raise PictureError(other_size(found, size))
-    return jpeg, encoded
+    return jpeg, found, encoded
 
 
 def other_size(found: Sequence[int], size: Sequence[int]) -> str:
