@@ -8,6 +8,7 @@ nothing says which.
 
 from __future__ import annotations
 
+import glob
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -174,25 +175,28 @@ class Index:
 
     def _data_files(self) -> list[Path]:
         """Return the files that fit the template of `info.json`."""
-        pattern = self._named("data_path", defaultdict(lambda: "*"))
-        found = sorted(self._folder.glob(pattern))
+        pattern = self._named("data_path")
+        found = sorted(glob.glob(pattern, root_dir=self._folder))
         if not found:
             raise DemosError(f"There is no {self._folder / pattern}: restore it.")
-        return found
+        return [self._folder / name for name in found]
 
     def _video_path(self, place: _FilmedPlace) -> Path:
         values = {name: str(getattr(place, name)) for name in ("chunk_index", "file_index")}
         key = self._video.removeprefix("videos/").rstrip("/")
         return self._folder / self._named("video_path", values | {"video_key": key})
 
-    def _named(self, key: str, values: Mapping[str, str]) -> str:
-        """Fill in a template of `info.json`, without Python's own formats."""
+    def _named(self, key: str, values: Mapping[str, str] | None = None) -> str:
+        """Fill in a template of `info.json`, without Python's own formats, or make it a glob."""
         template = self._info.get(key)
         if not isinstance(template, str):
             raise DemosError(
                 f"{self._folder / INFO} does not say where the files are (data_path, video_path)."
             )
-        name = _PLACE.sub(lambda match: values[match[1]].rjust(int(match[2] or 0), "0"), template)
+        if values is None:
+            name = _PLACE.sub("*", glob.escape(template))
+        else:
+            name = _PLACE.sub(lambda at: values[at[1]].rjust(int(at[2] or 0), "0"), template)
         if not files.is_inside(self._folder, name):
             raise DemosError(f"{self._folder / INFO}: the name {name!r} leaves the folder.")
         return name
