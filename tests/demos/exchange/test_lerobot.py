@@ -279,6 +279,8 @@ def outside(folder: Path) -> None:
         (lambda f: edit_info(f, data_path="../../{chunk_index}"), "leaves the folder"),
         (lambda f: edit_info(f, data_path="{chunk_index:99d}"), "There is no .*99d"),
         (lambda f: edit_info(f, data_path=None), "does not say where the files are"),
+        (lambda f: edit_info(f, data_path=""), "There is no"),
+        (lambda f: edit_info(f, data_path="**/*"), r"There is no .*\[\*\]"),
         (lambda f: edit_features(f, action=None), "there is no action"),
         (lambda f: edit_features(f, action={"dtype": "float32"}), "required field `shape`"),
         (
