@@ -40,7 +40,7 @@ _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}
 _STEP: Final = np.dtype([(name, np.int64) for name in ("frame", "time_ns", "file", "row", "tick")])
 
 
-class Place(msgspec.Struct, kw_only=True):
+class EpisodeEntry(msgspec.Struct, kw_only=True):
     """A row of `meta/episodes`."""
 
     number: int = msgspec.field(name="episode_index")
@@ -50,7 +50,7 @@ class Place(msgspec.Struct, kw_only=True):
     end: int | None = msgspec.field(default=None, name="dataset_to_index")
 
 
-class _FilmedPlace(Place):
+class _FilmedEntry(EpisodeEntry):
     """The same with the part of the video."""
 
     chunk_index: int
@@ -72,7 +72,7 @@ class Located:
         times: Its times; None without one.
     """
 
-    place: Place
+    place: EpisodeEntry
     steps: NDArray[Any]
     paths: Sequence[Path]
     video: Path | None = None
@@ -139,21 +139,21 @@ class Index:
         for number in sorted(self._spans.keys() - self.places.keys() - twice):
             context.leave_out("episode", f"that {EPISODES} does not have", number)
         self._videos: dict[Path, VideoTimes | str] = {}
-        self._filmed: dict[Path, list[_FilmedPlace]] = defaultdict(list)
+        self._filmed: dict[Path, list[_FilmedEntry]] = defaultdict(list)
         self._overlaps: dict[int, str] = {}
         for place in self.places.values():
-            if isinstance(place, _FilmedPlace):
+            if isinstance(place, _FilmedEntry):
                 self._filmed[self._video_path(place)].append(place)
 
-    def _read_places(self) -> tuple[dict[int, Place], set[int]]:
+    def _read_places(self) -> tuple[dict[int, EpisodeEntry], set[int]]:
         """Return the rows of `meta/episodes` in order, and the numbers that are there twice."""
         paths = sorted((self._folder / EPISODES).glob("*/*.parquet"))
         if not paths:
             raise DemosError(f"There is no {EPISODES}/*/*.parquet in {self._folder}: restore it.")
-        kind = _FilmedPlace if self._video else Place
-        own = {field.encode_name for field in msgspec.structs.fields(Place)}
-        names = own | {self._video + name for name in _FilmedPlace.__struct_fields__ if self._video}
-        found: dict[int, Place] = {}
+        kind = _FilmedEntry if self._video else EpisodeEntry
+        own = {field.encode_name for field in msgspec.structs.fields(EpisodeEntry)}
+        names = own | {self._video + name for name in _FilmedEntry.__struct_fields__ if self._video}
+        found: dict[int, EpisodeEntry] = {}
         twice: set[int] = set()
         for path in paths:
             inner = files.inside(self._folder, str(path.relative_to(self._folder)), path)
@@ -181,7 +181,7 @@ class Index:
             raise DemosError(f"There is no {self._folder / pattern}: restore it.")
         return [self._folder / name for name in found]
 
-    def _video_path(self, place: _FilmedPlace) -> Path:
+    def _video_path(self, place: _FilmedEntry) -> Path:
         values = {name: str(getattr(place, name)) for name in ("chunk_index", "file_index")}
         key = self._video.removeprefix("videos/").rstrip("/")
         return self._folder / self._named("video_path", values | {"video_key": key})
@@ -230,12 +230,12 @@ class Index:
         for number, place in self.places.items():
             try:
                 located = Located(place, self._steps(place), self._paths)
-                filmed = isinstance(place, _FilmedPlace)
+                filmed = isinstance(place, _FilmedEntry)
                 yield self._with_pictures(located, place) if filmed else located
             except _Contradiction as found:
                 self._context.leave_out("episode", found.reason, f"{number}{found.size}")
 
-    def _steps(self, place: Place) -> NDArray[Any]:
+    def _steps(self, place: EpisodeEntry) -> NDArray[Any]:
         """Return the steps whose rows agree with each other and with `meta/episodes`."""
         length, rate_hz = place.length, self._rate_hz
         if place.number not in self._spans:
@@ -340,7 +340,7 @@ class Index:
             self._context.warn(f"{name} ends {-late_s:.4g} s earlier than {EPISODES} says.")
         return times
 
-    def _with_pictures(self, located: Located, place: _FilmedPlace) -> Located:
+    def _with_pictures(self, located: Located, place: _FilmedEntry) -> Located:
         """Return an episode with the image of each step, without steps that have none."""
         number, steps = place.number, located.steps
         path = self._video_path(place)
