@@ -166,8 +166,8 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
     for feature in features:
         key = feature.key.removeprefix(_OBSERVATION)
         prefix = "" if feature.key in {_ACTION, _STATE} else f"{key}/"
-        stated = cast("list[Any]", feature.units) if isinstance(feature.units, list) else []
-        units = list(map(str, stated))
+        stated = feature.units
+        units = list(map(str, cast("list[Any]", stated))) if isinstance(stated, list) else []
         named = tuple(prefix + name for name in feature.names)
         if len(set(named)) != feature.size or not all(feature.names):
             if named:
