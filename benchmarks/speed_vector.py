@@ -24,7 +24,6 @@ import shapechanger
 from benchmarks.peer import Peer
 from benchmarks.row import Row
 from shapechanger.envs.stepping.fast_model import find_fast_model
-from shapechanger.envs.stepping.watch import ModelWatch
 
 ROUNDS = 31
 # More rounds for wall-clock times, which vary more: other processes count too.
@@ -112,7 +111,7 @@ def against_physics(num_envs: int, *, fast: bool = False) -> Row:
     model = ant.model
     if fast:
         one: Any = fleet.envs.envs[0].unwrapped
-        model = cast("Any", find_fast_model(ModelWatch(one.model), one.body_spec))
+        model = cast("Any", find_fast_model(one.model, one.body_spec))
     bare = [(model, mujoco.MjData(model)) for _ in range(num_envs)]
     controls: list[Any] = [data.ctrl for _, data in bare]
     actions = fleet.actions(STEPS)

@@ -255,6 +255,7 @@ MODULES: Final = (
     "shapechanger.demos.dataset",
     "shapechanger.demos.recording",
     "shapechanger.envs.ant",
+    "shapechanger.envs.humanoid",
     "shapechanger.envs.make_vec",
     "shapechanger.envs.own",
     "shapechanger.envs.pendulum",

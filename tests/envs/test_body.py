@@ -19,6 +19,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.envs import CATALOGUE
+from shapechanger.envs.ant import ANT, LEGS
 from shapechanger.errors import (
     BrokenModel,
     EnvArgumentError,
@@ -37,11 +38,12 @@ from shapechanger.morphology import (
     Split,
     Stretch,
     from_json,
-    interpolate,
     to_json,
 )
 from shapechanger.morphology.certificate import fingerprint
 from shapechanger.morphology.families import BodyLike
+from tests.morphology.models import ant as ant_spec
+from tests.morphology.models import built, posed
 
 _BIG = (Stretch("shank_*", 2.0),)
 _OTHER = (Stretch("shank_*", 1.5), Cut("shank_4", 0.25), Gear("hip_1", to=40.0))
@@ -115,11 +117,6 @@ def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
         assert env.unwrapped.body == _BIG
         model = env.unwrapped.model
     assert fingerprint(model) == fingerprint(_model("shapechanger/BigAnt-v1"))
-
-
-def test_an_empty_list_is_the_unedited_body() -> None:
-    body = _compiled(_model("shapechanger/BigAnt-v1", body="[]"))
-    assert body == _compiled(_model("shapechanger/Ant-v1"))
 
 
 @pytest.mark.parametrize(
@@ -270,18 +267,6 @@ def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
     assert env.standing_height == small
 
 
-def test_a_new_body_starts_from_rest(ant: Any) -> None:
-    """No state of the old body's episode remains."""
-    for _ in range(10):
-        ant.step(np.ones(8, np.float32))
-    first, _ = ant.reset(seed=3, options={"body": "BigAnt"})
-    assert ant.unwrapped.data.time == 0.0
-    for _ in range(10):
-        ant.step(np.ones(8, np.float32))
-    second, _ = ant.reset(seed=3)
-    np.testing.assert_array_equal(first, second)
-
-
 def test_the_body_stays_until_it_is_changed(ant: Any) -> None:
     """Resets without a body keep it; an equal body is not compiled again."""
     ant.reset(options={"body": "BigAnt"})
@@ -402,19 +387,6 @@ def test_a_custom_model_can_be_edited(tmp_path: Path) -> None:
     again.close()
 
 
-def test_interpolated_bodies_are_a_path_between_two_envs() -> None:
-    with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
-        ends = [
-            interpolate(one.unwrapped.body, other.unwrapped.body, alpha) for alpha in (0.0, 1.0)
-        ]
-        middle = interpolate(one.unwrapped.body, other.unwrapped.body, 0.5)
-    prints = [fingerprint(_model("shapechanger/Ant-v1", body=body)) for body in ends]
-    assert prints == [fingerprint(_model(f"shapechanger/{name}-v1")) for name in ("Ant", "BigAnt")]
-    model = _model("shapechanger/Ant-v1", body=middle)
-    shank = model.geom_size[model.body("shank_1").geomadr[0], 1]
-    assert shank == pytest.approx(1.5 * 0.2 * math.sqrt(2.0))
-
-
 def test_an_unknown_option_of_reset_is_refused(ant: Any) -> None:
     """The message suggests the nearest spelling."""
     with pytest.raises(UnknownName, match=r"Did you mean 'body'\?"):
@@ -465,3 +437,16 @@ def test_what_is_no_seed_is_refused(seed: Any) -> None:
             env.unwrapped.drawn_bodies(2, seed, "training")  # type: ignore[attr-defined]
         same = [env.reset(seed=cast("Any", one))[0] for one in (2**63, np.uint64(2**63))]
         np.testing.assert_array_equal(*same)
+
+
+def test_legs_are_in_the_order_of_the_motors() -> None:
+    """Legs follow the motors, with the given directions."""
+    model = built(ant_spec())
+    motors = [model.actuator(i).name for i in range(model.nu)]
+    assert motors == [f"{joint}_{leg}" for leg in LEGS for joint in ("hip", "ankle")]
+    data = posed(model)
+    for leg, (x, y) in LEGS.items():
+        place = data.body(f"shank_{leg}").xpos
+        assert (np.sign(place[0]), np.sign(place[1])) == (x, y)
+    extended = built(ant_spec(), *ANT.body("ExtendedAnt"))
+    assert [extended.actuator(i).name for i in range(8, 12)] == [f"foot_{leg}" for leg in LEGS]

@@ -335,28 +335,3 @@ def test_features_name_elements_of_the_model(env: Any) -> None:
         assert feature.element is not None
         assert getattr(env.model, feature.element.kind)(feature.element.name).id >= 0
         assert feature.name.startswith(f"{feature.element.name}/")
-
-
-def test_the_units_of_the_ant() -> None:
-    """Units are SI; the unit of a pure number is 1."""
-    with gym.make("shapechanger/ExtendedAnt-v1") as made:
-        layout = made.unwrapped.observation_layout
-    assert {str(feature).partition("/")[2] for feature in layout} == {
-        *("z [m]", "qw [1]", "qx [1]", "qy [1]", "qz [1]", "angle [rad]", "velocity [rad/s]"),
-        *("vx [m/s]", "vy [m/s]", "vz [m/s]", "wx [rad/s]", "wy [rad/s]", "wz [rad/s]"),
-        *("contact/tx [N·m]", "contact/ty [N·m]", "contact/tz [N·m]"),
-        *("contact/fx [N]", "contact/fy [N]", "contact/fz [N]"),
-    }
-
-
-def test_the_order_of_the_pendulum() -> None:
-    """Positions come before velocities, and the cart before the pole."""
-    with gym.make("shapechanger/InvertedPendulum-v1") as made:
-        env: Any = made.unwrapped
-        assert [str(feature) for feature in env.observation_layout] == [
-            *("slider/position [m]", "hinge/angle [rad]"),
-            *("slider/velocity [m/s]", "hinge/velocity [rad/s]"),
-        ]
-        (motor,) = env.action_layout
-    assert (str(motor), motor.low, motor.high) == ("slide/motor [1]", -3.0, 3.0)
-    assert (motor.gain, motor.gain_unit) == (100.0, "N")

@@ -34,10 +34,9 @@ from shapechanger.morphology import (
     Mass,
     StartHeight,
     Stretch,
-    to_json,
 )
-from shapechanger.transfer.body_map import BodyMap
 from tests.envs.own_robots import DOG, Move, Nonsense, Rear
+from tests.envs.vector.sameness import play_side_by_side
 from tests.morphology.models import URDF
 
 REAR = "tests.envs.own_robots:Rear"
@@ -228,14 +227,6 @@ def test_bodies_change_at_a_reset(dog: Path) -> None:
     assert _inner(env).model.nq == 9
 
 
-def test_bodies_lie_between_two(dog: Path) -> None:
-    """`towards` draws one at each reset."""
-    long = to_json([Stretch("front", 2.0)])
-    env = shapechanger.from_mjcf(dog, towards=long)
-    env.reset(seed=0)
-    assert 0.2 < _inner(env).model.geom("front").size[1] < 0.42
-
-
 def test_certificates_name_the_files(dog: Path, tmp_path: Path) -> None:
     """And what differs between two bodies, or between two files."""
     one = shapechanger.from_mjcf(dog)
@@ -249,51 +240,14 @@ def test_certificates_name_the_files(dog: Path, tmp_path: Path) -> None:
     assert "dog" in str(_inner(one).certify_shift(one, shapechanger.from_mjcf(cat)))
 
 
-def test_a_map_leads_to_another_file(dog: Path, tmp_path: Path) -> None:
-    """By name, as between any two bodies."""
-    tail = (
-        '<body name="tail" pos="-.3 0 0"><joint name="tail" axis="0 1 0" range="-1 1"/>'
-        '<geom size=".05" mass=".1"/></body>'
-    )
-    text = DOG.replace('      <body name="front"', f'      {tail}<body name="front"')
-    text = text.replace("  </actuator>", '<motor joint="tail" ctrlrange="-1 1"/>  </actuator>')
-    other = tmp_path / "tailed.xml"
-    other.write_text(text[: text.index("  <keyframe>")] + "</mujoco>")
-    source, target = (_inner(shapechanger.from_mjcf(path)) for path in (dog, other))
-    mapped = BodyMap.between(
-        source.observation_layout,
-        target.observation_layout,
-        source.action_layout,
-        target.action_layout,
-    )
-    start = target.reset(seed=0)[0]
-    seen = mapped.adapt_observation(start)
-    place = target.observation_layout.names.index("front/angle")
-    assert seen[source.observation_layout.names.index("front/angle")] == start[place]
-    np.testing.assert_array_equal(mapped.adapt_action(np.array([0.3, 0.4])), [0.3, 0.4, 0.0])
-
-
 def test_many_at_once_equal_one_by_one(dog: Path) -> None:
     """To the last bit, over the ends of episodes."""
     options: dict[str, Any] = {"path": str(dog), "task": REAR, "max_episode_steps": 5}
     many = shapechanger.make_vec("shapechanger/OwnRobot-v1", 3, threads=2, **options)
     sync = gym.make_vec("shapechanger/OwnRobot-v1", 3, vectorization_mode="sync", **options)
-    same = gym.make_vec("shapechanger/OwnRobot-v1", 3, **options)
-    try:
-        starts = [envs.reset(seed=4)[0] for envs in (many, sync, same)]
-        rng = np.random.default_rng(0)
-        for _ in range(12):
-            action = rng.uniform(-1.0, 1.0, (3, 2)).astype(np.float32)
-            steps = [envs.step(action) for envs in (many, sync, same)]
-            for other in steps[1:]:
-                for x, y in zip(steps[0][:4], other[:4], strict=True):
-                    np.testing.assert_array_equal(x, y)
-                for name, values in steps[0][4].items():
-                    np.testing.assert_array_equal(values, other[4][name])
-        np.testing.assert_array_equal(starts[0], starts[1])
-    finally:
-        for envs in (many, sync, same):
-            envs.close()
+    assert play_side_by_side(many, sync, 12, "NextStep") == 6
+    many.close()
+    sync.close()
 
 
 def test_a_urdf_stands_on_a_floor(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.envs.own_models import model_file, own_family, require_robot
+from shapechanger.envs.own_models import own_family, require_robot
 from shapechanger.errors import BrokenModel, MorphologyError, UnknownName
 from shapechanger.morphology import (
     AddFloor,
@@ -97,9 +97,9 @@ def test_files_that_do_not_exist_are_named(tmp_path: Path) -> None:
     with pytest.raises(
         UnknownName, match=r"matches 'robto.xml'. Did you mean 'robot.xml'\? There are: robot.xml\."
     ):
-        model_file(tmp_path / "robto.xml")
+        own_family(tmp_path / "robto.xml")
     with pytest.raises(MorphologyError, match="is a folder: name a file"):
-        model_file(tmp_path)
+        own_family(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 
 def test_robots_of_the_package_have_names(descriptions: Path) -> None:
     """MJCF and URDF; the modules of the package know the files."""
-    assert model_file("leg_mj_description") == (descriptions / "leg.xml").resolve()
+    assert own_family("leg_mj_description").path == (descriptions / "leg.xml").resolve()
     family = own_family("arm_description", (AddMotor("*", 1.0),))
     np.testing.assert_array_equal(compile_body(family.load(family.path)).actuator_gear[:, 0], 1.0)
 
@@ -215,11 +215,11 @@ def test_robots_that_the_package_lacks_are_named(
 ) -> None:
     """With the nearest spelling, or the reason."""
     with pytest.raises(error, match=sentence):
-        model_file(name)
+        own_family(name)
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the command that installs it."""
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
     with pytest.raises(MorphologyError, match="run `pip install robot_descriptions`"):
-        model_file("go2_mj_description")
+        own_family("go2_mj_description")

@@ -34,7 +34,6 @@ from shapechanger.morphology import (
 )
 from shapechanger.morphology.pose import StartRules
 from shapechanger.morphology.robot import robot_bodies
-from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -210,19 +209,6 @@ def test_its_shift_is_certified(robot: _Robot) -> None:
     assert "mass" in str(certificate)
     with pytest.raises(EmptyShift, match="behave the same"):
         source.unwrapped.certify_shift(source, robot.make())
-
-
-@each_robot
-def test_it_maps_to_itself(robot: _Robot) -> None:
-    """By the identity."""
-    env = robot.make()
-    inner: Any = env.unwrapped
-    layouts = inner.observation_layout, inner.action_layout
-    ours = BodyMap.between(layouts[0], layouts[0], layouts[1], layouts[1])
-    observation, _ = env.reset(seed=0)
-    np.testing.assert_array_equal(ours.adapt_observation(observation), observation)
-    action = env.action_space.sample()
-    np.testing.assert_array_equal(ours.adapt_action(action), action)
 
 
 @each_robot

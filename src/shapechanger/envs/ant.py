@@ -112,8 +112,8 @@ _sum: Final = np.add.reduce
 class _Ant(Binding):
     """Views of an ant's data, and buffers for values computed from them."""
 
-    def __init__(self, watch: ModelWatch, env: AntEnv) -> None:
-        super().__init__(watch, env.data, env.frame_skip)
+    def __init__(self, watch: ModelWatch, env: Any) -> None:
+        super().__init__(watch, env)
         data = env.data
         self.main_xy = data.body(env.main_body).xpos[:2]
         self.qpos_xy = data.qpos[:2]
@@ -219,6 +219,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 
     family = ANT
     measures = (FORWARD_SPEED, RETURN)
+    binding = _Ant
     replaced = (
         *("do_simulation", "_step_mujoco_simulation", "state_vector", "dt"),
         *("_get_obs", "_get_rew", "is_healthy", "healthy_reward", "up"),
@@ -258,9 +259,6 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         """The body whose velocity is rewarded, by number or name."""
         return self._main_body
 
-    def _bind(self, watch: ModelWatch) -> _Ant:
-        return _Ant(watch, self)
-
     def _advance(self, bound: _Ant, action: Any, out: NDArray[np.float64] | None) -> StepResult:
         # Gymnasium's `step`, `_get_obs` and `is_healthy`, each number computed once, in their order
         # and precision: the cost of an action is summed in the action's own.
@@ -289,16 +287,9 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             np.isfinite(qpos).all() and np.isfinite(bound.qvel).all()
         )
         healthy = finite and is_upright(z, up_x, up_y, *self._healthy_z_range)
-        reward, info = self._reward(
-            qpos[0],
-            qpos[1],
-            np.float64(math.sqrt(bound.qpos_xy.dot(bound.qpos_xy))),
-            x_velocity,
-            y_velocity,
-            ctrl_cost,
-            contact_cost,
-            healthy,
-        )
+        place = qpos[0], qpos[1], np.float64(math.sqrt(bound.qpos_xy.dot(bound.qpos_xy)))
+        velocity = x_velocity, y_velocity
+        reward, info = self._reward(place, velocity, ctrl_cost, contact_cost, healthy)
         if bound.warnings.tolist() != NO_WARNINGS:
             info["diverged"] = True
         if self.render_mode == "human":
@@ -306,28 +297,14 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         return observation, reward, not healthy and self._terminate_when_unhealthy, False, info
 
     def _reward(
-        self,
-        x: Any,
-        y: Any,
-        distance: Any,
-        x_velocity: Any,
-        y_velocity: Any,
-        ctrl_cost: Any,
-        contact_cost: Any,
-        healthy: Any,
+        self, place: Any, velocity: Any, ctrl_cost: Any, contact_cost: Any, healthy: Any
     ) -> tuple[Any, dict[str, Any]]:
         """Return reward and info as Gymnasium's `_get_rew`, of one ant or of a row of ants.
 
-        Args:
-            x: Place of the torso, m.
-            y: Place of the torso, m.
-            distance: Distance of the torso from the origin, m.
-            x_velocity: Velocity of the main body, m/s.
-            y_velocity: Velocity of the main body, m/s.
-            ctrl_cost: Cost of the action.
-            contact_cost: Cost of the contact forces.
-            healthy: Whether the ant is healthy.
+        The place is the torso's, x, y and distance from the origin, m; the velocity is the main
+        body's along x and y, m/s.
         """
+        (x, y, distance), (x_velocity, y_velocity) = place, velocity
         forward_reward = x_velocity * self._forward_reward_weight
         healthy_reward = healthy * self._healthy_reward
         reward = (forward_reward + healthy_reward) - (ctrl_cost + contact_cost)
@@ -348,18 +325,15 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         if self.render_mode == "human":
             return ""
         bound.healthy_z_range[:] = self._healthy_z_range
-        # Numbers of other types give results of other types; their representations differ too.
-        return sys.intern(
-            repr(
-                (
-                    *(id(self.tuned), bound.qpos.size, bound.qvel.size, bound.forces.size),
-                    *(bound.dt, self.place_hidden, self.contacts_observed),
-                    *(tuple(self._contact_force_range), self._terminate_when_unhealthy),
-                    *(self._forward_reward_weight, self._healthy_reward),
-                    *(self._ctrl_cost_weight, self._contact_cost_weight),
-                )
-            )
+        shared = (
+            *(id(self.tuned), bound.qpos.size, bound.qvel.size, bound.forces.size),
+            *(bound.dt, self.place_hidden, self.contacts_observed),
+            *(tuple(self._contact_force_range), self._terminate_when_unhealthy),
+            *(self._forward_reward_weight, self._healthy_reward),
+            *(self._ctrl_cost_weight, self._contact_cost_weight),
         )
+        # Numbers of other types give results of other types; their representations differ too.
+        return sys.intern(repr(shared))
 
     def conclude(
         self,
@@ -376,7 +350,6 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         place, state, forces = after[:, :2], after[:, :size], after[:, size + 4 :]
         main_xy, low, high = after[:, size : size + 2], after[:, size + 2], after[:, size + 3]
         main_xy_before = np.frombuffer(b"".join(before)).reshape(n, 2)
-        warnings = np.concatenate([bound.warnings for bound in bounds])
         ctrl_cost = self._ctrl_cost_weight * _sum(np.square(actions, order="C"), axis=1)
         clipped = forces.clip(*self._contact_force_range)
         observed = [state[:, 2:] if self.place_hidden else state]
@@ -390,22 +363,11 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             # Rounded as `dot` rounds, which need not be as NumPy rounds a sum of products.
             distance = np.sqrt(np.vecdot(place, place))
         healthy = upright & np.isfinite(state).all(axis=1)
-        rewards, infos = self._reward(
-            place[:, 0],
-            place[:, 1],
-            distance,
-            velocity[:, 0],
-            velocity[:, 1],
-            ctrl_cost,
-            contact_cost,
-            healthy,
-        )
+        where = place[:, 0], place[:, 1], distance
+        rewards, infos = self._reward(where, velocity.T, ctrl_cost, contact_cost, healthy)
         infos["reward_survive"] = infos["reward_survive"].tolist()  # Python numbers, like step()'s.
         terminated = ~healthy & bool(self._terminate_when_unhealthy)
-        diverged: Sequence[int] = ()
-        if warnings.any():
-            diverged = np.flatnonzero(warnings.reshape(n, -1).any(axis=1)).tolist()
-        return Outcomes(observations, rewards, terminated, infos, diverged)
+        return observations, rewards, terminated, infos
 
     def _observation_features(self, model: Any) -> list[Feature]:
         features = position_features(model)[2 if self.place_hidden else 0 :]
@@ -442,7 +404,7 @@ def is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
         x: Its quaternion's x.
         y: Its quaternion's y.
         low: Lowest healthy height, m.
-        high: Highest healthy height, m.
+        high: Highest one, m.
     """
     return (low <= z) & (z <= high) & (1.0 - 2.0 * (x * x + y * y) > 0.0)
 

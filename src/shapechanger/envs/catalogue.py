@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 import gymnasium as gym
@@ -30,30 +29,26 @@ REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
 OWN_ROBOT: Final = "shapechanger/OwnRobot-v1"
 """Id of the env of a robot and a task of the user's own, from a file."""
 
-VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
-    {
-        "shapechanger/Car-v1": ("car", "front wheels that steer, in a corridor"),
-        "shapechanger/Tank-v1": ("tank", "two tracks, in a corridor"),
-        "shapechanger/Truck-v1": ("truck", "front wheels that steer and a trailer, in a yard"),
-        "shapechanger/Boat-v1": ("boat", "propeller and rudder, in a harbour"),
-    }
-)
+VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = {
+    "shapechanger/Car-v1": ("car", "front wheels that steer, in a corridor"),
+    "shapechanger/Tank-v1": ("tank", "two tracks, in a corridor"),
+    "shapechanger/Truck-v1": ("truck", "front wheels that steer and a trailer, in a yard"),
+    "shapechanger/Boat-v1": ("boat", "propeller and rudder, in a harbour"),
+}
 """Vehicle and summary by id; all have the same task, and their bodies form no family."""
 
-RANGES_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
-    {
-        env_id.replace("-v1", "Ranges-v1"): (vehicle, "the same, seeing distances; fast")
+
+def _variants(suffix: str, summary: str) -> Mapping[str, tuple[str, str]]:
+    return {
+        env_id.replace("-v1", f"{suffix}-v1"): (vehicle, summary)
         for env_id, (vehicle, _) in VEHICLE_ENVS.items()
     }
-)
+
+
+RANGES_ENVS: Final = _variants("Ranges", "the same, seeing distances; fast")
 """Vehicle and summary by id, for the same task on distances instead of images."""
 
-WAYPOINT_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
-    {
-        env_id.replace("-v1", "Waypoint-v1"): (vehicle, "camera and action the same for all")
-        for env_id, (vehicle, _) in VEHICLE_ENVS.items()
-    }
-)
+WAYPOINT_ENVS: Final = _variants("Waypoint", "camera and action the same for all")
 """Vehicle and summary by id, for the same task with waypoints as actions."""
 
 
@@ -75,24 +70,22 @@ class TaskEntry(msgspec.Struct, frozen=True):
     device: str = ""
 
 
-FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
-    {
-        "shapechanger/Finger-v1": TaskEntry(
-            "shapechanger.finger.reach:FingerReachEnv",
-            "finger of seven tendons: reach a point",
-            "ppo-finger",
-            100,
-            "shapechanger.finger.gpu",
-        ),
-        "shapechanger/FingerTrack-v1": TaskEntry(
-            "shapechanger.finger.track:FingerTrackEnv",
-            "finger of seven tendons: follow a path",
-            "ppo-finger",
-            250,
-            "shapechanger.finger.gpu",
-        ),
-    }
-)
+FINGER_ENVS: Final[Mapping[str, TaskEntry]] = {
+    "shapechanger/Finger-v1": TaskEntry(
+        "shapechanger.finger.reach:FingerReachEnv",
+        "finger of seven tendons: reach a point",
+        "ppo-finger",
+        100,
+        "shapechanger.finger.gpu",
+    ),
+    "shapechanger/FingerTrack-v1": TaskEntry(
+        "shapechanger.finger.track:FingerTrackEnv",
+        "finger of seven tendons: follow a path",
+        "ppo-finger",
+        250,
+        "shapechanger.finger.gpu",
+    ),
+}
 """Envs of the finger by id."""
 
 
@@ -132,7 +125,7 @@ _FAMILIES: Final = {
     "Hopper": ("runners:HopperEnv", "ppo-planar", 3800.0),
     "Walker2d": ("runners:Walker2dEnv", "ppo-planar", None),
     "Swimmer": ("runners:SwimmerEnv", "ppo-swim", 360.0),
-    "Humanoid": ("runners:HumanoidEnv", "ppo-humanoid", None),
+    "Humanoid": ("humanoid:HumanoidEnv", "ppo-humanoid", None),
     "InvertedDoublePendulum": ("pendulum:InvertedDoublePendulumEnv", "ppo-planar", 9100.0),
 }
 # Name, family and summary of each body.
@@ -167,24 +160,17 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
     entry.id: entry for entry in (_entry(*row) for row in _BODIES)
 }
 
-# Families of ODRL's robots.
-_ODRL: Final = {
-    "ant": "Ant",
-    "halfcheetah": "HalfCheetah",
-    "hopper": "Hopper",
-    "walker2d": "Walker2d",
-}
-
 
 def _odrl_entry(name: str) -> CatalogueEntry:
     """Return the entry of a body such as `odrl-ant-friction-0.1`."""
     task = name.removeprefix("odrl-")
-    return _entry(name, _ODRL[task.partition("-")[0]], f"body of ODRL: {task}")
+    family = next(each for each in _FAMILIES if each.lower() == task.partition("-")[0])
+    return _entry(name, family, f"body of ODRL: {task}")
 
 
-ODRL_ENVS: Final[Mapping[str, CatalogueEntry]] = MappingProxyType(
-    {entry.id: entry for entry in map(_odrl_entry, odrl_bodies())}
-)
+ODRL_ENVS: Final[Mapping[str, CatalogueEntry]] = {
+    entry.id: entry for entry in map(_odrl_entry, odrl_bodies())
+}
 """Envs with the bodies of ODRL by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
 
 # Envs whose bodies form no family, except the vehicle on the network.
@@ -236,16 +222,12 @@ def register_all() -> None:
         _register(env_id, task.entry_point, task.episode_steps)
     reach, track = FINGER_ENVS.values()
     for env_id, entry_point, limit in (
-        (REMOTE_FINGER, "shapechanger.finger.remote:RemoteFingerEnv", reach.episode_steps),
-        (
-            REMOTE_FINGER_TRACK,
-            "shapechanger.finger.remote:RemoteFingerTrackEnv",
-            track.episode_steps,
-        ),
-        (REMOTE_VEHICLE, "shapechanger.robot.client.env:RemoteVehicleEnv", None),
-        (REMOTE_WAYPOINT, "shapechanger.vehicles.remote.waypoints:RemoteWaypointEnv", None),
+        (REMOTE_FINGER, "finger.remote:RemoteFingerEnv", reach.episode_steps),
+        (REMOTE_FINGER_TRACK, "finger.remote:RemoteFingerTrackEnv", track.episode_steps),
+        (REMOTE_VEHICLE, "robot.client.env:RemoteVehicleEnv", None),
+        (REMOTE_WAYPOINT, "vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
-        _register(env_id, entry_point, limit, nondeterministic=True)  # A robot.
+        _register(env_id, f"shapechanger.{entry_point}", limit, nondeterministic=True)  # A robot.
 
 
 def _register(env_id: str, entry_point: str, episode_steps: int | None, **more: Any) -> None:

@@ -68,7 +68,9 @@ def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Fe
     return features
 
 
-def contact_features(model: mujoco.MjModel, low: float, high: float) -> list[Feature]:
+def contact_features(
+    model: mujoco.MjModel, low: float = -math.inf, high: float = math.inf
+) -> list[Feature]:
     """Return six features per body except the world: clipped `cfrc_ext`, torque before force.
 
     Args:
@@ -128,20 +130,16 @@ def action_layout(model: mujoco.MjModel) -> Layout:
         drives_joint = model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT
         kind = _J(model.jnt_type[model.actuator_trnid[a, 0]]) if drives_joint else None
         target = _servo_unit(model, a, kind)
-        if target:
-            element = Element("actuator", name)
-            features.append(Feature(f"{name}/target", target, float(low), float(high), element))
-            continue
-        known = kind in _FORCE_UNIT and gear > 0.0
+        unit = _FORCE_UNIT.get(kind, "") if kind is not None and gear > 0.0 and not target else ""
         features.append(
             Feature(
-                f"{name}/motor",
-                "1",
+                f"{name}/{'target' if target else 'motor'}",
+                target or "1",
                 float(low),
                 float(high),
                 Element("actuator", name),
-                gain=gear if known else 1.0,
-                gain_unit=_FORCE_UNIT[kind] if known and kind is not None else "",
+                gain=gear if unit else 1.0,
+                gain_unit=unit,
             )
         )
     return Layout(tuple(features))

@@ -23,39 +23,24 @@ from shapechanger.errors import UnknownName, VectorEnvError
 
 if TYPE_CHECKING:
     from shapechanger.envs.warp.env import WarpVectorEnv
-    from shapechanger.morphology.families import BodyLike
 
 _BACKENDS: Final = ("threads", "warp")
+# Arguments of a CPU env that have no meaning on a device, with the reason.
+_REFUSED: Final = {
+    "render_mode": "nothing is drawn on the device; render the same body with gymnasium.make",
+    "towards": "a reset draws no body by itself; hand it with options={'bodies': [...]}",
+}
 
 
 @overload
 def make_vec(
-    env_id: str,
-    num_envs: int = 1,
-    *,
-    backend: Literal["threads"] = "threads",
-    threads: int | None = None,
-    bodies: Sequence[BodyLike] | None = None,
-    autoreset_mode: AutoresetMode | str | None = None,
-    copy: bool = True,
-    **arguments: Any,
+    env_id: str, num_envs: int = 1, *, backend: Literal["threads"] = "threads", **arguments: Any
 ) -> ThreadVectorEnv: ...
 
 
 @overload
 def make_vec(
-    env_id: str,
-    num_envs: int = 1,
-    *,
-    backend: Literal["warp"],
-    device: str | None = None,
-    bodies: Sequence[Any] | None = None,
-    pool: Sequence[Any] | None = None,
-    nconmax: int | None = None,
-    njmax: int | None = None,
-    task_infos: bool = True,
-    autoreset_mode: AutoresetMode | str | None = None,
-    **arguments: Any,
+    env_id: str, num_envs: int = 1, *, backend: Literal["warp"], **arguments: Any
 ) -> WarpVectorEnv: ...
 
 
@@ -119,36 +104,41 @@ def make_vec(
         raise UnknownName("backend", backend, _BACKENDS)
     made_from, mode = _known_id(env_id), _mode(autoreset_mode, backend)
     limits = {"nconmax": nconmax, "njmax": njmax}
-    given = {name: number for name, number in limits.items() if number is not None}
-    chosen: dict[str, Any] = {}
+    limits = {name: number for name, number in limits.items() if number is not None}
+    recorded: dict[str, Any] = {
+        "threads": threads,
+        "device": device,
+        "bodies": bodies,
+        "pool": pool,
+    }
+    recorded = {name: value for name, value in recorded.items() if value is not None} | limits
     if backend == "warp":
         if threads is not None or not copy:
             raise VectorEnvError("backend='warp' has no threads, and always copies observations.")
         if pool is not None and (bodies is not None or not len(pool)):
             raise VectorEnvError("Give either `bodies`, one per world, or a `pool` of some bodies.")
-        from shapechanger.envs.warp import make_warp  # Warp.
+        for name, reason in _REFUSED.items():
+            if arguments.get(name) is not None:
+                raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
+        from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader
 
-        envs = make_warp(
-            made_from,
-            partial(_make, made_from),
+        place = find_device(device)
+        envs = WarpVectorEnv(
+            make_reader(made_from, partial(_make, made_from), arguments),
+            pool or bodies or [None],
             count,
-            device=device,
-            bodies=bodies,
-            pool=pool,
-            limits={name: _at_least_one(name, number) for name, number in given.items()},
+            device=place,
+            redraws=pool is not None,
+            limits={name: _at_least_one(name, number) for name, number in limits.items()},
             task_infos=task_infos,
-            arguments=arguments,
         )
         spec = copying.deepcopy(envs.made_from)
-        chosen |= {"backend": backend, **given} | ({} if device is None else {"device": device})
-        chosen |= ({} if pool is None else {"pool": list(pool)}) | {"task_infos": task_infos}
+        recorded |= {"backend": backend, "task_infos": task_infos}
     else:
-        asked = {"device": device, "pool": pool, **limits}
-        for name, value in asked.items():
-            if value is not None:
-                raise VectorEnvError(f"backend='threads' has no {name}: use backend='warp'.")
+        if wrong := [name for name in ("device", "pool", *limits) if name in recorded]:
+            raise VectorEnvError(f"backend='threads' has no {wrong[0]}: use backend='warp'.")
         cores = _cores() if threads is None else _at_least_one("thread", threads)
-        each: Sequence[dict[str, Any]] = [arguments] * count
+        each: list[dict[str, Any]] = [arguments] * count
         if bodies is not None:
             each = [{**arguments, "body": body} for body in bodies]
         envs = ThreadVectorEnv(
@@ -158,12 +148,12 @@ def make_vec(
             copy=copy,
         )
         spec = copying.deepcopy(envs.envs[0].spec)
-        chosen |= {"copy": copy} | ({} if threads is None else {"threads": threads})
+        recorded["copy"] = copy
     # `gymnasium.make_vec(spec)` repeats this call; it sets the spec of its own results too.
     if spec is not None and spec.vector_entry_point is not None:
+        recorded |= {name: list(recorded[name]) for name in recorded.keys() & {"bodies", "pool"}}
         spec.kwargs.update(arguments, num_envs=count, vectorization_mode="vector_entry_point")
-        spec.kwargs.update(autoreset_mode=mode.value, **chosen)
-        spec.kwargs.update({} if bodies is None else {"bodies": list(bodies)})
+        spec.kwargs.update(autoreset_mode=mode.value, **recorded)
         envs.spec = spec
     return envs
 

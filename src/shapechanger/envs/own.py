@@ -242,7 +242,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         if self._observed is None:
             places = [i for i in range(len(features)) if i not in hidden]
         else:
-            features += contact_features(model, -np.inf, np.inf)
+            features += contact_features(model)
             names = [feature.name for feature in features]
             places = _matching(names, self._observed)
         self._places = np.array(places, np.intp)

@@ -104,21 +104,13 @@ def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
         UnknownName: If there is no such file, or the package has no robot of this name.
         MorphologyError: If the path is a folder, or the package is missing or fails.
     """
-    file = model_file(path)
+    file = _model_file(path)
     name = file.stem
     return OwnFamily(name, {name: ()}, path=file, rig=rig)
 
 
-def model_file(path: str | Path) -> Path:
-    """Return the file of a robot, as an absolute path.
-
-    Args:
-        path: As of `own_family`.
-
-    Raises:
-        UnknownName: If there is no such file, or the package has no robot of this name.
-        MorphologyError: If the path is a folder, or the package is missing or fails.
-    """
+def _model_file(path: str | Path) -> Path:
+    """Return the file of a robot, as an absolute path."""
     file = Path(path).expanduser()
     if file.is_file():
         return file.resolve()
@@ -126,14 +118,10 @@ def model_file(path: str | Path) -> Path:
         return _described(str(path))
     if file.is_dir():
         raise MorphologyError(f"{path} is a folder: name a file of MJCF or URDF in it.")
-    known = sorted(each.name for each in _models_beside(file))
-    raise UnknownName(f"model in {file.parent.resolve()}", file.name, known)
-
-
-def _models_beside(file: Path) -> list[Path]:
-    """Return the models in a file's folder."""
     folder = file.parent
-    return [each for each in folder.glob("*") if each.suffix in (".xml", ".urdf", ".mjcf")]
+    models = (each for each in folder.glob("*") if each.suffix in (".xml", ".urdf", ".mjcf"))
+    known = sorted(each.name for each in models)
+    raise UnknownName(f"model in {folder.resolve()}", file.name, known)
 
 
 def _described(name: str) -> Path:

@@ -18,6 +18,7 @@ import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
+from types import SimpleNamespace
 from typing import Any, Final, Protocol, cast
 
 import numpy as np
@@ -161,13 +162,6 @@ BUILT_IN: Final[Mapping[str, type[OwnTask]]] = {"walk": Walk}
 """Tasks, keyed by name."""
 
 
-class _OfFunction:
-    """A task made of a function that returns the terms of the reward."""
-
-    def __init__(self, reward: Callable[[RobotState], Mapping[str, float]]) -> None:
-        self.reward = reward
-
-
 def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTask, str]:
     """Return a task and its name for messages.
 
@@ -196,7 +190,7 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
     if callable(getattr(found, "reward", None)):
         return cast("OwnTask", found), name
     if callable(found):
-        return _OfFunction(cast("Any", found)), name
+        return cast("OwnTask", SimpleNamespace(reward=found)), name
     raise _without_reward(name)
 
 

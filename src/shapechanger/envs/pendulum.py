@@ -57,9 +57,9 @@ CLIPPED_AT: Final = 10.0
 class _Pendulum(Binding):
     """Views of a pendulum's data."""
 
-    def __init__(self, watch: ModelWatch, env: InvertedPendulumEnv) -> None:
-        super().__init__(watch, env.data, env.frame_skip)
-        self.observed = [env.data.qpos, env.data.qvel]
+    def __init__(self, watch: ModelWatch, env: TunedStep) -> None:
+        super().__init__(watch, env)
+        self.observed = [self.qpos, self.qvel]
 
 
 class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -110,15 +110,13 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
     """
 
     family = PENDULUM
+    binding = _Pendulum
     replaced = ("do_simulation", "_step_mujoco_simulation", "_get_obs")
 
     def __init__(self, body: BodyLike = "InvertedPendulum", **arguments: Any) -> None:
         self._begin(body, arguments)
         cast("Any", GymnasiumInvertedPendulumEnv).__init__(self, **arguments)
         self._finish(arguments)
-
-    def _bind(self, watch: ModelWatch) -> _Pendulum:
-        return _Pendulum(watch, self)
 
     def _advance(
         self, bound: _Pendulum, action: Any, out: NDArray[np.float64] | None

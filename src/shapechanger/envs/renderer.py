@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import weakref
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, cast
 
@@ -23,6 +23,7 @@ except ModuleNotFoundError as error:
 
 # Frames of at most this many pixels are camera observations rather than films.
 _MOST_CAMERA_PIXELS: Final = 256 * 256
+_require_context_once: Final = functools.cache(require_context)
 # Effects that render the scene again for each light and each mirror.
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 
@@ -85,39 +86,38 @@ class Renderer(MujocoRenderer):
             viewer.cam.lookat[:] = self.data.xpos[self._follow]
         for marker in markers:
             viewer.add_marker(**marker)
-        with self._floors_below():
+        with _restored(self.data.geom_xpos):
+            if self._follow is not None:
+                self._move_floors(self.data.xpos[self._follow, :2])
             return cast("Any", super().render(render_mode))
 
-    @contextmanager
-    def _floors_below(self) -> Generator[None]:
-        """Draw floors below the body that the camera follows, which may walk off them.
+    def _move_floors(self, middle: NDArray[np.float64]) -> None:
+        """Move floors below the body that the camera follows, which may walk off them.
 
         Contacts take floors as infinite, and images do not. They move by whole tiles, so that
         they seem to stay.
         """
-        if self._follow is None:
-            yield
-            return
-        places = self.data.geom_xpos
-        middle = self.data.xpos[self._follow, :2]
-        before = {floor: places[floor].copy() for floor in self._floors}
         for floor, period in self._floors.items():
-            places[floor, :2] += np.round((middle - places[floor, :2]) / period) * period
-        try:
-            yield
-        finally:
-            for floor, place in before.items():
-                places[floor] = place
+            place = self.data.geom_xpos[floor, :2]
+            place += np.round((middle - place) / period) * period
 
     def _get_viewer(self, render_mode: str | None) -> OffScreenViewer | WindowViewer:
         viewers: Any = super()
         if render_mode in self._viewers:
             return viewers._get_viewer(render_mode)
         if not self._plain or render_mode == "human":
-            with _fine_floors(self.model, self._floors):
+            # In large squares, coordinates in the shadow map are inexact enough that floors shadow
+            # themselves in places. Contacts do not read the size of a square.
+            with _restored(self.model.geom_size):
+                self.model.geom_size[[*self._floors], 2] = _SQUARE_M
                 return viewers._get_viewer(render_mode)
-        with _small_buffers(self.model):
+        quality = self.model.vis.quality
+        before = quality.offsamples, quality.shadowsize
+        quality.offsamples = quality.shadowsize = 0  # Neither multisampling nor shadow maps.
+        try:
             viewer = viewers._get_viewer(render_mode)
+        finally:
+            quality.offsamples, quality.shadowsize = before
         for flag in _COSTLY:
             viewer.scn.flags[flag] = 0
         return viewer
@@ -139,38 +139,14 @@ def _floors(model: mujoco.MjModel) -> dict[int, NDArray[np.float64]]:
     return found
 
 
-@functools.cache
-def _require_context_once() -> None:
-    """Require that an OpenGL context opens; checked once per process."""
-    require_context()
-
-
 @contextmanager
-def _small_buffers(model: mujoco.MjModel) -> Generator[None]:
-    """Create contexts without multisampling and shadow maps inside this block."""
-    quality = model.vis.quality
-    before = quality.offsamples, quality.shadowsize
-    quality.offsamples = quality.shadowsize = 0
+def _restored(array: NDArray[np.float64]) -> Generator[None]:
+    """Restore the numbers of an array at the end of this block."""
+    before = array.copy()
     try:
         yield
     finally:
-        quality.offsamples, quality.shadowsize = before
-
-
-@contextmanager
-def _fine_floors(model: mujoco.MjModel, floors: Iterable[int]) -> Generator[None]:
-    """Create contexts inside this block whose floors consist of small squares.
-
-    In large ones, coordinates in the shadow map are inexact enough that floors shadow themselves in
-    places. Contacts do not read the size of a square.
-    """
-    chosen = [*floors]
-    before = model.geom_size[chosen, 2].copy()
-    model.geom_size[chosen, 2] = _SQUARE_M
-    try:
-        yield
-    finally:
-        model.geom_size[chosen, 2] = before
+        array[:] = before
 
 
 def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
@@ -191,8 +167,6 @@ _DISTANCE_PER_REACH: Final = 3.0
 _HEADLIGHT: Final = 0.5
 # Geoms of the groups 3 to 5 are not drawn unless a viewer asks for them.
 _HIDDEN_GROUP: Final = 3
-# Value of the depth buffer, from 0 to 1, for a pixel without geoms.
-_FARTHEST: Final = 1.0
 _BACKGROUND: Final = 235
 # Largest width and height, pixels; GPUs do not draw much larger images.
 _LARGEST: Final = 8192
@@ -229,7 +203,7 @@ def draw(
     Bodies drawn with the same reach have the same scale.
 
     Args:
-        model: Model of the body.
+        model: Model of the body, with a sky and a light; see `prepare_scene`.
         pose: Its pose, (nq,).
         width: Width in pixels.
         height: Height in pixels.
@@ -243,40 +217,21 @@ def draw(
             f"An image must be 1 to {_LARGEST} pixels wide and high, got {width} x {height}."
         )
     choose_gl()
-    lit = _well_lit(model, width, height)
-    data = _posed(lit, pose)
+    model = copy.copy(model)
+    buffer = model.vis.global_
+    buffer.offwidth, buffer.offheight = max(buffer.offwidth, width), max(buffer.offheight, height)
+    data = _posed(model, pose)
     camera = {
-        "lookat": _geoms(lit, data)[0],
+        "lookat": _geoms(model, data)[0],
         "distance": _DISTANCE_PER_REACH * reach,
         "azimuth": _AZIMUTH_DEG,
         "elevation": _ELEVATION_DEG,
     }
-    renderer = Renderer(lit, data, camera, width, height, camera_id=-1, shadows=True)
+    renderer = Renderer(model, data, camera, width, height, camera_id=-1, shadows=True)
     try:
-        picture, depth = renderer.render("rgbd_tuple")
+        return np.array(renderer.render("rgb_array"), dtype=np.uint8)
     finally:
         renderer.close()
-    result = np.array(picture, dtype=np.uint8)
-    if not has_sky(lit):
-        # Without a sky the background is black, which hides dark bodies.
-        result[depth >= _FARTHEST] = _BACKGROUND
-    return result
-
-
-def has_sky(model: mujoco.MjModel) -> bool:
-    """Return whether the model has its own background."""
-    return bool((model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX).any())
-
-
-def _well_lit(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:
-    """Return a copy of the model with a large enough frame buffer and a light."""
-    result = copy.copy(model)
-    result.vis.global_.offwidth = max(result.vis.global_.offwidth, width)
-    result.vis.global_.offheight = max(result.vis.global_.offheight, height)
-    if not result.nlight:
-        result.vis.headlight.ambient[:] = _HEADLIGHT
-        result.vis.headlight.diffuse[:] = _HEADLIGHT
-    return result
 
 
 def _posed(model: mujoco.MjModel, pose: NDArray[np.float64]) -> mujoco.MjData:

@@ -375,20 +375,20 @@ class Reshapable(MujocoEnv):
         ):
             lost = [name for name in old.names if name not in new]
             gained = [name for name in new.names if name not in old]
-            bounds_move = space == "action" and not (
-                np.array_equal(old.low, new.low) and np.array_equal(old.high, new.high)
-            )
-            if old.names != new.names or bounds_move:
-                change = "; ".join(
-                    f"{word} {', '.join(names[:3])}{' and more' * (len(names) > 3)}"
-                    for word, names in (("it loses", lost), ("it gains", gained))
-                    if names
-                )
-                if not change:
-                    change = "its bounds move" if bounds_move else "its order changes"
+            changes = [
+                f"{word} {', '.join(names[:3])}{' and more' * (len(names) > 3)}"
+                for word, names in (("it loses", lost), ("it gains", gained))
+                if names
+            ]
+            if not changes and old.names != new.names:
+                changes = ["its order changes"]
+            bounds = [(one.low.tolist(), one.high.tolist()) for one in (old, new)]
+            if not changes and space == "action" and bounds[0] != bounds[1]:
+                changes = ["its bounds move"]
+            if changes:
                 raise SpaceMismatch(
                     f"This body would change the {space} space from {old.size} to {new.size} "
-                    f"numbers ({change}): a reset cannot change a space, so "
+                    f"numbers ({'; '.join(changes)}): a reset cannot change a space, so "
                     "make another env with this body and transfer with a body map."
                 )
 

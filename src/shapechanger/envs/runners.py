@@ -1,4 +1,4 @@
-"""Half cheetah, hopper, walker, swimmer and humanoid: their families of bodies, and their envs.
+"""Half cheetah, hopper, walker and swimmer: their families of bodies, and their envs.
 
 All models are Gymnasium's (MIT).
 """
@@ -20,21 +20,13 @@ try:
     import mujoco
     from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv as GymnasiumHalfCheetahEnv
     from gymnasium.envs.mujoco.hopper_v5 import HopperEnv as GymnasiumHopperEnv
-    from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
     from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv as GymnasiumSwimmerEnv
     from gymnasium.envs.mujoco.walker2d_v5 import Walker2dEnv as GymnasiumWalker2dEnv
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.measure import FORWARD_SPEED, RETURN, Measure
-from shapechanger.envs.layouts import (
-    contact_features,
-    drive_features,
-    inertia_features,
-    position_features,
-    twist_features,
-    velocity_features,
-)
+from shapechanger.envs.layouts import position_features, velocity_features
 from shapechanger.envs.odrl import published
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
@@ -73,20 +65,9 @@ WALKER2D: Final = _runner(
     },
 )
 SWIMMER: Final = Family("Swimmer", {"Swimmer": ()})
-HUMANOID: Final = Family("Humanoid", {"Humanoid": ()})
 
 # Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
 _CLIPPED_AT: Final = 10.0
-# The joints that move a trunk in the world.
-IN_A_PLANE: Final = ("slide", "slide", "hinge")
-IN_SPACE: Final = ("free",)
-
-_KINDS: Final = {
-    mujoco.mjtJoint.mjJNT_FREE: "free",
-    mujoco.mjtJoint.mjJNT_BALL: "ball",
-    mujoco.mjtJoint.mjJNT_SLIDE: "slide",
-    mujoco.mjtJoint.mjJNT_HINGE: "hinge",
-}
 
 
 class Runner(Reshapable):
@@ -110,7 +91,7 @@ class Runner(Reshapable):
     """
 
     measures: ClassVar[tuple[Measure, ...]] = (FORWARD_SPEED, RETURN)
-    root: ClassVar[tuple[str, ...]] = IN_A_PLANE
+    root: ClassVar[tuple[str, ...]] = ("slide", "slide", "hinge")
     place_size: ClassVar[int] = 1
     velocity_limit: ClassVar[float] = math.inf
 
@@ -126,7 +107,7 @@ class Runner(Reshapable):
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
         trunk = [
-            _KINDS[mujoco.mjtJoint(kind)]
+            mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower()
             for kind, body in zip(model.jnt_type, model.jnt_bodyid, strict=True)
             if body == model.jnt_bodyid[0]
         ]
@@ -452,133 +433,3 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     family = SWIMMER
     place_size = 2
-
-
-class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
-    HealthyRunner, GymnasiumHumanoidEnv
-):
-    """Walk forwards on two legs with arms and a waist: `Humanoid-v5` with an editable body.
-
-    Actions, observations, rewards and infos equal `Humanoid-v5`'s.
-
-    ## Action space
-    `Box(-0.4, 0.4, (17,), float32)`: torques of the motors divided by their gears: 300 N·m for the
-    hips' y axes, 200 N·m for the knees, 25 N·m for the arms and 100 N·m for all others. An action
-    lasts 0.015 s.
-
-    | Num | Action                | Min  | Max | Unit |
-    | --- | --------------------- | ---- | --- | ---- |
-    | 0   | abdomen_y/motor       | -0.4 | 0.4 | 1    |
-    | 1   | abdomen_z/motor       | -0.4 | 0.4 | 1    |
-    | 2   | abdomen_x/motor       | -0.4 | 0.4 | 1    |
-    | 3   | right_hip_x/motor     | -0.4 | 0.4 | 1    |
-    | 4   | right_hip_z/motor     | -0.4 | 0.4 | 1    |
-    | 5   | right_hip_y/motor     | -0.4 | 0.4 | 1    |
-    | 6   | right_knee/motor      | -0.4 | 0.4 | 1    |
-    | 7   | left_hip_x/motor      | -0.4 | 0.4 | 1    |
-    | 8   | left_hip_z/motor      | -0.4 | 0.4 | 1    |
-    | 9   | left_hip_y/motor      | -0.4 | 0.4 | 1    |
-    | 10  | left_knee/motor       | -0.4 | 0.4 | 1    |
-    | 11  | right_shoulder1/motor | -0.4 | 0.4 | 1    |
-    | 12  | right_shoulder2/motor | -0.4 | 0.4 | 1    |
-    | 13  | right_elbow/motor     | -0.4 | 0.4 | 1    |
-    | 14  | left_shoulder1/motor  | -0.4 | 0.4 | 1    |
-    | 15  | left_shoulder2/motor  | -0.4 | 0.4 | 1    |
-    | 16  | left_elbow/motor      | -0.4 | 0.4 | 1    |
-
-    ## Observation space
-    `Box(-inf, inf, (348,), float64)`, for the unedited body:
-
-    | Num     | Observation           | Min     | Max      | Unit            |
-    | ------- | --------------------- | ------- | -------- | --------------- |
-    | 0       | torso/z               | -inf    | inf      | m               |
-    | 1       | torso/qw              | -1      | 1        | 1               |
-    | 2       | torso/qx              | -1      | 1        | 1               |
-    | 3       | torso/qy              | -1      | 1        | 1               |
-    | 4       | torso/qz              | -1      | 1        | 1               |
-    | 5       | abdomen_z/angle       | -0.7854 | 0.7854   | rad             |
-    | 6       | abdomen_y/angle       | -1.309  | 0.5236   | rad             |
-    | 7       | abdomen_x/angle       | -0.6109 | 0.6109   | rad             |
-    | 8       | right_hip_x/angle     | -0.4363 | 0.08727  | rad             |
-    | 9       | right_hip_z/angle     | -1.047  | 0.6109   | rad             |
-    | 10      | right_hip_y/angle     | -1.92   | 0.3491   | rad             |
-    | 11      | right_knee/angle      | -2.793  | -0.03491 | rad             |
-    | 12      | left_hip_x/angle      | -0.4363 | 0.08727  | rad             |
-    | 13      | left_hip_z/angle      | -1.047  | 0.6109   | rad             |
-    | 14      | left_hip_y/angle      | -1.92   | 0.3491   | rad             |
-    | 15      | left_knee/angle       | -2.793  | -0.03491 | rad             |
-    | 16      | right_shoulder1/angle | -1.484  | 1.047    | rad             |
-    | 17      | right_shoulder2/angle | -1.484  | 1.047    | rad             |
-    | 18      | right_elbow/angle     | -1.571  | 0.8727   | rad             |
-    | 19      | left_shoulder1/angle  | -1.047  | 1.484    | rad             |
-    | 20      | left_shoulder2/angle  | -1.047  | 1.484    | rad             |
-    | 21      | left_elbow/angle      | -1.571  | 0.8727   | rad             |
-    | 22      | torso/vx              | -inf    | inf      | m/s             |
-    | 23      | torso/vy              | -inf    | inf      | m/s             |
-    | 24      | torso/vz              | -inf    | inf      | m/s             |
-    | 25      | torso/wx              | -inf    | inf      | rad/s           |
-    | 26      | torso/wy              | -inf    | inf      | rad/s           |
-    | 27      | torso/wz              | -inf    | inf      | rad/s           |
-    | 28-44   | */velocity            | -inf    | inf      | rad/s           |
-    | 45-174  | */inertia/*           | -inf    | inf      | kg·m², kg·m, kg |
-    | 175-252 | */twist/*             | -inf    | inf      | rad/s, m/s      |
-    | 253-269 | */drive               | -inf    | inf      | N·m             |
-    | 270-347 | */contact/*           | -inf    | inf      | N·m, N          |
-
-    ## Reward
-    `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 5 while healthy, plus 1.25 times
-    the velocity of the centre of mass along x, m/s, minus `0.1 sum(action^2)`, minus `5e-7
-    sum(force^2)` of the contact forces and torques, which is at most 10.
-
-    ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.01). Joints
-    stay inside their limits and feet above the floor. The knees start at their limit, bent by 2
-    degrees, where Gymnasium's start straight.
-
-    ## End
-    Terminated when the torso is below 1 m or above 2 m. For other bodies these heights scale with
-    their standing height. Truncated after 1,000 steps.
-
-    ## Info
-    `x_position`, `y_position` and `distance_from_origin`, m; `x_velocity` and `y_velocity`, m/s;
-    `tendon_length`, m, and `tendon_velocity`, m/s; `reward_forward`, `reward_ctrl`,
-    `reward_contact` and `reward_survive`. `diverged` if the simulation has diverged.
-
-    ## Versions
-    v1: the first.
-
-    Args:
-        body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON.
-        healthy_z_range: Heights of the torso between which the body is healthy, m; None
-            derives them from the body.
-        **arguments: All other arguments of `Humanoid-v5` and of `Reshapable`.
-    """
-
-    family = HUMANOID
-    root = IN_SPACE
-    place_size = 2
-
-    def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
-        blocks = {
-            "cinert": inertia_features,
-            "cvel": twist_features,
-            "qfrc_actuator": drive_features,
-            "cfrc_ext": _unclipped_contact_features,
-        }
-        self._blocks = [
-            features
-            for name, features in blocks.items()
-            if arguments.get(f"include_{name}_in_observation", True)
-        ]
-        super()._begin(body, arguments)
-
-    def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
-        features = super()._observation_features(model)
-        for block in self._blocks:
-            features += block(model)
-        return features
-
-
-def _unclipped_contact_features(model: mujoco.MjModel) -> list[Feature]:
-    return contact_features(model, -math.inf, math.inf)

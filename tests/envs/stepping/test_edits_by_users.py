@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -11,8 +12,8 @@ import pytest
 
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.pendulum import InvertedPendulumEnv
-from shapechanger.envs.stepping import ModelWatch
-from shapechanger.envs.stepping import fast_model as twin
+from shapechanger.envs.stepping import watch as watches
+from shapechanger.envs.stepping.watch import ModelWatch
 from tests.envs.stepping.side_by_side import same
 
 _MODEL = AntEnv().model
@@ -124,7 +125,7 @@ def _play(envs: tuple[Any, Any], steps: int, seed: int) -> None:
 def test_an_edit_takes_effect(edit: Edit) -> None:
     """Edits count between and within episodes, and no more once they are undone."""
     ours, _ = envs = _ants()
-    kept = [(env.model, _saved(env.model)) for env in envs]
+    kept = [(env.model, copy.copy(env.model)) for env in envs]
     for env in envs:
         env.reset(seed=0)
     _play(envs, 10, seed=0)
@@ -146,7 +147,7 @@ def test_an_edit_takes_effect(edit: Edit) -> None:
 
 def test_an_edit_before_the_first_step_takes_effect() -> None:
     """The fast model is searched only while the model is unedited."""
-    twin.forget_fast_models()
+    watches.snapshots.clear()
     ours, theirs = envs = _ants()
     for env in envs:
         env.model.body_mass[1] *= 1.75
@@ -254,16 +255,9 @@ def _other(value: Any, kind: np.dtype[Any]) -> Any:
     return np.nextafter(value, np.inf, dtype=kind) if kind.kind == "f" else value ^ 1
 
 
-def _saved(model: Any) -> bytes:
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
-
-
-def _restore(model: Any, saved: bytes) -> None:
-    """Write back all numbers of a saved model."""
-    original = mujoco.MjModel.from_binary_path("m", {"m": saved})
-    for name in (*_ARRAYS,):
+def _restore(model: Any, original: Any) -> None:
+    """Write back all numbers of a copied model."""
+    for name in _ARRAYS:
         getattr(model, name)[...] = getattr(original, name)
     for part in ("opt", "stat"):
         for name in dir(getattr(model, part)):
@@ -273,21 +267,6 @@ def _restore(model: Any, saved: bytes) -> None:
                     getattr(getattr(model, part), name)[:] = value
                 else:
                     setattr(getattr(model, part), name, value)
-
-
-def test_an_edit_before_the_first_step_can_be_undone() -> None:
-    """The fast model then uses the compiled timestep instead of the edited one."""
-    ours, theirs = AntEnv(), AntEnv(fast_model=False)
-    AntEnv().reset(seed=0)
-    for env in (ours, theirs):
-        env.reset(seed=0)
-        timestep = env.model.opt.timestep
-        env.model.opt.timestep = 0.005
-        env.step(np.zeros(8))
-        env.model.opt.timestep = timestep
-    for _ in range(3):
-        assert same(ours.step(np.full(8, 0.2)), theirs.step(np.full(8, 0.2)))
-    assert ours._bound.has_fast_model
 
 
 @pytest.mark.parametrize("undone", [False, True])

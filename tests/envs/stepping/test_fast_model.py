@@ -11,9 +11,8 @@ import pytest
 
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.pendulum import InvertedPendulumEnv
-from shapechanger.envs.stepping import ModelWatch, find_fast_model
-from shapechanger.envs.stepping import fast_model as twin
-from shapechanger.envs.stepping.fast_model import moves_equally
+from shapechanger.envs.stepping import watch
+from shapechanger.envs.stepping.fast_model import find_fast_model, moves_equally
 
 _ISLAND = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 _CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -67,7 +66,7 @@ def _searches(fast: mujoco.MjModel) -> bool:
 
 def _fast_model_of(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, mujoco.MjModel | None]:
     model = spec.compile()
-    return model, find_fast_model(ModelWatch(model), spec.copy)
+    return model, find_fast_model(model, spec.copy)
 
 
 def _knows_its_pairs(model: mujoco.MjModel) -> bool:
@@ -239,66 +238,57 @@ def test_a_contact_filter_prevents_a_fast_model() -> None:
         mujoco.set_mjcb_contactfilter(None)
 
 
-def test_a_wrong_margin_is_detected() -> None:
-    """`moves_equally` detects margins that are not summed."""
-    ant = AntEnv()
-    fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
-    assert moves_equally(ant.model, fast)
-    fast.pair_margin[:] = 0.01
-    assert not moves_equally(ant.model, fast)
-
-
 @pytest.mark.parametrize(
     "change",
     [
         lambda model: model.pair_friction.__setitem__((3, 0), 0.9),
         lambda model: model.pair_solimp.__setitem__((12, 0), 0.89),
         lambda model: model.pair_gap.__setitem__(5, 0.3),
+        lambda model: model.pair_margin.__setitem__(slice(None), 0.01),  # Margins are summed.
         lambda model: model.body_mass.__setitem__(4, 0.1),
         lambda model: setattr(model.opt, "iterations", 1),
         lambda model: setattr(model.opt, "jacobian", mujoco.mjtJacobian.mjJAC_SPARSE),
     ],
-    ids=["friction", "impedance", "gap", "mass", "iterations", "sparse"],
+    ids=["friction", "impedance", "gap", "margins", "mass", "iterations", "sparse"],
 )
-def test_any_other_difference_is_detected(change: Any) -> None:
+def test_any_difference_is_detected(change: Any) -> None:
     """`moves_equally` detects differences of a pair, a body and the solver."""
     ant = AntEnv()
-    fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
+    fast = copy.copy(find_fast_model(ant.model, ant.body_spec))
+    assert moves_equally(ant.model, fast)
     change(fast)
     assert not moves_equally(ant.model, fast)
 
 
-def test_the_search_waits_for_enough_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search starts after `patience` steps, unless another env has the result."""
-    monkeypatch.setattr(AntEnv, "patience", 3)
-    twin.forget_fast_models()
-    first, second = AntEnv(), AntEnv()
-    for env in (first, second):
-        env.reset(seed=0)
-        for step in range(5):
-            env.step(np.zeros(8))
-            assert env._bound.has_fast_model is (True if step >= 3 or env is second else None)
-
-
 def test_envs_of_a_body_count_steps_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search starts after `patience` steps; an env that is made later has its result."""
     monkeypatch.setattr(AntEnv, "patience", 6)
+    watch.snapshots.clear()
     envs = [AntEnv(), AntEnv(), AntEnv()]
     for env in envs:
         env.reset(seed=0)
-    twin.forget_fast_models()
     for step in range(4):
         for env in envs:
             env.step(np.zeros(8))
             assert env._bound.has_fast_model is (True if step >= 2 else None)
+    late = AntEnv()
+    late.reset(seed=0)
+    late.step(np.zeros(8))
+    assert late._bound.stepping is envs[0]._bound.stepping
 
 
-def test_the_cache_of_fast_models_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cache keeps the most recent bodies."""
-    monkeypatch.setattr(twin, "_REMEMBERED", 2)
-    twin.forget_fast_models()
-    for friction in (0.3, 0.4, 0.5, 0.4):
-        assert _fast_model_of(_scene(floor=f'friction="{friction} 0.1 0.1"'))[1] is not None
-    assert len(twin._fast_models) == 2
+def test_the_number_of_remembered_bodies_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The most recent bodies are kept, with their fast models."""
+    monkeypatch.setattr(watch, "_REMEMBERED", 2)
+    found = []
+    for body in ("Ant", "BigAnt", "AmputatedAnt", "BigAnt", "Ant"):
+        env = AntEnv(body)
+        env.reset(seed=0)
+        env.step(np.zeros(8))
+        found.append(env._bound.stepping)
+    assert found[1] is found[3]
+    assert found[0] is not found[4]
+    assert len(watch.snapshots) == 2
 
 
 def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
@@ -324,13 +314,5 @@ def test_a_spec_of_another_model_gives_no_pairs() -> None:
     model = spec.compile()
     heavier = spec.copy()
     heavier.geoms[-1].density = 2.0 * heavier.geoms[-1].density
-    watch = ModelWatch(model)
-    fast = find_fast_model(watch, lambda: heavier)
+    fast = find_fast_model(model, lambda: heavier)
     assert fast is None or not _knows_its_pairs(fast)
-
-
-def test_forgetting_resets_the_counted_steps() -> None:
-    watch = ModelWatch(mujoco.MjModel.from_xml_string("<mujoco/>"))
-    watch.snapshot.steps = 3
-    twin.forget_fast_models()
-    assert watch.snapshot.steps == 0

@@ -36,8 +36,10 @@ def test_at_least_one_env_and_thread_are_needed(count: Any) -> None:
             shapechanger.make_vec("Ant", 2, threads=count)
     with pytest.raises(VectorEnvError, match="at least one env, got 0"):
         gym.make_vec("shapechanger/Ant-v1", num_envs=0)
-    with pytest.raises(VectorEnvError, match="at least one env"):
+    with pytest.raises(VectorEnvError, match="at least one env, got 0"):
         ThreadVectorEnv([])
+    with pytest.raises(VectorEnvError, match="at least one thread, got 0"):
+        ThreadVectorEnv([lambda: gym.make("CartPole-v1")], threads=0)
 
 
 def test_each_env_has_one_body() -> None:
@@ -87,6 +89,12 @@ def test_unknown_ids_and_modes_are_refused() -> None:
     ("arguments", "sentence"),
     [
         ({"backend": "warp", "pool": []}, "a `pool` of some bodies"),
+        ({"backend": "warp", "bodies": ["Ant"] * 2, "pool": ["Ant"]}, "either `bodies`, one per"),
+        ({"backend": "warp", "threads": 2}, "has no threads"),
+        ({"backend": "warp", "copy": False}, "always copies observations"),
+        ({"backend": "warp", "njmax": 0}, "needs at least one njmax, got 0"),
+        ({"backend": "warp", "render_mode": "rgb_array"}, "takes no render_mode: nothing is drawn"),
+        ({"backend": "warp", "towards": "BigAnt"}, "takes no towards: a reset draws no body"),
         ({"backend": "warp", "autoreset_mode": "Disabled"}, "has no autoreset mode Disabled"),
         ({"pool": ["Ant"]}, "backend='threads' has no pool: use backend='warp'"),
         ({"njmax": 3}, "backend='threads' has no njmax"),

@@ -10,7 +10,7 @@ from gymnasium.vector import VectorEnv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.envs.vector.infos import InfoColumns, StepResults, batched, in_columns
+from shapechanger.envs.vector.results import InfoColumns, StepResults, batched, in_columns
 from tests.envs.vector.sameness import require_same
 
 _VECTOR = np.arange(3.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from collections import deque
 from typing import Any
 
 import gymnasium as gym
@@ -19,7 +18,6 @@ from shapechanger.envs import CATALOGUE
 from shapechanger.envs import make_vec as entry_points
 from shapechanger.envs.checks import require_same_spaces
 from shapechanger.envs.vector import ThreadVectorEnv
-from shapechanger.envs.vector.batch import _work_off
 from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.errors import SpaceMismatch, UnknownName, VectorEnvError
 from shapechanger.morphology import Stretch
@@ -45,15 +43,6 @@ def test_gymnasium_makes_the_same_envs(env_id: str) -> None:
         one.close()
 
 
-def test_threads_are_an_argument_of_gymnasiums_make_vec() -> None:
-    """`threads` is a keyword; Gymnasium refuses `vector_kwargs` for entry points."""
-    envs: Any = gym.make_vec("shapechanger/Ant-v1", num_envs=3, threads=2)
-    assert envs.threads == 2
-    envs.close()
-    with pytest.raises(gym.error.Error, match="only through kwargs"):
-        gym.make_vec("shapechanger/Ant-v1", num_envs=3, vector_kwargs={"threads": 2})
-
-
 def test_a_backend_of_worlds_on_a_device() -> None:
     """Its arguments and the threads' exclude each other; the spec makes an equal env."""
     bodies = ["InvertedPendulum", "BigInvertedPendulum"]
@@ -65,36 +54,10 @@ def test_a_backend_of_worlds_on_a_device() -> None:
     assert isinstance(again, WarpVectorEnv)
     assert again.bodies == envs.bodies
     assert again.max_episode_steps == envs.max_episode_steps == 7
-    with pytest.raises(VectorEnvError, match="has no threads"):
-        shapechanger.make_vec("Ant", 2, backend="warp", threads=2)
     with pytest.raises(VectorEnvError, match="has no device: use backend='warp'"):
         shapechanger.make_vec("Ant", 2, device="cpu")
     with pytest.raises(UnknownName, match=r"No backend matches 'wrap'\. Did you mean 'warp'"):
         shapechanger.make_vec("Ant", 2, backend="wrap")
-
-
-def test_a_vector_env_of_one_env() -> None:
-    """Results equal the single env's, with a batch axis."""
-    envs, alone = shapechanger.make_vec("Ant"), gym.make("shapechanger/Ant-v1")
-    assert envs.num_envs == envs.threads == 1
-    observations, _ = envs.reset(seed=3)
-    assert observations.tolist() == [alone.reset(seed=3)[0].tolist()]
-    action = np.full(8, 0.3, np.float32)
-    for _ in range(3):
-        observations, rewards, terminated, truncated, _ = envs.step(action[None])
-        expected = alone.step(action)
-        assert observations.tolist() == [expected[0].tolist()]
-        assert rewards.tolist() == [expected[1]]
-        assert (terminated.tolist(), truncated.tolist()) == ([expected[2]], [expected[3]])
-    envs.close()
-    alone.close()
-
-
-def test_gymnasiums_vector_envs_are_available() -> None:
-    """`vectorization_mode="sync"` makes Gymnasium's SyncVectorEnv."""
-    envs = gym.make_vec("shapechanger/Ant-v1", num_envs=2, vectorization_mode="sync")
-    assert isinstance(envs, gym.vector.SyncVectorEnv)
-    envs.close()
 
 
 def test_spaces_equal_gymnasiums() -> None:
@@ -231,14 +194,6 @@ def test_importing_make_vec_loads_no_simulator() -> None:
     assert run.stdout == "False\n"
 
 
-def test_empty_vector_envs_are_refused() -> None:
-    """At least one env and one thread are needed."""
-    with pytest.raises(VectorEnvError, match="at least one env, got 0"):
-        ThreadVectorEnv([])
-    with pytest.raises(VectorEnvError, match="at least one thread, got 0"):
-        ThreadVectorEnv([lambda: _Bounded(1.0)], threads=0)
-
-
 class _Bounded(gym.Env[Any, Any]):
     """Env without a body, a layout or a spec."""
 
@@ -252,14 +207,3 @@ def test_other_bounds_are_refused() -> None:
     require_same_spaces([_Bounded(1.0), _Bounded(1.0)])
     with pytest.raises(SpaceMismatch, match=r"env 1 \(_Bounded\) has other bounds than env 0"):
         require_same_spaces([_Bounded(1.0), _Bounded(2.0)])
-
-
-def test_a_thread_without_tasks_ends() -> None:
-    """A thread ends quietly if another one takes the last task first."""
-
-    def take() -> Any:
-        raise IndexError
-
-    failures: list[tuple[int, Exception]] = []
-    _work_off(deque([(0, failures.append)]), take, failures)  # type: ignore[list-item]
-    assert failures == []

@@ -21,7 +21,8 @@ import torch
 from torch.overrides import TorchFunctionMode
 from torch.utils._pytree import tree_leaves
 
-from shapechanger.envs.warp import devices, env, make, noise, worlds
+from shapechanger.envs import warp
+from shapechanger.envs.warp import devices, env, noise, worlds
 from shapechanger.envs.warp.devices import wp
 
 _CPU = torch.device("cpu")
@@ -175,7 +176,7 @@ def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevic
     def run(self: Any, name: str, function: Any) -> None:
         """Leave the physics out, which asks and copies nothing."""
 
-    monkeypatch.setattr(make, "find_device", lambda name: "cuda:0")
+    monkeypatch.setattr(warp, "find_device", lambda name: "cuda:0")
     monkeypatch.setattr(worlds, "on", on)
     monkeypatch.setattr(noise, "on", on)
     # There are no streams without a GPU.

@@ -67,26 +67,6 @@ def test_a_changed_task_has_no_batched_functions() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        ({"render_mode": "rgb_array"}, "takes no render_mode: nothing is drawn on the device"),
-        ({"towards": "BigAnt"}, "takes no towards: a reset draws no body by itself"),
-        ({"threads": 2}, "has no threads"),
-        ({"copy": False}, "always copies observations"),
-        ({"bodies": ["Ant"]}, "There are 2 envs and 1 bodies"),
-        ({"bodies": ["Ant"] * 2, "pool": ["Ant"]}, "either `bodies`, one per world, or a `pool`"),
-        ({"pool": []}, "a `pool` of some bodies"),
-        ({"njmax": 0}, "needs at least one njmax, got 0"),
-        ({"autoreset_mode": "NextStep"}, "no autoreset mode NextStep: its worlds start again"),
-    ],
-)
-def test_arguments_without_meaning(arguments: dict[str, Any], sentence: str) -> None:
-    """The error says why, and what to do instead."""
-    with pytest.raises(VectorEnvError, match=sentence):
-        shapechanger.make_vec("Ant", 2, backend="warp", device="cpu", **arguments)
-
-
-@pytest.mark.parametrize(
     ("actions", "sentence"),
     [
         (torch.zeros(2, 2), r"numbers of shape \(2, 1\), got torch.float32 of shape \(2, 2\)"),

@@ -137,11 +137,12 @@ def test_the_noise_never_changes() -> None:
     torch.testing.assert_close(drawn, expected, rtol=0.0, atol=1e-15)
 
 
-def test_a_world_that_diverges_restarts_alone() -> None:
+@pytest.mark.parametrize("velocity", [torch.nan, 1e12])
+def test_a_world_that_diverges_restarts_alone(velocity: float) -> None:
     """Its reward is 0, its number is true in `diverged`, and the others step as ever."""
     whole, broken = pendulums(), pendulums()
     still = torch.zeros(WORLDS, 1)
-    broken.batches[0].worlds.qvel[1] = torch.nan
+    broken.batches[0].worlds.qvel[1] = velocity
     expected, found = whole.step(still), broken.step(still)
     for one, other in zip(found[:4], expected[:4], strict=True):
         assert torch.equal(one[[0, 2]], other[[0, 2]])
@@ -169,14 +170,6 @@ def test_inference_mode_and_gradients_leave_no_trace() -> None:
     assert not observations.requires_grad
     assert not rewards.requires_grad
     assert not envs.batches[0].worlds.qpos.requires_grad
-
-
-def test_huge_numbers_diverge_too() -> None:
-    """As in MuJoCo, a velocity above 1e10 has diverged."""
-    envs = pendulums()
-    envs.batches[0].worlds.qvel[2] = 1e12
-    *_, infos = envs.step(torch.zeros(WORLDS, 1))
-    assert infos["diverged"].tolist() == [False, False, True]
 
 
 def test_a_closed_or_new_vector_env_does_not_step() -> None:

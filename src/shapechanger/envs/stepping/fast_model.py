@@ -18,8 +18,6 @@ either fails keeps its contact search, or has no fast model at all.
 from __future__ import annotations
 
 import copy
-import threading
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from typing import Any, Final, cast
 
@@ -27,7 +25,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.stepping.watch import ModelWatch, forget_steps
 from shapechanger.morphology.certificate.numbers import (
     colliding_pairs,
     geoms_of_pairs,
@@ -42,101 +39,57 @@ _NO_SEARCH: Final = int(_BIT.mjDSBL_MIDPHASE)
 _NO_CONTACTS: Final = int(_BIT.mjDSBL_CONTACT)
 # Elements that could split one tree into islands, or that the rules do not cover.
 _UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield")
-# Size of the cache; fast models of envs in use stay alive without it.
-_REMEMBERED: Final = 32
-
-_fast_models: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()
-_lock = threading.Lock()
 
 
 def find_fast_model(
-    watch: ModelWatch, make_spec: Callable[[], mujoco.MjSpec]
+    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
 ) -> mujoco.MjModel | None:
-    """Return a cheaper model that steps the data of a watched model and moves equally.
-
-    The result is cached, and all envs of a body share it: do not write to it.
+    """Return a cheaper model that steps the data of another and moves equally.
 
     Args:
-        watch: Watch of the compiled, unedited model.
+        model: The compiled, unedited model.
         make_spec: Returns the spec that the model was compiled from.
 
     Returns:
         The fast model; None if none is known to move equally.
     """
-    name = watch.digest
-    with _lock:  # Of several threads with the same body, one searches.
-        if name not in _fast_models:
-            _fast_models[name] = next(
-                (
-                    candidate
-                    for candidate in _candidates(watch.model, make_spec)
-                    if moves_equally(watch.model, candidate)
-                ),
-                None,
-            )
-            while len(_fast_models) > _REMEMBERED:
-                _fast_models.popitem(last=False)
-        return _fast_models[name]
-
-
-def forget_fast_models() -> None:
-    """Clear the cache and the counted steps, to measure the time of a search."""
-    with _lock:
-        _fast_models.clear()
-    forget_steps()
-
-
-def known_fast_model(watch: ModelWatch) -> mujoco.MjModel | None:
-    """Return the fast model of the watched model, if it has been found."""
-    name = watch.digest
-    with _lock:
-        if name in _fast_models:
-            _fast_models.move_to_end(name)
-        return _fast_models.get(name)
+    candidates = _candidates(model, make_spec)
+    return next((each for each in candidates if moves_equally(model, each)), None)
 
 
 def _candidates(
     model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
 ) -> Iterator[mujoco.MjModel]:
     """Yield the models that the rules allow, the cheapest first."""
-    if _is_one_tree(model):
-        without_search = _without_search(model, make_spec)
-        if without_search is not None:
-            yield without_search
-        yield _in_one_piece(model)
-
-
-def _is_one_tree(model: mujoco.MjModel) -> bool:
-    """Return whether all constraints are in one tree, and the rules cover all elements."""
-    return (
+    # Others may have constraints in several trees, or elements that the rules do not cover.
+    if (
         model.ntree == 1
         and not model.opt.enableflags
         and not any(getattr(model, size) for size in _UNKNOWN)
         and mujoco.get_mjcb_contactfilter() is None
-    )
+    ):
+        without_search = _without_search(model, make_spec)
+        if without_search is not None:
+            yield without_search
+        yield _without(model, _NO_ISLANDS)
 
 
-def _in_one_piece(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return the model without the search for islands."""
-    result = copy.copy(model)
-    result.opt.disableflags |= _NO_ISLANDS | _idle(model)
-    return result
-
-
-def _idle(model: mujoco.MjModel) -> int:
-    """Return the disable flags of everything that a model lacks, such as tendons."""
+def _without(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:
+    """Return a model with more disable flags, and with those of everything that it lacks."""
     # If both springs and dampers are disabled, MuJoCo skips all other passive forces too, such as
     # fluid forces.
     has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
     has_springs = model.jnt_stiffness.any() or model.jnt_stiffnesspoly.any()
-    idle = int(_BIT.mjDSBL_EQUALITY)
+    flags |= int(_BIT.mjDSBL_EQUALITY)
     if has_dampers and not has_springs:
-        idle |= int(_BIT.mjDSBL_SPRING)
+        flags |= int(_BIT.mjDSBL_SPRING)
     if not model.dof_frictionloss.any():
-        idle |= int(_BIT.mjDSBL_FRICTIONLOSS)
+        flags |= int(_BIT.mjDSBL_FRICTIONLOSS)
     if not model.nsensor:
-        idle |= int(_BIT.mjDSBL_SENSOR)
-    return idle
+        flags |= int(_BIT.mjDSBL_SENSOR)
+    result = copy.copy(model)
+    result.opt.disableflags |= flags
+    return result
 
 
 def _without_search(
@@ -147,9 +100,7 @@ def _without_search(
         return None
     _, pairs = colliding_pairs(model)
     if not pairs.size:
-        result = copy.copy(model)
-        result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS | _idle(model)
-        return result
+        return _without(model, _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS)
     names = [model.geom(geom).name for geom in range(model.ngeom)]
     if not _on_one_floor(model, pairs) or not all(names):
         return None
@@ -170,8 +121,7 @@ def _without_search(
         result.body_conaffinity,
     ):
         bits[:] = 0
-    result.opt.disableflags |= _NO_ISLANDS | _NO_SEARCH | _idle(model)
-    return result
+    return _without(result, _NO_ISLANDS | _NO_SEARCH)
 
 
 def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
@@ -209,19 +159,8 @@ def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
 # Fields that must be equal after every step; they include everything that the next step uses.
 _FIELDS: Final = (
     *("time", "qpos", "qvel", "act", "qacc", "qacc_warmstart", "qfrc_constraint", "xpos", "xquat"),
-    *(
-        "qfrc_passive",
-        "qfrc_spring",
-        "qfrc_damper",
-        "geom_xpos",
-        "cinert",
-        "cvel",
-        "cfrc_ext",
-        "cfrc_int",
-        "cacc",
-        "actuator_force",
-        "sensordata",
-    ),
+    *("qfrc_passive", "qfrc_spring", "qfrc_damper", "geom_xpos", "cinert", "cvel", "cfrc_ext"),
+    *("cfrc_int", "cacc", "actuator_force", "sensordata", "ncon", "nefc"),
 )
 _OF_CONTACTS: Final = (
     *("geom", "dist", "pos", "frame", "includemargin", "friction", "solref", "solreffriction"),
@@ -267,7 +206,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
             mujoco.mj_step(other, two)
             mujoco.mj_rnePostConstraint(model, one)
             mujoco.mj_rnePostConstraint(other, two)
-            if not _same(one, two):
+            if not (_same(one, two, _FIELDS) and _same(one.contact, two.contact, _OF_CONTACTS)):
                 return False
             touched.update(map(tuple, one.contact.geom.tolist()))
     if other.npair == model.npair:
@@ -276,16 +215,12 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     return all((a, b) in touched or (b, a) in touched for a, b in pairs.tolist())
 
 
-def _same(one: mujoco.MjData, two: mujoco.MjData) -> bool:
-    if one.ncon != two.ncon or one.nefc != two.nefc:
-        return False
-    return all(_equal(getattr(one, name), getattr(two, name)) for name in _FIELDS) and all(
-        _equal(getattr(one.contact, name), getattr(two.contact, name)) for name in _OF_CONTACTS
+def _same(one: Any, two: Any, names: tuple[str, ...]) -> bool:
+    """Return whether some fields of two objects have the same bytes."""
+    return all(
+        np.asarray(getattr(one, name)).tobytes() == np.asarray(getattr(two, name)).tobytes()
+        for name in names
     )
-
-
-def _equal(one: Any, two: Any) -> bool:
-    return np.asarray(one).tobytes() == np.asarray(two).tobytes()
 
 
 def _drawn(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
-from typing import Any, ClassVar, Final, Literal, NamedTuple, cast
+from typing import Any, ClassVar, Final, Literal, cast
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.reshapable import BAD_STATE, Reshapable
-from shapechanger.envs.stepping.fast_model import find_fast_model, known_fast_model
+from shapechanger.envs.stepping.fast_model import find_fast_model
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
 
@@ -20,27 +21,12 @@ StepResult = tuple[NDArray[np.float64], Any, bool, Literal[False], dict[str, Any
 NO_WARNINGS: Final = [0, 0, 0]
 """`Binding.warnings` of a simulation that has not diverged."""
 
-
-# What a binding holds views or copies of.
-_BOUND_TO: Final = frozenset({"model", "data", "frame_skip"})
+_searching: Final = threading.Lock()
 
 
-class Outcomes(NamedTuple):
-    """Results of one step of n envs of one kind.
-
-    Attributes:
-        observations: Shape (n, size of one observation).
-        rewards: Shape (n,).
-        terminated: Whether the step ended each episode, shape (n,).
-        infos: One value per env for each key of an info.
-        diverged: Indices of the envs whose simulation has diverged.
-    """
-
-    observations: NDArray[np.float64]
-    rewards: NDArray[Any]
-    terminated: NDArray[np.bool_]
-    infos: dict[str, Any]
-    diverged: Sequence[int]
+Outcomes = tuple[NDArray[np.float64], NDArray[Any], NDArray[np.bool_], dict[str, Any]]
+"""Results of one step of n envs of one kind: observations, shape (n, size); rewards and ends, shape
+(n,); and one value per env for each key of an info."""
 
 
 class Binding:
@@ -48,8 +34,7 @@ class Binding:
 
     Args:
         watch: Watch of the public model.
-        data: The public data.
-        frame_skip: Physics steps per action.
+        env: The env.
 
     Attributes:
         model: The public model.
@@ -60,12 +45,10 @@ class Binding:
         warnings: View of MuJoCo's counts of bad positions, velocities and accelerations, (3,).
         kind: Envs with the same kind are concluded together; empty for an env that steps by
             itself, None until it is known. It is renewed after each reset.
-        valid: Whether the binding may be used again without `ready_together`, as long as the model
-            is unedited.
     """
 
-    def __init__(self, watch: ModelWatch, data: mujoco.MjData, frame_skip: int) -> None:
-        model = watch.model
+    def __init__(self, watch: ModelWatch, env: TunedStep) -> None:
+        model, data, frame_skip = watch.model, env.data, env.frame_skip
         self.watch = watch
         self.unedited = watch.unedited
         self.model = model
@@ -80,7 +63,6 @@ class Binding:
         self.qvel = data.qvel
         self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
-        self.valid = False
 
     def step_with(self, fast: mujoco.MjModel | None) -> None:
         """Step with a fast model from now on; with None, the public model keeps stepping."""
@@ -100,14 +82,17 @@ class TunedStep(Reshapable):
     methods step it. They also step if a subclass overrides one of the methods in `replaced`, or if
     `model` has been replaced.
 
-    Subclasses implement `_advance`, list in `replaced` what it stands for, and set `tuned`.
+    Subclasses implement `_advance`, list in `replaced` what it stands for, and set `tuned` and
+    `binding`.
 
     To step many envs together, call `ready_together` of each, set their controls, call `move` of
-    each binding, and then `conclude` once for all bindings of one `kind`.
+    each binding, and then `conclude` once for all bindings of one `kind`. Whether a simulation has
+    diverged is in the `warnings` of its binding.
 
     Attributes:
         replaced: Methods and properties that `_advance` stands for.
         tuned: The class that `_advance` was written for.
+        binding: Class of its bindings.
         patience: Steps with a body, summed over all envs that have it, before a fast model is
             looked for. Finding an ant's takes 20 ms and saves 0.05 ms a step, so it would not pay
             for a body that soon changes. Results do not depend on when the fast model takes over.
@@ -115,6 +100,7 @@ class TunedStep(Reshapable):
 
     replaced: ClassVar[tuple[str, ...]] = ()
     tuned: ClassVar[type[TunedStep]]
+    binding: ClassVar[type[Binding]]
     patience: ClassVar[int] = 400
 
     fast_model: bool = True
@@ -146,13 +132,12 @@ class TunedStep(Reshapable):
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute; a new model, data or frame skip invalidates the binding."""
         super().__setattr__(name, value)
-        if name in _BOUND_TO:
+        if name in ("model", "data", "frame_skip"):
             self._invalidate()
 
     def _invalidate(self) -> None:
         if self._bound is not None:
             self._bound.kind = None
-            self._bound.valid = False
 
     def render(self) -> Any:
         """Return a frame, or None where a window shows it.
@@ -199,7 +184,6 @@ class TunedStep(Reshapable):
             return None
         if bound.kind is None:
             bound.kind = self._kind_of(bound)
-        bound.valid = bool(bound.kind and bound.has_fast_model)
         return bound if bound.kind else None
 
     def _kind_of(self, bound: Any) -> str:
@@ -230,10 +214,6 @@ class TunedStep(Reshapable):
         """Take one step, with the observation written to `out` if given."""
         raise NotImplementedError
 
-    def _bind(self, watch: ModelWatch) -> Binding:
-        """Return views of the present data."""
-        raise NotImplementedError
-
     def _ready(self) -> Any:
         """Return the binding to step with; None where Gymnasium's methods must step."""
         bound = self._bound
@@ -249,9 +229,14 @@ class TunedStep(Reshapable):
         if bound.has_fast_model:
             return bound if bound.unedited() else None
         if bound.has_fast_model is None and self.fast_model:
-            bound.watch.snapshot.steps += 1
-            if bound.watch.snapshot.steps > self.patience and bound.unedited():
-                bound.step_with(find_fast_model(bound.watch, self.body_spec))
+            snapshot = bound.watch.snapshot
+            snapshot.steps += 1
+            if snapshot.steps > self.patience and bound.unedited():
+                with _searching:  # Of several threads with the same body, one searches.
+                    if not snapshot.searched:
+                        snapshot.fast = find_fast_model(self.model, self.body_spec)
+                        snapshot.searched = True
+                bound.step_with(snapshot.fast)
         # Without a fast model the public one steps; only its timestep was copied.
         return bound if bound.dt == self.dt else None
 
@@ -261,9 +246,9 @@ class TunedStep(Reshapable):
         watch = self._watch
         if watch is None or watch.model is not self.model or not self._is_as_written():
             return None
-        bound = self._bound = self._bind(watch)
-        if self.fast_model and (fast := known_fast_model(watch)) is not None:
-            bound.step_with(fast)
+        bound = self._bound = self.binding(watch, self)
+        if self.fast_model and watch.snapshot.fast is not None:
+            bound.step_with(watch.snapshot.fast)
         return bound
 
     def _is_as_written(self) -> bool:

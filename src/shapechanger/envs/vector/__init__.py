@@ -3,6 +3,5 @@
 from __future__ import annotations
 
 from shapechanger.envs.vector.env import ThreadVectorEnv
-from shapechanger.envs.vector.infos import Restart
 
-__all__ = ["Restart", "ThreadVectorEnv"]
+__all__ = ["ThreadVectorEnv"]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import weakref
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext, suppress
 from functools import partial
 from typing import Any, cast
 
@@ -21,8 +23,14 @@ from shapechanger.envs.checks import (
     require_boxes,
     require_same_spaces,
 )
-from shapechanger.envs.vector.batch import BatchStep, SubEnv
-from shapechanger.envs.vector.infos import Restart, StepResults, batched, in_columns
+from shapechanger.envs.vector.results import (
+    InfoColumns,
+    Restart,
+    StepResults,
+    SubEnv,
+    batched,
+    in_columns,
+)
 from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
 from shapechanger.errors import VectorEnvError
 
@@ -106,7 +114,6 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self._awaits_reset = True
         self.threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
         self._threads = EnvThreads(self.threads, self.num_envs)
-        self._batch = BatchStep(self._subs, self._observations, self.threads)
         # Ends the threads of a vector env that is never closed, at the latest at exit.
         weakref.finalize(self, self._threads.stop)
 
@@ -161,21 +168,16 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self._require_open()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         numbers = range(self.num_envs) if chosen is None else chosen
+        changes_bodies = any(given and "body" in given for given in options)
+        # One thread at a time compiles a body, and its renderer is replaced.
+        compiling = threading.Lock() if changes_bodies else nullcontext()
 
         def start(i: int) -> None:
-            infos[i] = self._subs[i].reset(seeds[i], options[i])
+            with compiling:
+                infos[i] = self._subs[i].reset(seeds[i], options[i])
 
-        if any(given and "body" in given for given in options):
-            # One thread at a time compiles a body, and its renderer is replaced.
-            compiling = threading.Lock()
-
-            def start_in_turn(i: int) -> None:
-                with compiling:
-                    start(i)
-
-            self._guarded(lambda: self._at_home(start_in_turn, numbers))
-        else:
-            self._guarded(lambda: self._threads.do(start, numbers))
+        run = self._at_home if changes_bodies else self._threads.do
+        self._guarded(lambda: run(start, numbers))
         self._ended[numbers] = False
         return self._present_observations(), infos
 
@@ -213,45 +215,93 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return self._present_observations(), results
 
     def _advance(self, actions: NDArray[Any], waiting: list[bool], results: StepResults) -> None:
-        """Reset the envs that wait for it, and step the others."""
-        same_step = self._mode is AutoresetMode.SAME_STEP
-        restart = partial(self._restart, results)
-        self._batch.begin(actions, results, restart if same_step else None)
+        """Reset the envs that wait for it, and step the others.
 
-        def reset(i: int) -> None:
-            results.put(i, (0.0, False, False, self._subs[i].reset()))
+        Envs whose physics can be stepped separately have their results computed together, after
+        all threads are done; all others take their whole step.
+        """
+        # Binding, and state from before the physics, of each env whose physics has stepped.
+        moved: list[Any] = [None] * self.num_envs
+
+        def advance(i: int) -> None:
+            sub = self._subs[i]
+            if waiting[i]:
+                results.put(i, (0.0, False, False, sub.reset()))
+                return
+            bound = None if sub.tuned is None else sub.tuned.ready_together()
+            if bound is None:
+                results.put(i, sub.step(actions[i]))
+                return
+            moved[i] = bound, bound.remember()
+            bound.ctrl[:] = actions[i]
+            bound.move()
+
+        # Threads rarely take equally long, so each takes its own envs from the front and then
+        # those of other threads from the back. A deque hands out each env once. Envs that may draw
+        # must stay in their thread.
+        queues = [
+            deque(i for i in part if self._subs[i].tuned is not None)
+            for part in self._threads.parts
+        ]
 
         def work(thread: int, failures: Failures) -> None:
-            own = self._threads.parts[thread]
-            resets = [i for i in own if waiting[i]]
-            # Envs that may draw must stay in their thread.
-            for i in resets:
+            for i in self._threads.parts[thread]:
                 if self._subs[i].tuned is None:
-                    attempt(reset, i, failures)
-            anywhere = [i for i in resets if self._subs[i].tuned is not None]
-            stepping = [i for i in own if not waiting[i]]
-            self._batch.advance(thread, stepping, anywhere, reset, failures)
+                    attempt(advance, i, failures)
+            own = queues[thread]
+            for queue in (own, *queues):
+                take = queue.popleft if queue is own else queue.pop
+                with suppress(IndexError):  # None is left.
+                    while True:
+                        attempt(advance, take(), failures)
 
         self._threads.share([partial(work, thread) for thread in range(self.threads)])
-        self._batch.conclude()
+        kinds: dict[str, list[int]] = {}
+        for i, one in enumerate(moved):
+            if one is not None:
+                kinds.setdefault(one[0].kind, []).append(i)
+        for numbers in kinds.values():
+            self._conclude(numbers, [moved[i] for i in numbers], actions, results)
         # Observations that are not finite end episodes, even if no simulation has noticed.
         finite = np.isfinite(self._observations)
         if not np.logical_and.reduce(finite, axis=None):
-            bad = ~finite.reshape(self.num_envs, -1).all(axis=1)
-            for i in np.flatnonzero(bad).tolist():
-                if i not in results.restarts:
-                    self._batch.end_diverged(i)
-        if same_step:
-            ends = np.flatnonzero(results.terminated | results.truncated).tolist()
-            if ended := [i for i in ends if i not in results.restarts]:
-                self._threads.do(restart, ended)
+            for i in np.flatnonzero(~finite.reshape(self.num_envs, -1).all(axis=1)).tolist():
+                self._end_diverged(i, results)
+        if self._mode is AutoresetMode.SAME_STEP:
 
-    def _restart(self, results: StepResults, i: int) -> None:
-        """Reset an env whose episode has ended."""
-        sub = self._subs[i]
-        if not np.isfinite(sub.row).all():
-            self._batch.end_diverged(i)
-        results.restarts[i] = Restart(sub.row.copy(), sub.reset())
+            def restart(i: int) -> None:
+                sub = self._subs[i]
+                results.restarts[i] = Restart(sub.row.copy(), sub.reset())
+
+            ended = np.flatnonzero(results.terminated | results.truncated).tolist()
+            self._threads.do(restart, ended)
+
+    def _conclude(
+        self, numbers: list[int], moved: list[Any], actions: NDArray[Any], results: StepResults
+    ) -> None:
+        """Compute the results of envs of one kind whose physics has stepped."""
+        subs = [self._subs[i] for i in numbers]
+        everyone = len(numbers) == self.num_envs
+        where = slice(None) if everyone else np.array(numbers)
+        observations, rewards, terminated, infos = cast("Any", subs[0].tuned).conclude(
+            [bound for bound, _ in moved],
+            [before for _, before in moved],
+            actions[where],
+            self._observations if everyone else None,
+        )
+        if not everyone:
+            self._observations[where] = observations
+        truncated = [sub.tick() for sub in subs]
+        results.put_columns(InfoColumns(numbers, infos), rewards, terminated, truncated)
+        warnings = np.concatenate([bound.warnings for bound, _ in moved])
+        if warnings.any():
+            for place in np.flatnonzero(warnings.reshape(len(subs), -1).any(axis=1)).tolist():
+                self._end_diverged(numbers[place], results)
+
+    def _end_diverged(self, i: int, results: StepResults) -> None:
+        """End the episode of an env that has stepped, because its simulation has diverged."""
+        truncated = bool(results.truncated[i])
+        results.put(i, self._subs[i].diverged(truncated, results.info(i)))
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 # First, because it names a package that is missing.
-import shapechanger.envs.warp.devices  # noqa: F401  # pyright: ignore[reportUnusedImport]
-from shapechanger.envs.warp.batch import WarpBatch
+from shapechanger.envs.warp.devices import find_device
 from shapechanger.envs.warp.env import WarpVectorEnv
-from shapechanger.envs.warp.make import make_warp
+from shapechanger.envs.warp.reader import make_reader
 
-__all__ = ["WarpBatch", "WarpVectorEnv", "make_warp"]
+__all__ = ["WarpVectorEnv", "find_device", "make_reader"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import mujoco
@@ -14,7 +14,7 @@ from torch import Tensor
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
 from shapechanger.envs.warp.devices import without_gradients
 from shapechanger.envs.warp.noise import uniforms
-from shapechanger.envs.warp.tasks import DeviceTask
+from shapechanger.envs.warp.tasks import DeviceOutcome, DeviceTask
 from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.layout import Layout
@@ -62,39 +62,23 @@ def require_fitting(kind: BatchKind, body: DeviceBody) -> None:
         )
 
 
-class DeviceStep(NamedTuple):
-    """Results of one step of a batch.
-
-    Attributes:
-        observations: Shape (n, size).
-        rewards: Shape (n,).
-        terminated: Shape (n,).
-        diverged: Shape (n,).
-        infos: Tensors of shape (n, ...).
-    """
-
-    observations: Tensor
-    rewards: Tensor
-    terminated: Tensor
-    diverged: Tensor
-    infos: dict[str, Tensor]
-
-
 class WarpBatch:
     """Worlds that are stepped together.
 
     Args:
         kind: What their bodies have in common.
-        numbers: The number of each world in the vector env, shape (n,).
-        bodies: The bodies that the worlds can have.
-        chosen: The body of each world, an index of `bodies`, shape (n,).
+        numbers: The number of each world in the vector env.
+        bodies: The bodies that the worlds can have, keyed by their edits.
+        each: The edits of each world's body.
         device: Name of the device.
         redraws: Whether each start of an episode draws one of the bodies.
         limits: Memory for contacts and constraints; see `Worlds`.
 
     Attributes:
+        kind: What their bodies have in common.
         numbers: The number of each world in the vector env, shape (n,).
-        chosen: The body of each world, an index of the bodies it can have, shape (n,).
+        bodies: The bodies that the worlds can have, keyed by their edits.
+        chosen: The body of each world, an index of `bodies`, shape (n,).
         worlds: Their physics, with views of positions, velocities and forces.
         observation_layout: Name, unit and range of each number of an observation.
         action_layout: Name, unit and range of each number of an action.
@@ -105,59 +89,60 @@ class WarpBatch:
     def __init__(
         self,
         kind: BatchKind,
-        numbers: Tensor,
-        bodies: Sequence[DeviceBody],
-        chosen: Tensor,
+        numbers: Sequence[int],
+        bodies: Mapping[Any, DeviceBody],
+        each: Sequence[Any],
         device: str,
         *,
         redraws: bool = False,
         limits: Mapping[str, int],
     ) -> None:
         self.kind = kind
-        self.numbers = numbers
+        self.numbers = torch.tensor(numbers, device=device)
         self._task = kind.task
         self.observation_layout, self.action_layout = kind.observation_layout, kind.action_layout
         size = (kind.observation_layout.size,)
         self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, size, np.float32)
         self.single_action_space = kind.action_space
+        self.chosen = _places(bodies, each, device)
         self.worlds = Worlds(
             kind.model,
-            bodies,
-            chosen,
+            [*bodies.values()],
+            self.chosen,
             kind.frame_skip,
             device,
             kind.task.contact_forces,
             limits,
         )
         self._task.attach(kind.model, self.worlds)
-        self.chosen = chosen
         self._redraws = redraws
         self._hold_constants(bodies)
-        self._constants = {name: table[chosen] for name, table in self._tables.items()}
+        self._constants = {name: table[self.chosen] for name, table in self._tables.items()}
         self._before = self._task.place(self.worlds).clone()
 
-    def _hold_constants(self, bodies: Sequence[DeviceBody]) -> None:
+    def _hold_constants(self, bodies: Mapping[Any, DeviceBody]) -> None:
         """Keep the numbers of the task of each body on the device."""
-        self._held = len(bodies)
+        self.bodies = bodies
+        rows = [body.constants for body in bodies.values()]
         self._tables = {
             name: torch.as_tensor(
-                np.stack([body.constants[name] for body in bodies]),
+                np.stack([row[name] for row in rows]),
                 dtype=self._task.precision,
                 device=self.worlds.device,
             )
-            for name in bodies[0].constants
+            for name in rows[0]
         }
 
-    def change_bodies(self, bodies: Sequence[DeviceBody], chosen: Tensor) -> None:
+    def change_bodies(self, bodies: Mapping[Any, DeviceBody], each: Sequence[Any]) -> None:
         """Replace the bodies that worlds can have; worlds with another one must start again.
 
         Args:
-            bodies: The bodies.
-            chosen: The body of each world, an index of `bodies`, shape (n,).
+            bodies: The bodies, keyed by their edits.
+            each: The edits of each world's body.
         """
-        self.worlds.hold(bodies)
+        self.worlds.hold([*bodies.values()])
         self._hold_constants(bodies)
-        self._choose(chosen)
+        self._choose(_places(bodies, each, self.worlds.device))
 
     def _choose(self, chosen: Tensor) -> None:
         self.chosen = chosen
@@ -165,7 +150,7 @@ class WarpBatch:
         for name, table in self._tables.items():
             self._constants[name].copy_(table[chosen])
 
-    def step(self, actions: Tensor) -> DeviceStep:
+    def step(self, actions: Tensor) -> tuple[Tensor, DeviceOutcome, Tensor]:
         """Take one step in each world.
 
         A world whose simulation has diverged is terminated with the reward 0, and put back to its
@@ -173,6 +158,10 @@ class WarpBatch:
 
         Args:
             actions: Shape (n, nu).
+
+        Returns:
+            Observations, shape (n, size); rewards, ends and infos; and which worlds have diverged,
+            shape (n,).
         """
         worlds, task, actions = self.worlds, self._task, actions.detach()
         task.act(worlds, self._constants, actions)
@@ -188,7 +177,7 @@ class WarpBatch:
         worlds.clear(diverged)
         poses = self._constants["init_qpos"].to(worlds.qpos.dtype)
         worlds.qpos.copy_(torch.where(diverged[:, None], poses, worlds.qpos))
-        return DeviceStep(observations, rewards, terminated | diverged, diverged, infos)
+        return observations, DeviceOutcome(rewards, terminated | diverged, infos), diverged
 
     def start(
         self, mask: Tensor, seeds: Tensor, episodes: Tensor
@@ -205,7 +194,7 @@ class WarpBatch:
         """
         self.worlds.clear(mask)
         if self._redraws:
-            drawn = uniforms(seeds, episodes, _BODIES, 1)[:, 0] * self._held
+            drawn = uniforms(seeds, episodes, _BODIES, 1)[:, 0] * len(self.bodies)
             self._choose(torch.where(mask, drawn.to(torch.int64), self.chosen))
         self._task.start(self.worlds, self._constants, mask, seeds, episodes)
         return self._started(mask)
@@ -229,3 +218,9 @@ class WarpBatch:
             worlds.kinematics()
         self._before = torch.where(mask[:, None], self._task.place(worlds), self._before)
         return self._task.observations(worlds), self._task.start_infos(worlds, self._constants)
+
+
+def _places(bodies: Mapping[Any, DeviceBody], each: Sequence[Any], device: str) -> Tensor:
+    """Return the place of each world's body among the bodies, shape (n,)."""
+    place = {body: i for i, body in enumerate(bodies)}
+    return torch.tensor([place[body] for body in each], device=device)

@@ -91,16 +91,12 @@ def _fields() -> list[Any]:
 @cache
 def _per_world() -> list[str]:
     """Return the names of the fields that have a row per world."""
-    return [*(f.name for f in _fields() if _is_array(f) and _per_row(f)), ARMS]
+    return [*(field.name for field in _fields() if _has_rows(field)), ARMS]
 
 
-def _is_array(field: Any) -> bool:
-    return isinstance(field.type, wp.array)
-
-
-def _per_row(field: Any) -> bool:
-    """Return whether each world may have its own."""
-    return field.type.shape[0] == "*"
+def _has_rows(field: Any) -> bool:
+    """Return whether a field is an array of which each world may have its own."""
+    return isinstance(field.type, wp.array) and field.type.shape[0] == "*"
 
 
 def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
@@ -112,20 +108,16 @@ def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
         value: Any = getattr(model, name)
         if field.type is int or field.type is bool:
             yield name, str(int(value)).encode()
-        elif _is_array(field):
+        elif isinstance(field.type, wp.array):
             array: NDArray[Any] = np.asarray(value)
-            # Of the rows, only the shape is shared.
-            own = _per_row(field) or (name == ARMS and _only_joints(model))
+            # Of the rows, only the shape is shared. A pulley's divisor is in the place of the arms.
+            only_joints = bool(np.all(model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT))
+            own = _has_rows(field) or (name == ARMS and only_joints)
             yield name, str(array.shape).encode() + (b"" if own else array.tobytes())
     for name in _SHARED_OPTIONS:
         yield f"opt.{name}", str(getattr(model.opt, name)).encode()
     for name, pattern in _switches(model).items():
         yield name, np.asarray(pattern).tobytes()
-
-
-def _only_joints(model: mujoco.MjModel) -> bool:
-    """Return whether no tendon has a pulley, whose divisor is in the place of the moment arms."""
-    return bool(np.all(model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT))
 
 
 def _switches(model: mujoco.MjModel) -> dict[str, Any]:

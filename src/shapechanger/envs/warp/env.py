@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final, cast
 
@@ -96,18 +95,9 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._redraws = redraws
         self._task_infos = task_infos
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
-        self._groups = _grouped(reader, [reader.body(body) for body in bodies], num_envs)
+        groups = _grouped(reader, [reader.body(body) for body in bodies], num_envs)
         self.batches = tuple(
-            WarpBatch(
-                group.kind,
-                torch.tensor(group.worlds, device=device),
-                list(group.bodies.values()),
-                torch.tensor(group.chosen, device=device),
-                device,
-                redraws=redraws,
-                limits=limits or {},
-            )
-            for group in self._groups
+            WarpBatch(*group, device, redraws=redraws, limits=limits or {}) for group in groups
         )
         self._streams = Streams(len(self.batches), device)
         first = self.batches[0]
@@ -150,9 +140,9 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     def bodies(self) -> list[Any]:
         """The edits of each world's body; for a finger its parameters."""
         found: list[Any] = [None] * self.num_envs
-        for group, batch in zip(self._groups, self.batches, strict=True):
-            known = list(group.bodies)
-            for world, chosen in zip(group.worlds, _numbers(batch.chosen), strict=True):
+        for batch in self.batches:
+            known = list(batch.bodies)
+            for world, chosen in zip(_numbers(batch.numbers), _numbers(batch.chosen), strict=True):
                 found[world] = known[chosen]
         return found
 
@@ -227,19 +217,13 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         edits = [self._reader.body(body) for body in bodies]
         new = dict(zip(numbers, edits, strict=True))
         read = {body: self._reader.read(body)[0] for body in dict.fromkeys(edits)}
-        for group in self._groups:
-            for world in group.worlds:
-                if world in new:
-                    require_fitting(group.kind, read[new[world]])
+        homes = {world: batch for batch in self.batches for world in _numbers(batch.numbers)}
+        for world, body in new.items():
+            require_fitting(homes[world].kind, read[body])
         present = self.bodies
-        for group, batch in zip(self._groups, self.batches, strict=True):
-            if not any(world in new for world in group.worlds):
-                continue
-            each = [new.get(world, present[world]) for world in group.worlds]
-            group.bodies = {body: read.get(body) or group.bodies[body] for body in each}
-            place = {body: i for i, body in enumerate(group.bodies)}
-            chosen = torch.tensor([place[body] for body in each], device=self.device)
-            batch.change_bodies(list(group.bodies.values()), chosen)
+        for batch in dict.fromkeys(homes[world] for world in new):
+            each = [new.get(world, present[world]) for world in _numbers(batch.numbers)]
+            batch.change_bodies({body: read.get(body) or batch.bodies[body] for body in each}, each)
 
     def _take_seeds(self, seeds: list[int | None]) -> None:
         """Take new seeds; a world with a new seed begins with its first episode."""
@@ -298,10 +282,10 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         steps = self._streams.run(
             [partial(batch.step, action) for batch, action in zip(self.batches, each, strict=True)]
         )
-        observations = [step.observations for step in steps]
-        rewards = self._gathered_one([step.rewards for step in steps])
-        terminated = self._gathered_one([step.terminated for step in steps])
-        diverged = self._gathered_one([step.diverged for step in steps])
+        observations = [seen for seen, _, _ in steps]
+        rewards = self._gathered_one([outcome.rewards for _, outcome, _ in steps])
+        terminated = self._gathered_one([outcome.terminated for _, outcome, _ in steps])
+        diverged = self._gathered_one([bad for _, _, bad in steps])
         self._elapsed += 1
         if self._limit is None:
             truncated = torch.zeros_like(terminated)
@@ -315,7 +299,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             **{"diverged": diverged, "_diverged": diverged},
         }
         if self._task_infos:
-            step_infos = self._gathered([step.infos for step in steps])
+            step_infos = self._gathered([outcome.infos for _, outcome, _ in steps])
             final_info = _masked({**step_infos, "diverged": diverged}, ended)
             infos |= {"final_info": final_info, "_final_info": ended}
             infos |= _merged(_masked(step_infos, ~ended), start_infos, ended)
@@ -415,53 +399,40 @@ def _numbers(tensor: Tensor) -> list[Any]:
     return cast("Any", tensor).tolist()
 
 
-@dataclass(slots=True)
-class _Group:
-    """Worlds of one batch, and the bodies that they can have.
-
-    Attributes:
-        kind: What the bodies have in common.
-        bodies: The device's arrays of each body, keyed by its edits.
-        worlds: The numbers of the worlds in the vector env.
-        chosen: The body of each world, a place among `bodies`.
-    """
-
-    kind: BatchKind
-    bodies: dict[Any, DeviceBody] = field(default_factory=dict[Any, DeviceBody])
-    worlds: list[int] = field(default_factory=list[int])
-    chosen: list[int] = field(default_factory=list[int])
-
-
-def _grouped(reader: Reader, bodies: Sequence[Any], num_envs: int) -> list[_Group]:
+def _grouped(
+    reader: Reader, bodies: Sequence[Any], num_envs: int
+) -> list[tuple[BatchKind, list[int], dict[Any, DeviceBody], list[Any]]]:
     """Compile bodies, and group worlds that have them in turn by the shapes of their arrays.
+
+    Returns:
+        Kind, numbers of the worlds, possible bodies, and the body of each world, of each batch.
 
     Raises:
         VectorEnvError: If there are fewer worlds than shapes.
     """
-    groups: list[_Group] = []
-    group_of: dict[Any, _Group] = {}
+    kinds: list[BatchKind] = []
+    members: list[dict[Any, DeviceBody]] = []
     for body in dict.fromkeys(bodies):
         read, kind = reader.read(body)
-        group = next((g for g in groups if not differing_arrays(g.kind.first, read)), None)
-        if group is None:
-            group = _Group(kind)
-            groups.append(group)
-        group.bodies[body] = read
-        group_of[body] = group
-    place = {body: i for group in groups for i, body in enumerate(group.bodies)}
+        fitting = (i for i, one in enumerate(kinds) if not differing_arrays(one.first, read))
+        place = next(fitting, len(kinds))
+        if place == len(kinds):
+            kinds.append(kind)
+            members.append({})
+        members[place][body] = read
     # A pool of more bodies than worlds is spread over them.
     step = max(1, len(bodies) // num_envs)
-    for world in range(num_envs):
-        body = bodies[world * step % len(bodies)]
-        group_of[body].worlds.append(world)
-        group_of[body].chosen.append(place[body])
-    for group in groups:
-        if not group.worlds:
+    each = [bodies[world * step % len(bodies)] for world in range(num_envs)]
+    groups: list[tuple[BatchKind, list[int], dict[Any, DeviceBody], list[Any]]] = []
+    for kind, known in zip(kinds, members, strict=True):
+        worlds = [world for world, body in enumerate(each) if body in known]
+        if not worlds:
             raise VectorEnvError(
-                f"No world has bodies like {group.kind.first.name}: the bodies of the pool form "
-                f"{len(groups)} batches, because their arrays differ, and there are {num_envs} "
+                f"No world has bodies like {kind.first.name}: the bodies of the pool form "
+                f"{len(kinds)} batches, because their arrays differ, and there are {num_envs} "
                 "worlds, so make more."
             )
+        groups.append((kind, worlds, known, [each[world] for world in worlds]))
     return groups
 
 

@@ -67,7 +67,7 @@ class DeviceStarts:
         ]
         self._lift = rules.lift
         # Each floor with geoms of one shape.
-        self._touching: dict[tuple[int, int], list[int]] = {}
+        touching: dict[tuple[int, int], list[int]] = {}
         for floor, geom in rules.floor_pairs if rules.lift is not None else ():
             shape = int(model.geom_type[geom])
             if model.geom_type[floor] != _PLANE or shape not in _SHAPES:
@@ -76,10 +76,8 @@ class DeviceStarts:
                     "ellipsoids, cylinders and boxes; here "
                     f"{_G(int(model.geom_type[floor])).name} meets {_G(shape).name}."
                 )
-            self._touching.setdefault((floor, shape), []).append(geom)
-        self._geoms = {
-            pair: torch.tensor(geoms, device=device) for pair, geoms in self._touching.items()
-        }
+            touching.setdefault((floor, shape), []).append(geom)
+        self._geoms = {pair: torch.tensor(geoms, device=device) for pair, geoms in touching.items()}
 
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:

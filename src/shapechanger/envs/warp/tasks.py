@@ -21,6 +21,7 @@ from typing_extensions import override
 
 from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
 from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, NAMESPACE
+from shapechanger.envs.humanoid import HumanoidEnv
 from shapechanger.envs.pendulum import (
     CLIPPED_AT,
     FALLEN_M,
@@ -31,7 +32,6 @@ from shapechanger.envs.pendulum import (
 from shapechanger.envs.runners import (
     HalfCheetahEnv,
     HopperEnv,
-    HumanoidEnv,
     SwimmerEnv,
     Walker2dEnv,
 )
@@ -80,7 +80,11 @@ class DeviceTask(ABC):
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
         """Return the numbers of the task that depend on the body of a CPU env."""
-        return {**DeviceStarts.constants(env), "dt": np.array(env.dt)}
+        found = {**DeviceStarts.constants(env), "dt": np.array(env.dt)}
+        if hasattr(env, "healthy_z_range"):
+            low, high = env.healthy_z_range
+            found |= {"low": np.array(low), "high": np.array(high)}
+        return found
 
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
         """Serve worlds from here on.
@@ -144,6 +148,16 @@ class DeviceTask(ABC):
         return {}
 
 
+def _place_infos(worlds: Worlds) -> dict[str, Tensor]:
+    """Return the place of a trunk in the plane of the floor, m, as the infos of a reset."""
+    place = worlds.qpos[:, :2]
+    return {
+        "x_position": place[:, 0].clone(),
+        "y_position": place[:, 1].clone(),
+        "distance_from_origin": length(place),
+    }
+
+
 def _cost(weight: float, numbers: Tensor) -> Tensor:
     return weight * numbers.square().flatten(1).sum(dim=1)
 
@@ -157,12 +171,6 @@ class DeviceAnt(DeviceTask):
     def __init__(self, env: Any) -> None:
         super().__init__(env)
         self._main = int(env.model.body(env.main_body).id)
-
-    @override
-    @staticmethod
-    def constants(env: Any) -> dict[str, NDArray[Any]]:
-        low, high = env.healthy_z_range
-        return {**DeviceTask.constants(env), "low": np.array(low), "high": np.array(high)}
 
     def place(self, worlds: Worlds) -> Tensor:
         """Return the place of the main body, m, shape (n, 2)."""
@@ -190,9 +198,8 @@ class DeviceAnt(DeviceTask):
         finite = qpos.isfinite().all(dim=1) & worlds.qvel.isfinite().all(dim=1)
         healthy = upright & finite
         rewards, infos = env._reward(
-            *self.start_infos(worlds, constants).values(),
-            velocity[:, 0],
-            velocity[:, 1],
+            self.start_infos(worlds, constants).values(),
+            velocity.T,
             _cost(env._ctrl_cost_weight, actions),
             _cost(env._contact_cost_weight, self._forces(worlds)),
             healthy,
@@ -201,12 +208,7 @@ class DeviceAnt(DeviceTask):
 
     @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        place = worlds.qpos[:, :2]
-        return {
-            "x_position": place[:, 0].clone(),
-            "y_position": place[:, 1].clone(),
-            "distance_from_origin": length(place),
-        }
+        return _place_infos(worlds)
 
 
 class DevicePendulum(DeviceTask):
@@ -324,12 +326,7 @@ class DeviceSwimmer(DeviceRunner):
 
     @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        place = self.place(worlds)
-        return {
-            "x_position": place[:, 0].clone(),
-            "y_position": place[:, 1].clone(),
-            "distance_from_origin": length(place),
-        }
+        return _place_infos(worlds)
 
 
 class DeviceCheetah(DeviceRunner):
@@ -340,12 +337,6 @@ class DeviceCheetah(DeviceRunner):
 
 class DeviceWalker(DeviceRunner):
     """Walkers, which are healthy within heights and leans."""
-
-    @override
-    @staticmethod
-    def constants(env: Any) -> dict[str, NDArray[Any]]:
-        low, high = env.healthy_z_range
-        return {**DeviceTask.constants(env), "low": np.array(low), "high": np.array(high)}
 
     def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
         """Return whether each body is healthy, shape (n,)."""
@@ -393,11 +384,6 @@ class DeviceHumanoid(DeviceRunner):
             if getattr(env, f"_include_{name}_in_observation") is True
         ]
 
-    @override
-    @staticmethod
-    def constants(env: Any) -> dict[str, NDArray[Any]]:
-        return DeviceWalker.constants(env)
-
     def place(self, worlds: Worlds) -> Tensor:
         """Return the place of the centre of mass, m, shape (n, 2)."""
         mass = worlds.row("body_mass")
@@ -421,13 +407,10 @@ class DeviceHumanoid(DeviceRunner):
 
     @override
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        place = worlds.qpos[:, :2]
         return {
-            "x_position": place[:, 0].clone(),
-            "y_position": place[:, 1].clone(),
+            **_place_infos(worlds),
             "tendon_length": worlds.ten_length.clone(),
             "tendon_velocity": worlds.ten_velocity.clone(),
-            "distance_from_origin": length(place),
         }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import mujoco
 import numpy as np
@@ -39,6 +39,12 @@ _CONTACTS: Final = {
     _pair(_G.mjGEOM_CAPSULE, _G.mjGEOM_BOX): 2,
 }
 _MOST_CONTACTS: Final = 8
+# Arrays of the data that are attributes of `Worlds`.
+_ARRAYS: Final = (
+    *("qpos", "qvel", "qacc", "qfrc_actuator", "qfrc_constraint", "ctrl", "actuator_force", "act"),
+    *("history", "time", "xpos", "xipos", "cinert", "cvel", "cfrc_ext", "ten_length"),
+    *("ten_velocity", "site_xpos", "geom_xpos", "geom_xmat"),
+)
 # Most rows of one equality.
 _ROWS_PER_EQUALITY: Final = 6
 # Overflows of the memory for contacts and constraints, by which results are wrong.
@@ -51,7 +57,12 @@ _OVERFLOWS: Final = {
 class Worlds:
     """Models and data of worlds whose bodies have arrays of the same shapes.
 
-    All tensors are views of the device's data.
+    Arrays of MuJoCo's data are attributes with its names and units, as views with a row per world:
+    `qpos` (n, nq), `qvel`, `qacc`, `qfrc_actuator` and `qfrc_constraint` (n, nv), `ctrl` and
+    `actuator_force` (n, nu), `act` (n, na), `history` (n, nhistory), `time` (n,), `xpos` and
+    `xipos` (n, nbody, 3), `cinert` (n, nbody, 10), `cvel` and `cfrc_ext` (n, nbody, 6),
+    `ten_length` and `ten_velocity` (n, ntendon), `site_xpos` (n, nsite, 3), `geom_xpos`
+    (n, ngeom, 3) and `geom_xmat` (n, ngeom, 3, 3).
 
     Args:
         model: A body of the batch.
@@ -65,27 +76,6 @@ class Worlds:
 
     Attributes:
         limits: How many contacts and rows of constraints a world has memory for.
-        qpos: Shape (n, nq).
-        qvel: Shape (n, nv).
-        ctrl: Shape (n, nu).
-        act: States of the actuators, shape (n, na).
-        actuator_force: Shape (n, nu).
-        history: Former controls with their times, shape (n, nhistory).
-        time: s, shape (n,).
-        qacc: Shape (n, nv).
-        xpos: Places of the bodies, m, shape (n, nbody, 3).
-        xipos: Places of their centres of mass, m, shape (n, nbody, 3).
-        cinert: Inertias of the bodies about the centre of mass of all, and masses, shape
-            (n, nbody, 10).
-        cvel: Velocities of the bodies, rad/s and m/s, shape (n, nbody, 6).
-        qfrc_actuator: Forces of the actuators at the joints, shape (n, nv).
-        ten_length: Lengths of the tendons, shape (n, ntendon).
-        ten_velocity: Rates of change of these, shape (n, ntendon).
-        site_xpos: Places of the sites, m, shape (n, nsite, 3).
-        geom_xpos: Places of the geoms, m, shape (n, ngeom, 3).
-        geom_xmat: Orientations of the geoms, shape (n, ngeom, 3, 3).
-        cfrc_ext: External forces, N·m and N, shape (n, nbody, 6).
-        qfrc_constraint: Forces of contacts and limits, shape (n, nv).
     """
 
     def __init__(
@@ -119,26 +109,8 @@ class Worlds:
             self._data: Any = mjw.make_data(model, nworld=self.count, **self.limits)
         data = self._data
         self._overflow = as_torch(data.overflow)
-        self.qpos = as_torch(data.qpos)
-        self.qvel = as_torch(data.qvel)
-        self.ctrl = as_torch(data.ctrl)
-        self.act = as_torch(data.act)
-        self.actuator_force = as_torch(data.actuator_force)
-        self.history = as_torch(data.history)
-        self.time = as_torch(data.time)
-        self.qacc = as_torch(data.qacc)
-        self.xpos = as_torch(data.xpos)
-        self.xipos = as_torch(data.xipos)
-        self.cinert = as_torch(data.cinert)
-        self.cvel = as_torch(data.cvel)
-        self.qfrc_actuator = as_torch(data.qfrc_actuator)
-        self.ten_length = as_torch(data.ten_length)
-        self.ten_velocity = as_torch(data.ten_velocity)
-        self.site_xpos = as_torch(data.site_xpos)
-        self.geom_xpos = as_torch(data.geom_xpos)
-        self.geom_xmat = as_torch(data.geom_xmat)
-        self.cfrc_ext = as_torch(data.cfrc_ext)
-        self.qfrc_constraint = as_torch(data.qfrc_constraint)
+        for name in _ARRAYS:
+            setattr(self, name, as_torch(getattr(data, name)))
         # What else of the state a restart clears.
         self._cleared = [
             as_torch(array)
@@ -154,6 +126,10 @@ class Worlds:
         self._static_tables: dict[str, Tensor] = {}
         self.hold(bodies)
         self.choose(numbers)
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Tensor: ...
 
     def row(self, name: str) -> Tensor:
         """Return an array of the model, shape (n or 1, ...), as of each world.
@@ -205,7 +181,7 @@ class Worlds:
         for name, table in self._tables.items():
             self._rows[name].copy_(table[numbers])
         for name, table in self._static_tables.items():
-            cast("Tensor", getattr(self, name))[:, self._static] = table[numbers]
+            getattr(self, name)[:, self._static] = table[numbers]
 
     def overflows(self) -> dict[str, int]:
         """Return in how many worlds the memory was too small since the last call, by limit."""

@@ -1,12 +1,21 @@
-"""Infos and results of one step of many envs."""
+"""One env of a vector env, and the results of a step of all of them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
+import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from shapechanger.envs.stepping.tuned import TunedStep
+
+# Indices of mjWARN_BADQPOS, mjWARN_BADQVEL and mjWARN_BADQACC in `data.warning`.
+_BAD_STATE: Final = slice(3, 6)
 
 Step = tuple[Any, Any, Any, dict[str, Any]]
 """Reward, terminated, truncated and info of one env."""
@@ -22,13 +31,6 @@ class InfoColumns(NamedTuple):
 
     numbers: Sequence[int]
     values: Mapping[str, Sequence[Any] | NDArray[Any]]
-
-    def rows(self) -> list[dict[str, Any]]:
-        """Return the info of each env."""
-        return [
-            dict(zip(self.values, row, strict=True))
-            for row in zip(*self.values.values(), strict=True)
-        ]
 
 
 def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> list[InfoColumns]:
@@ -210,8 +212,9 @@ class StepResults:
 
     def _expand(self) -> None:
         """Split the columns into one info per env."""
-        for columns in self._columns:
-            self._infos.update(zip(columns.numbers, columns.rows(), strict=True))
+        for numbers, values in self._columns:
+            for number, *row in zip(numbers, *values.values(), strict=True):
+                self._infos[number] = dict(zip(values, row, strict=True))
         self._columns = []
 
     def _with_restart(self, number: int) -> dict[str, Any]:
@@ -219,3 +222,93 @@ class StepResults:
         if restart is None:
             return info
         return {"final_obs": restart.final_observation, "final_info": info, **restart.info}
+
+
+class SubEnv:
+    """One env of a vector env, which writes its observations into a row of a batch.
+
+    An env with a method `step_into(action, row)` is stepped by it, past the wrappers of `gym.make`:
+    the clock of `TimeLimit` is counted here, and the others do nothing between two resets.
+
+    A simulation has diverged when the env's info says so, when MuJoCo found a position, velocity or
+    acceleration that is huge or not finite, or when an observation is not finite. MuJoCo then
+    restarts from the model's own pose, which the action did not cause: the env is terminated, the
+    reward is 0, and the info has `diverged`. Observations that are not finite read 0.
+
+    Args:
+        env: The env as `gym.make` makes it.
+        row: Where to write its observations.
+
+    Attributes:
+        tuned: The env without its wrappers if its physics can be stepped separately, else None.
+    """
+
+    __slots__ = ("_clock", "_limit", "_step_into", "_warnings", "env", "row", "tuned")
+
+    def __init__(self, env: gym.Env[Any, Any], row: NDArray[Any]) -> None:
+        self.env = env
+        self.row = row
+        self._clock: Any = None
+        self._limit = math.inf
+        self._step_into: Any = None
+        self._warnings: NDArray[Any] | None = None
+        inner: Any = env
+        while isinstance(inner, OrderEnforcing | PassiveEnvChecker | TimeLimit):
+            if isinstance(inner, TimeLimit):
+                self._clock = inner
+                self._limit = cast("Any", inner)._max_episode_steps
+            inner = cast("Any", inner).env
+        if inner is env.unwrapped and row.dtype == np.float64:
+            self._step_into = getattr(inner, "step_into", None)
+        self.tuned: TunedStep | None = (
+            cast("TunedStep", inner)
+            if self._step_into is not None and hasattr(inner, "ready_together")
+            else None
+        )
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> dict[str, Any]:
+        """Start an episode, and return its info.
+
+        Args:
+            seed: Seed of the env; None to go on with its generator.
+            options: Options of the env's reset.
+        """
+        observation, info = self.env.reset(seed=seed, options=options)
+        self.row[...] = observation
+        if self._step_into is None:
+            # A reset may have replaced the data.
+            data = getattr(self.env.unwrapped, "data", None)
+            self._warnings = None if data is None else data.warning.number[_BAD_STATE]
+        return info
+
+    def step(self, action: Any) -> Step:
+        """Take one step."""
+        if self._step_into is None:
+            observation, reward, terminated, truncated, info = self.env.step(action)
+            self.row[...] = observation
+        else:
+            reward, terminated, truncated, info = self._step_into(action, self.row)
+            truncated = self.tick() or truncated
+        if "diverged" in info or (self._warnings is not None and self._warnings.any()):
+            return self.diverged(truncated, info)
+        return reward, terminated, truncated, info
+
+    def tick(self) -> bool:
+        """Count one more step; return whether the episode's time limit is reached."""
+        clock = self._clock
+        if clock is None:
+            return False
+        clock._elapsed_steps += 1
+        return clock._elapsed_steps >= self._limit
+
+    def diverged(self, truncated: Any, info: dict[str, Any]) -> Step:
+        """Return the result of a step whose simulation has diverged.
+
+        Args:
+            truncated: Whether the step was truncated.
+            info: Info of the step.
+        """
+        self.row[~np.isfinite(self.row)] = 0.0
+        return 0.0, True, truncated, {**info, "diverged": True}
