@@ -9,7 +9,7 @@ from collections import OrderedDict
 from collections.abc import Iterable
 from functools import cache
 from operator import attrgetter
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -104,7 +104,7 @@ def _regions(*owners: Any) -> list[tuple[int, int]]:
     """Return address and length in bytes of the arrays' memory, neighbours as one region."""
     spans: list[tuple[int, int]] = []
     for owner in owners:
-        for name in _array_names(cast("Any", owner).__class__):
+        for name in _array_names(owner.__class__):
             array: Any = getattr(owner, name)
             # An array that owns its memory is a copy, which is gone at once.
             if array.size and not array.flags.owndata:
