@@ -182,28 +182,3 @@ def test_a_copy_begins_an_episode_of_its_own(tmp_path: Path) -> None:
         other.step(np.zeros(2))
     other.reset(seed=3)
     np.testing.assert_array_equal(other.step(np.zeros(2))[0].shape, (15,))
-
-
-def test_many_joints_are_solved_densely(tmp_path: Path) -> None:
-    """With MuJoCo 4.0.0, whose sparse solver is wrong; a rollout equals MuJoCo's own dense one."""
-    links = "".join(
-        f'<body name="l{i}" pos=".1 0 0"><joint name="j{i}" axis="0 {i % 2} {1 - i % 2}"/>'
-        '<geom type="capsule" fromto="0 0 0 .1 0 0" size=".02" mass=".1"/>'
-        for i in range(64)
-    )
-    text = (
-        f'<mujoco><worldbody>{_FLOOR}<body pos="0 0 .1"><freejoint/><geom size=".05"/>{links}'
-        f'{"</body>" * 65}</worldbody><actuator><motor joint="j0" ctrlrange="-1 1"/></actuator>'
-        "</mujoco>"
-    )
-    env, inner = _env(tmp_path, text, still)
-    assert bool(mujoco.mj_isSparse(inner.model)) == (mujoco.__version__ != "4.0.0")
-    env.reset(seed=0)
-    plain = mujoco.MjModel.from_xml_string(text)
-    plain.opt.jacobian = inner.model.opt.jacobian
-    data = mujoco.MjData(plain)
-    data.qpos[:], data.qvel[:] = inner.data.qpos, inner.data.qvel
-    env.step(np.ones(1))
-    data.ctrl[:] = 1.0
-    mujoco.mj_step(plain, data, inner.frame_skip)
-    np.testing.assert_array_equal(data.qpos, inner.data.qpos)

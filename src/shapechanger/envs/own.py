@@ -22,6 +22,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.measure import RETURN, Measure
+from shapechanger.envs.actions import check_action
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.own_models import own_family, require_robot
@@ -57,52 +58,7 @@ _HOME: Final = "home"
 _J: Final = mujoco.mjtJoint
 
 
-class _TaskEnv(MujocoEnv, EzPickle):
-    """Gymnasium's half: step the physics, ask the task, draw a start."""
-
-    def step(self, action: Any) -> Any:
-        """Take one step."""
-        own = cast("OwnRobotEnv", self)
-        before = own.trunk_place()
-        cast("Any", self).do_simulation(action, self.frame_skip)
-        robot = own.seen(np.asarray(action), before)
-        # A state that is huge or not finite is no fault of the task, and is not its business.
-        terms = {} if own.diverged else reward_terms(own.task, own.task_name, robot)
-        terminated = own.diverged or has_ended(own.task, own.task_name, robot)
-        info = {
-            "x_position": float(robot.place[0]),
-            "y_position": float(robot.place[1]),
-            "x_velocity": float(robot.velocity[0]),
-            "y_velocity": float(robot.velocity[1]),
-            **{f"reward_{name}": value for name, value in terms.items()},
-        }
-        if self.render_mode == "human":
-            self.render()
-        return self._get_obs(), sum(terms.values(), 0.0), terminated, False, info
-
-    def reset_model(self) -> _Floats:
-        """Draw a start state around the start pose."""
-        own = cast("OwnRobotEnv", self)
-        scale, rules = own.reset_noise_scale, own.start_rules()
-        # Nothing is drawn for objects, so that a robot starts the same with and without them.
-        place, speed = self.init_qpos.copy(), self.init_qvel.copy()
-        moved, pushed = int(rules.robot_places.sum()), int(rules.robot_dofs.sum())
-        place[rules.robot_places] += self.np_random.uniform(-scale, scale, moved)
-        speed[rules.robot_dofs] += scale * self.np_random.standard_normal(pushed)
-        cast("Any", self).set_state(place, speed)
-        return self._get_obs()
-
-    def _get_obs(self) -> _Floats:
-        return cast("OwnRobotEnv", self).observed_numbers()
-
-    def _get_reset_info(self) -> dict[str, Any]:
-        place = cast("OwnRobotEnv", self).trunk_place()
-        return {"x_position": float(place[0]), "y_position": float(place[1])}
-
-
-class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
-    Reshapable, _TaskEnv
-):
+class OwnRobotEnv(Reshapable, EzPickle):
     """A robot of an MJCF or URDF file, with a task of the user's own.
 
     - **Observation**: positions and velocities of all joints, without the place of the trunk on the
@@ -250,9 +206,44 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self._place_of = {name: place for place, name in enumerate(names)}
         return [features[place] for place in places]
 
-    def observed_numbers(self) -> _Floats:
-        """Return the present observation."""
+    def step(self, action: Any) -> Any:
+        """Take one step, as `Reshapable.step`, and ask the task for its reward and end."""
+        action = check_action(self, action)
+        self._require_reset("step")
+        before = self.trunk_place()
+        cast("Any", self).do_simulation(action, self.frame_skip)
+        robot, diverged = self.seen(action, before), self.diverged
+        # A state that is huge or not finite is no fault of the task, and is not its business.
+        terms = {} if diverged else reward_terms(self.task, self.task_name, robot)
+        terminated = diverged or has_ended(self.task, self.task_name, robot)
+        info = {
+            "x_position": float(robot.place[0]),
+            "y_position": float(robot.place[1]),
+            "x_velocity": float(robot.velocity[0]),
+            "y_velocity": float(robot.velocity[1]),
+            **{f"reward_{name}": value for name, value in terms.items()},
+            **({"diverged": True} if diverged else {}),
+        }
+        if self.render_mode == "human":
+            self.render()
+        return self._get_obs(), sum(terms.values(), 0.0), terminated, False, info
+
+    def _draw_start(self) -> _Floats:
+        scale, rules = self.reset_noise_scale, self.start_rules()
+        # Nothing is drawn for objects, so that a robot starts the same with and without them.
+        place, speed = self.init_qpos.copy(), self.init_qvel.copy()
+        moved, pushed = int(rules.robot_places.sum()), int(rules.robot_dofs.sum())
+        place[rules.robot_places] += self.np_random.uniform(-scale, scale, moved)
+        speed[rules.robot_dofs] += scale * self.np_random.standard_normal(pushed)
+        self.set_state(place, speed)
+        return self._get_obs()
+
+    def _get_obs(self) -> _Floats:
         return self._all_numbers(self._contacts_observed)[self._places]
+
+    def _get_reset_info(self) -> dict[str, Any]:
+        place = self.trunk_place()
+        return {"x_position": float(place[0]), "y_position": float(place[1])}
 
     def _all_numbers(self, contacts: bool) -> _Floats:
         """Return all numbers that can be observed, in the order of the names."""

@@ -299,9 +299,13 @@ class Reshapable(MujocoEnv):
         """
         self._starting = True
         try:
-            return cast("Any", super()).reset_model()
+            return self._draw_start()
         finally:
             self._starting = False
+
+    def _draw_start(self) -> NDArray[np.float64]:
+        """Set a start state as Gymnasium draws it, and return the observation."""
+        return cast("Any", super()).reset_model()
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Set the pose (nq,) and the velocities (nv,)."""

@@ -49,21 +49,6 @@ def model_rows(envs: WarpVectorEnv, name: str) -> Any:
     return rows.expand(envs.num_envs, *rows.shape[1:]).numpy()
 
 
-def test_new_bodies_are_written_from_compiled_models(ants: WarpVectorEnv) -> None:
-    """A body drawn at a reset has its own numbers, however often it is drawn."""
-    ants.reset(seed=0)
-    mask = np.array([False, True, False])
-    for body in (LONG, "BigAnt", LONG):
-        ants.reset(options={"bodies": [body], "reset_mask": mask})
-        env: Any = gym.make("shapechanger/Ant-v1", body=body).unwrapped
-        plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
-        for name in ("geom_size", "geom_pos", "body_mass", "body_inertia", "geom_friction"):
-            found = model_rows(ants, name)
-            np.testing.assert_allclose(found[1], getattr(env.model, name), rtol=1e-6, atol=1e-9)
-            np.testing.assert_allclose(found[0], getattr(plain.model, name), rtol=1e-6, atol=1e-9)
-    assert ants.bodies == [(), tuple(LONG), ()]
-
-
 def test_a_body_drawn_at_a_reset_moves_as_one_made_with_it(ants: WarpVectorEnv) -> None:
     """After a reset with bodies, each world steps as the CPU env of its body."""
     bodies: list[Any] = [LONG, "AmputatedAnt", [Gravity((0.0, 0.0, -4.0))]]

@@ -112,7 +112,6 @@ class TunedStep(Reshapable):
         super()._follow_body()
         self._watch = ModelWatch(self.model)
         self._rules = None
-        self._invalidate()
         self._bound = None
 
     def start_rules(self) -> StartRules:
@@ -127,15 +126,6 @@ class TunedStep(Reshapable):
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Set the pose (nq,) and the velocities (nv,)."""
         super().set_state(qpos, qvel)
-        self._invalidate()
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute; a new model, data or frame skip invalidates the binding."""
-        super().__setattr__(name, value)
-        if name in ("model", "data", "frame_skip"):
-            self._invalidate()
-
-    def _invalidate(self) -> None:
         if self._bound is not None:
             self._bound.kind = None
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import sys
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable
 from functools import cache
 from operator import attrgetter
 from typing import Any, Final
@@ -27,7 +27,7 @@ class Snapshot:
 
     Args:
         parts: The bytes of each watched region of memory.
-        numbers: The options and statistics that are single numbers.
+        numbers: Options and statistics outside of these.
 
     Attributes:
         steps: Steps that all envs with such a model have taken without a fast model.
@@ -69,10 +69,8 @@ class ModelWatch:
         self.model = model
         self.timestep = float(model.opt.timestep)
         self._options, self._statistics = model.opt, model.stat
-        # Options and statistics come first, wherever they are in memory, so that equal models have
-        # equal digests.
-        regions = [*_regions(model.opt, model.stat), *_regions(model)]
-        views = [(ctypes.c_char * size).from_address(start) for start, size in regions]
+        # These come first, wherever they are in memory, so that equal models have equal digests.
+        views = [*_views(sys.maxsize, model.opt, model.stat), *_views(_APART, model)]
         # A bytearray compares itself with any buffer by memcmp; bytes would not.
         parts = [bytearray(view) for view in views]
         numbers = self._read_numbers()
@@ -97,11 +95,12 @@ class ModelWatch:
         return True
 
     def _read_numbers(self) -> tuple[Any, ...]:
-        return _OPTIONS(self._options), _STATISTICS(self._statistics)
+        of_options, of_statistics = _readers()
+        return of_options(self._options), of_statistics(self._statistics)
 
 
-def _regions(*owners: Any) -> list[tuple[int, int]]:
-    """Return address and length in bytes of the arrays' memory, neighbours as one region."""
+def _views(apart: int, *owners: Any) -> list[Any]:
+    """Return views of the memory of all arrays; those closer than `apart` bytes share one."""
     spans: list[tuple[int, int]] = []
     for owner in owners:
         for name in _array_names(owner.__class__):
@@ -112,24 +111,37 @@ def _regions(*owners: Any) -> list[tuple[int, int]]:
                 spans.append((start, start + int(array.nbytes)))
     regions: list[tuple[int, int]] = []
     for start, end in sorted(spans):
-        if regions and start - sum(regions[-1]) < _APART:
+        if regions and start - sum(regions[-1]) < apart:
             start = regions[-1][0]
             end = max(sum(regions.pop()), end)
         regions.append((start, end - start))
-    return regions
+    return [(ctypes.c_char * size).from_address(start) for start, size in regions]
 
 
 @cache
 def _array_names(kind: type[Any]) -> list[str]:
     """Return the names of the arrays of a kind of object of MuJoCo, except `tex_data`."""
     blank: Any = mujoco.MjSpec().compile() if kind is mujoco.MjModel else kind()
-    return [n for n in _names(blank, np.ndarray) if n != "tex_data"]
+    names = (name for name in dir(kind) if type(getattr(blank, name)) is np.ndarray)
+    return [name for name in names if name != "tex_data"]
 
 
-def _names(blank: Any, *kinds: type[Any]) -> Iterable[str]:
-    return [name for name in dir(blank) if isinstance(getattr(blank, name), kinds)]
+@cache
+def _readers() -> list[Any]:
+    """Return functions that read the options, and the statistics, outside of the watched memory.
 
-
-# Read the single numbers of each.
-_OPTIONS: Final = attrgetter(*_names(mujoco.MjOption(), int, float))
-_STATISTICS: Final = attrgetter(*_names(mujoco.MjStatistic(), int, float))
+    Each number of a model is changed once, to see whether it lies within.
+    """
+    model = mujoco.MjSpec().compile()
+    (memory,) = _views(sys.maxsize, model.opt, model.stat)
+    readers: list[Any] = []
+    for part in (model.opt, model.stat):
+        outside: list[str] = []
+        for name in dir(part):
+            before, value = bytes(memory), getattr(part, name)
+            if isinstance(value, int | float):
+                setattr(part, name, value + 1)
+                if before == bytes(memory):
+                    outside.append(name)
+        readers.append(attrgetter("__class__", *outside))
+    return readers

@@ -159,12 +159,7 @@ class StepResults:
         self._columns: list[InfoColumns] = []
 
     def put(self, number: int, step: Step) -> None:
-        """Set the result of one env.
-
-        Args:
-            number: Index of the env.
-            step: Its result.
-        """
+        """Set the result of one env."""
         reward, terminated, truncated, info = step
         self.rewards[number] = reward
         self.terminated[number] = terminated
@@ -178,14 +173,7 @@ class StepResults:
         terminated: NDArray[np.bool_],
         truncated: list[bool],
     ) -> None:
-        """Set the results of several envs.
-
-        Args:
-            infos: Their infos, and which envs they are.
-            rewards: Their rewards.
-            terminated: Whether the step ended the episode of each.
-            truncated: Whether the episode of each was cut off.
-        """
+        """Set the results of several envs, whose numbers come with their infos."""
         where = _where(infos.numbers, self.rewards.size)
         self.rewards[where] = rewards
         self.terminated[where] = terminated

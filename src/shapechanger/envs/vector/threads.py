@@ -20,30 +20,27 @@ _Task = tuple[Callable[[], None], _Answers]
 _END_WITHIN_S: Final = 5.0
 
 
-class _Worker:
-    """One thread and its queue of tasks."""
+class _Worker(threading.Thread):
+    """A thread that runs tasks until None arrives in its inbox."""
 
     def __init__(self) -> None:
-        self.inbox: SimpleQueue[_Task | None] = SimpleQueue()
         # A daemon thread, so that a program that does not close its envs can still exit.
-        self.thread = threading.Thread(
-            target=_serve, args=(self.inbox,), name="shapechanger-vector", daemon=True
-        )
-        self.thread.start()
+        super().__init__(name="shapechanger-vector", daemon=True)
+        self.inbox: SimpleQueue[_Task | None] = SimpleQueue()
+        self.start()
 
-
-def _serve(inbox: SimpleQueue[_Task | None]) -> None:
-    """Run tasks until None arrives."""
-    while (task := inbox.get()) is not None:
-        job, answers = task
-        answer: BaseException | None = None
-        try:
-            job()
-        except BaseException as error:  # Raised again in the caller's thread.
-            answer = error
-        del task, job  # A waiting thread must not keep the job's objects alive.
-        answers.put(answer)
-        del answer, answers
+    def run(self) -> None:
+        """Run the tasks."""
+        while (task := self.inbox.get()) is not None:
+            job, answers = task
+            answer: BaseException | None = None
+            try:
+                job()
+            except BaseException as error:  # Raised again in the caller's thread.
+                answer = error
+            del task, job  # A waiting thread must not keep the job's objects alive.
+            answers.put(answer)
+            del answer, answers
 
 
 class EnvThreads:
@@ -132,12 +129,12 @@ class EnvThreads:
         for worker in workers:
             worker.inbox.put(None)
         for worker in workers:
-            if worker.thread is not threading.current_thread():
-                worker.thread.join(_END_WITHIN_S)
+            if worker is not threading.current_thread():
+                worker.join(_END_WITHIN_S)
 
     def _awake(self) -> list[_Worker]:
         """Return the threads, started if they are not alive."""
-        if not all(worker.thread.is_alive() for worker in self._workers):
+        if not all(worker.is_alive() for worker in self._workers):
             self._workers = []  # pragma: no cover  # After a fork; tested in a subprocess.
         while len(self._workers) < len(self.parts) - 1:
             self._workers.append(_Worker())

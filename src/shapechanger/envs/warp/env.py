@@ -67,6 +67,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         device: Name of the device.
         batches: The worlds, by the shapes of their arrays.
         made_from: The spec of the CPU env, or None.
+        max_episode_steps: Steps after which an episode is truncated; None for never.
+        episode_steps: Steps of each world's episode so far, shape (n,); it may be written.
         observation_layout: Name, unit and range of each number of an observation of the first
             batch.
         action_layout: The same of an action.
@@ -119,10 +121,12 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             [batch_space(b.single_action_space, self._size(b)) for b in self.batches]
         )
         self.made_from = reader.spec
-        self._limit = None if reader.spec is None else reader.spec.max_episode_steps
+        self.max_episode_steps: int | None = (
+            None if reader.spec is None else reader.spec.max_episode_steps
+        )
         self._seeds = self._per_world(torch.int64)
         self._episodes = self._per_world(torch.int64)
-        self._elapsed = self._per_world(torch.int64)
+        self.episode_steps = self._per_world(torch.int64)
         self._seeded = self._begun = False
         self._steps = 0
 
@@ -145,16 +149,6 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             for world, chosen in zip(_numbers(batch.numbers), _numbers(batch.chosen), strict=True):
                 found[world] = known[chosen]
         return found
-
-    @property
-    def max_episode_steps(self) -> int | None:
-        """Steps after which an episode is truncated; None for never."""
-        return self._limit
-
-    @property
-    def episode_steps(self) -> Tensor:
-        """Steps of each world's episode so far, shape (n,); what is written here counts."""
-        return self._elapsed
 
     @without_gradients()
     def reset(
@@ -255,7 +249,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             [partial(batch.start, *row) for batch, row in zip(self.batches, rows, strict=True)]
         )
         self._episodes += mask
-        self._elapsed.masked_fill_(mask, 0)
+        self.episode_steps.masked_fill_(mask, 0)
         infos = self._gathered([info for _, info in starts]) if self._task_infos else {}
         return [seen for seen, _ in starts], infos
 
@@ -286,11 +280,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         rewards = self._gathered_one([outcome.rewards for _, outcome, _ in steps])
         terminated = self._gathered_one([outcome.terminated for _, outcome, _ in steps])
         diverged = self._gathered_one([bad for _, _, bad in steps])
-        self._elapsed += 1
-        if self._limit is None:
+        self.episode_steps += 1
+        if self.max_episode_steps is None:
             truncated = torch.zeros_like(terminated)
         else:
-            truncated = self._elapsed >= self._limit
+            truncated = self.episode_steps >= self.max_episode_steps
         ended = terminated | truncated
         # Whether an episode has ended is not asked: the answer would keep a GPU waiting.
         starts, start_infos = self._start(ended)
