@@ -120,7 +120,7 @@ def make_vec(
         for name, reason in _REFUSED.items():
             if arguments.get(name) is not None:
                 raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
-        from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader
+        from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader  # Warp.
 
         place = find_device(device)
         envs = WarpVectorEnv(
