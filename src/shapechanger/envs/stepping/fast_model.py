@@ -71,11 +71,11 @@ def _candidates(
         without_search = _without_search(model, make_spec)
         if without_search is not None:
             yield without_search
-        yield _without(model, _NO_ISLANDS)
+        yield _disabled(copy.copy(model), _NO_ISLANDS)
 
 
-def _without(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:
-    """Return a model with more disable flags, and with those of everything that it lacks."""
+def _disabled(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:
+    """Add disable flags to a model, and those of everything that it lacks; return it."""
     # If both springs and dampers are disabled, MuJoCo skips all other passive forces too, such as
     # fluid forces.
     has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
@@ -87,9 +87,8 @@ def _without(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:
         flags |= int(_BIT.mjDSBL_FRICTIONLOSS)
     if not model.nsensor:
         flags |= int(_BIT.mjDSBL_SENSOR)
-    result = copy.copy(model)
-    result.opt.disableflags |= flags
-    return result
+    model.opt.disableflags |= flags
+    return model
 
 
 def _without_search(
@@ -100,7 +99,7 @@ def _without_search(
         return None
     _, pairs = colliding_pairs(model)
     if not pairs.size:
-        return _without(model, _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS)
+        return _disabled(copy.copy(model), _NO_ISLANDS | _NO_SEARCH | _NO_CONTACTS)
     names = [model.geom(geom).name for geom in range(model.ngeom)]
     if not _on_one_floor(model, pairs) or not all(names):
         return None
@@ -121,7 +120,7 @@ def _without_search(
         result.body_conaffinity,
     ):
         bits[:] = 0
-    return _without(result, _NO_ISLANDS | _NO_SEARCH)
+    return _disabled(result, _NO_ISLANDS | _NO_SEARCH)
 
 
 def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:

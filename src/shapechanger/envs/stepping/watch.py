@@ -69,6 +69,7 @@ class ModelWatch:
         self.model = model
         self.timestep = float(model.opt.timestep)
         self._options, self._statistics = model.opt, model.stat
+        self._of_options, self._of_statistics = _readers()
         # These come first, wherever they are in memory, so that equal models have equal digests.
         views = [*_views(sys.maxsize, model.opt, model.stat), *_views(_APART, model)]
         # A bytearray compares itself with any buffer by memcmp; bytes would not.
@@ -95,8 +96,7 @@ class ModelWatch:
         return True
 
     def _read_numbers(self) -> tuple[Any, ...]:
-        of_options, of_statistics = _readers()
-        return of_options(self._options), of_statistics(self._statistics)
+        return self._of_options(self._options), self._of_statistics(self._statistics)
 
 
 def _views(apart: int, *owners: Any) -> list[Any]:

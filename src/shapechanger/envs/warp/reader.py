@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any, Final, Protocol, cast
 
 import gymnasium as gym
+from typing_extensions import override
 
 from shapechanger.envs.catalogue import FINGER_ENVS
 from shapechanger.envs.checks import describe_body
@@ -32,7 +33,11 @@ class Reader(Protocol):
         ...
 
     def read(self, body: Any) -> tuple[DeviceBody, BatchKind]:
-        """Compile a body, and return it with the kind of a batch that begins with it."""
+        """Compile a body, and return it with the kind of a batch that begins with it.
+
+        Raises:
+            ShapechangerError: If it cannot be built, or not for a device.
+        """
         ...
 
     def close(self) -> None:
@@ -75,17 +80,14 @@ def make_reader(
     return BodyReader(first, find_device_task(first, env_id), make, arguments)
 
 
-class BodyReader:
-    """Compiles bodies with CPU envs, and reads what a device needs to know about them.
+class BodyReader(Reader):
+    """Reads the bodies of a family, which CPU envs compile.
 
     Args:
         first: A CPU env of the task.
         task: Its batched functions.
         make: Makes a CPU env of it from arguments.
         arguments: Arguments of the CPU env.
-
-    Attributes:
-        spec: The spec of the CPU env, with its time limit.
     """
 
     def __init__(
@@ -103,22 +105,12 @@ class BodyReader:
         self._envs: list[Any] = [first.unwrapped]
         self._usual = cast("Body", self._envs[0].body)
 
+    @override
     def body(self, value: BodyLike | None) -> Body:
-        """Return the edits of a body; None gives the arguments' edits."""
         return self._usual if value is None else self._envs[0].family.body(value)
 
+    @override
     def read(self, body: Body) -> tuple[DeviceBody, BatchKind]:
-        """Compile a body.
-
-        Args:
-            body: Its edits.
-
-        Returns:
-            The body, and the kind of a batch that begins with it.
-
-        Raises:
-            MorphologyError: If it cannot be built.
-        """
         env = self._env_with(body)
         found = device_body(describe_body(env), env.model, self._task.constants(env))
         kind = BatchKind(
@@ -143,7 +135,7 @@ class BodyReader:
         self._envs.append(made)
         return made
 
+    @override
     def close(self) -> None:
-        """Close the CPU envs."""
         for env in self._envs:
             env.close()
