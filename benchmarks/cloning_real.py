@@ -50,11 +50,12 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.card import class_numbers
 from shapechanger.demos.cloning.evaluation import macro_f1, output_fields
-from shapechanger.demos.cloning.learn import clone, learn
+from shapechanger.demos.cloning.learn import learn
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import DEMOS, Augmentation, CloneSettings
 from shapechanger.demos.dataset import Dataset, load_dataset
+from shapechanger.layout import Feature, Layout
 from shapechanger.vehicles.cloning import record_demonstrations
 from shapechanger.vehicles.envs.demonstrators import CLONES
 
@@ -84,6 +85,7 @@ _WAYS: Final = {
         DEMOS.members,
     ),
 }
+_STEERING: Final = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in ("steering", "throttle")))
 # Steps recorded in randomised corridors: ten minutes, as for the shipped clone.
 STEPS: Final = 12_000
 KEPT: Final = Path("results", "real-frames", "randomised.safetensors")
@@ -321,6 +323,7 @@ def _from_simulation(data: Dataset) -> list[Row]:
     left, right, forward = (truth == names.index(n) for n in ("left", "right", "forward"))
     # The keys as a clone's action: full left or right, or straight on.
     keys = np.stack((right.astype(np.float32) - left, np.ones(len(truth), np.float32)), axis=1)
+    steered = replace(data, actions=keys, action_layout=_STEERING)
     later = np.arange(len(truth)) >= FEW
     sources = {"as shipped": CameraPolicy.load(CLONES["car"]), "randomised": _randomised()}
     found: list[Row] = []
@@ -339,8 +342,9 @@ def _from_simulation(data: Dataset) -> list[Row]:
     for name, source in {"no simulation": None, **sources}.items():
         each: list[float] = []
         for seed in range(SEEDS):
-            policy, _ = clone(
-                pictures[:FEW], keys[:FEW], settings=FEW_FRAMES, seed=seed, start=source
+            start = source or CameraPolicy.fresh(FEW_FRAMES, seed)
+            policy, _ = learn(
+                steered, ~later, settings=FEW_FRAMES, seed=seed, start=start, symmetric=True
             )
             steering = policy.predict_many(pictures)[:, 0]
             each.append(_auc(-steering, left & later, forward & later))
@@ -364,9 +368,8 @@ def _randomised() -> CameraPolicy:
     shown = record_demonstrations(
         EnvRef("shapechanger/Car-v1", {"randomise": True}), STEPS, 200, 0, settings.framing
     )
-    policy, _ = clone(
-        shown.pictures, shown.actions, settings=settings, seed=0, episodes=shown.episodes
-    )
+    start = CameraPolicy.fresh(settings, 0)
+    policy, _ = learn(shown, settings=settings, seed=0, start=start, symmetric=True)
     KEPT.parent.mkdir(parents=True, exist_ok=True)
     policy.save(KEPT)
     return policy

@@ -20,7 +20,7 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from benchmarks.waypoints import taught_source
-from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
+from shapechanger.demos.cloning.card import OnnxClone
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.layout import Layout
 from shapechanger.robot.client.env import RemoteVehicleEnv
@@ -116,7 +116,7 @@ def on_board(vehicle: str = "car") -> list[Row]:
     for kind, (env, policy) in envs.items():
         with tempfile.TemporaryDirectory() as place, closing(env):
             file = Path(place, "policy.onnx")
-            export_clone(policy, file, control_hz=1e3 / _PERIOD_MS)
+            policy.export(file, control_hz=1e3 / _PERIOD_MS)
             if policy is clone:
                 rows.append(_inference_row(vehicle, OnnxClone(file)))
             here = DriveScore.of([drive(env, policy.predict, course=c) for c in courses])

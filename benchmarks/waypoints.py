@@ -28,10 +28,10 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.cloning.learn import clone, learn
+from shapechanger.demos.cloning.learn import learn
+from shapechanger.demos.cloning.pictures import ShrunkFrames
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.shrinking import ShrunkFrames
-from shapechanger.demos.dataset import Dataset, load_dataset
+from shapechanger.demos.dataset import Dataset, load_dataset, merged
 from shapechanger.demos.drivers import DriverDecision, Pilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.robot.profile.load import find_profile
@@ -39,7 +39,7 @@ from shapechanger.robot.twin.robot import run_robot
 from shapechanger.transfer.executor import use_one_thread
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.vehicles.cameras.rectify import CanonicalView
-from shapechanger.vehicles.cloning import CloningSettings, record_demonstrations, state_actions
+from shapechanger.vehicles.cloning import CloningSettings, record_demonstrations
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 from shapechanger.vehicles.envs.demonstrators import CLONES, waypoint_demonstrator
@@ -387,14 +387,9 @@ def taught_source(name: str, seed: int) -> CameraPolicy:
         record_demonstrations(env, steps, settings.episode_steps, seed, settings.clone.framing)
         for env in envs
     ]
-    policy, _ = clone(
-        np.concatenate([one.pictures for one in shown]),
-        np.concatenate([one.actions for one in shown]),
-        settings=settings.clone,
-        seed=seed,
-        episodes=[length for one in shown for length in one.episodes],
-    )
-    policy = state_actions(policy, envs[0])
+    data = merged(shown)
+    start = CameraPolicy.fresh(settings.clone, seed, data.action_layout)
+    policy, _ = learn(data, settings=settings.clone, seed=seed, start=start, symmetric=True)
     policy.save(path)
     return policy
 

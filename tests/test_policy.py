@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.policy import UNUSABLE, kind_of, read_tensors, tensor_bytes
+from shapechanger.errors import CorruptStudy
+from shapechanger.policy import kind_of, read_tensors, refusing, tensor_bytes
 
 _GIB = 1 << 30
 _ARRAYS = {"first": np.arange(4, dtype=np.float32), "second": np.ones((2, 2), np.float32)}
@@ -84,10 +85,9 @@ def test_a_forged_header_is_refused(path: Path, name: str) -> None:
 
 
 def _refused(path: Path) -> str:
-    with pytest.raises(UNUSABLE) as refusal:
+    with pytest.raises(CorruptStudy) as refusal, refusing(path, CorruptStudy):
         read_tensors(path, "test")
     text = str(refusal.value)
-    assert text
     assert text.isprintable()
     return text
 

@@ -184,9 +184,9 @@ MODELS.ship({"mujoco": "morphology.certificate.changes:ModelNumbers"})
 POLICIES.ship(
     {
         "trained": "transfer.learners.policy_file:TrainedPolicy.load",
-        "trained-onnx": "transfer.onnx_policy:OnnxPolicy",
+        "trained-onnx": "transfer.learners.card:OnnxPolicy",
         "clone": "demos.cloning.policy:CameraPolicy.load",
-        "clone-onnx": "demos.cloning.onnx_policy:OnnxClone",
+        "clone-onnx": "demos.cloning.card:OnnxClone",
     }
 )
 ROBOTS.ship({"profile": "vehicles.twin:read_robot"})

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, Generic, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import MissingExtra, ShapechangerError, no_policy_file
+from shapechanger.errors import MissingExtra, ShapechangerError
 from shapechanger.files import make_folder, write_atomic
-from shapechanger.policy import read_limited, refusal
+from shapechanger.policy import read_limited, refusing
 
 _OPSET: Final = 18
-_CARD: Final = "shapechanger"
+CARD: Final = "shapechanger"
+"""Name of the metadata that holds the card of a trained policy."""
 
 Card = TypeVar("Card")
 
@@ -91,12 +91,14 @@ def export_network(
     write_atomic(path, model.SerializeToString())
 
 
-class OnnxNetwork(Generic[Card]):
-    """The network of an ONNX file, which runs on the CPU without PyTorch.
-
-    Attributes:
-        card: Its card.
-        digest: First digits of the SHA-256 of the file.
+def read_network(
+    path: Path,
+    card_type: type[Card],
+    shapes_of: Callable[[Card], dict[str, list[int]]],
+    error: type[ShapechangerError],
+    key: str = CARD,
+) -> tuple[Card, Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float32]]]:
+    """Read a network from an ONNX file, which runs on the CPU without PyTorch.
 
     Args:
         path: The file, read once: a later change of it changes nothing here.
@@ -106,54 +108,30 @@ class OnnxNetwork(Generic[Card]):
         error: Exception for a file that cannot be used.
         key: Name of the metadata that holds the card.
 
+    Returns:
+        The card, and a function from inputs by name, each of shape (n, ...), to the output.
+
     Raises:
         MissingExtra: If onnxruntime is not installed.
     """
-
-    def __init__(
-        self,
-        path: Path,
-        card_type: type[Card],
-        shapes_of: Callable[[Card], dict[str, list[int]]],
-        error: type[ShapechangerError],
-        key: str = _CARD,
-    ) -> None:
+    with refusing(path, error):
+        content = read_limited(path)
         try:
-            content = read_limited(path)
-            self._session = _session(content)
-            facts = self._session.get_modelmeta().custom_metadata_map
-            if key not in facts:
-                raise ValueError("it has no card of Shapechanger")
-            self.card = msgspec.json.decode(facts[key], type=card_type)
-            sides = (*self._session.get_inputs(), *self._session.get_outputs())
-            found = {side.name: list(side.shape[1:]) for side in sides}
-            if found != (stated := shapes_of(self.card)):
-                raise ValueError(f"its network takes and gives {found}, and its card says {stated}")
-        except FileNotFoundError as missing:
-            raise error(no_policy_file(path)) from missing
-        except MissingExtra:
-            raise
-        except Exception as cause:  # The runtime's errors have no common base.
-            raise error(
-                f"{path} is not a policy that `shapechanger policies export` has written "
-                f"({refusal(cause)})."
-            ) from cause
-        self.digest = hashlib.sha256(content).hexdigest()[:12]
-
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
-        """Return the output for inputs by name, each of shape (n, ...)."""
-        return self._session.run(None, dict(inputs))[0]
-
-
-def _session(content: bytes) -> Any:
-    """Return a session of onnxruntime for the content of a file."""
-    try:
-        import onnxruntime  # pyright: ignore[reportMissingTypeStubs]
-    except ImportError as error:
-        raise MissingExtra("onnxruntime", "onboard") from error
-    runtime: Any = onnxruntime
-    options = runtime.SessionOptions()
-    # One policy is small: more threads would only wait for one another.
-    options.intra_op_num_threads = 1
-    options.log_severity_level = 4  # What is wrong is raised, too.
-    return runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+            import onnxruntime  # pyright: ignore[reportMissingTypeStubs]
+        except ImportError as missing:
+            raise MissingExtra("onnxruntime", "onboard") from missing
+        runtime: Any = onnxruntime
+        options = runtime.SessionOptions()
+        # One policy is small: more threads would only wait for one another.
+        options.intra_op_num_threads = 1
+        options.log_severity_level = 4  # What is wrong is raised, too.
+        session = runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        facts = session.get_modelmeta().custom_metadata_map
+        if key not in facts:
+            raise ValueError("it has no card of Shapechanger")
+        card = msgspec.json.decode(facts[key], type=card_type)
+        sides = (*session.get_inputs(), *session.get_outputs())
+        found = {side.name: list(side.shape[1:]) for side in sides}
+        if found != (stated := shapes_of(card)):
+            raise ValueError(f"its network takes and gives {found}, and its card says {stated}")
+        return card, lambda inputs: session.run(None, dict(inputs))[0]

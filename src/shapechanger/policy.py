@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final
@@ -19,8 +20,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import CorruptStudy, MissingExtra, no_policy_file
+from shapechanger.errors import CorruptStudy, MissingExtra, ShapechangerError, no_policy_file
 from shapechanger.registry import POLICIES
+
+CLONE_CARD: Final = "shapechanger-clone"
+"""Name of the metadata of an ONNX file that holds the card of a cloned policy."""
 
 _CARD: Final = "card"
 _HASH: Final = "sha256"
@@ -30,12 +34,6 @@ _LENGTH_BYTES: Final = 8
 _MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON takes twenty times as much memory.
 _MAX_BYTES: Final = 2**28
 _LONGEST: Final = 200  # Of a reason, characters.
-
-_UNREADABLE: Final = (OSError, LookupError, ValueError, msgspec.MsgspecError)
-# Raised by Stable-Baselines3 and PyTorch for cards and weights that do not make a model.
-_UNBUILDABLE: Final = (RuntimeError, TypeError, AssertionError, ArithmeticError, MemoryError)
-UNUSABLE: Final = (*_UNREADABLE, *_UNBUILDABLE)
-"""Exceptions for files that are damaged or something else."""
 
 _PREFIX: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ")
 # Messages of onnxruntime, and what they mean for who gave the file.
@@ -90,20 +88,30 @@ def save_policy(policy: Any, path: str | PathLike[str]) -> None:
     policy.save(Path(path))
 
 
-def refusal(error: Exception) -> str:
-    """Return why a file is no policy, for the end of a sentence.
+@contextmanager
+def refusing(path: Path, error: type[ShapechangerError]) -> Generator[None]:
+    """Raise in one sentence why a file is no policy, whatever reading it raises.
 
     Args:
-        error: What reading it has raised.
+        path: The file.
+        error: Exception to raise; one of it, or of a missing package, passes as it is.
     """
-    text = _PREFIX.sub("", (str(error).strip().splitlines() or [""])[0])
-    for pattern, words in _TRANSLATED:
-        if match := re.search(pattern, text):
-            return match.expand(words)
-    text = text[:_LONGEST].rstrip(".: ")
-    if isinstance(error, KeyError):
-        return f"it lacks {text}"
-    return text or "it needs more memory than there is"
+    try:
+        yield
+    except FileNotFoundError as missing:
+        raise error(no_policy_file(path)) from missing
+    except (error, MissingExtra):
+        raise
+    except Exception as cause:  # The errors of libraries have no common base.
+        line = _PREFIX.sub("", (str(cause).strip().splitlines() or [""])[0])
+        text = line[:_LONGEST].rstrip(".: ") or "it needs more memory than there is"
+        if isinstance(cause, KeyError):
+            text = f"it lacks {text}"
+        for pattern, words in _TRANSLATED:
+            if match := re.search(pattern, line):
+                text = match.expand(words)
+                break
+        raise error(f"{path} is not a policy that Shapechanger has written ({text}).") from cause
 
 
 def kind_of(path: Path) -> str:
@@ -113,14 +121,14 @@ def kind_of(path: Path) -> str:
         path: The file, of which only the header is read; all of an ONNX file.
     """
     if path.suffix == ".onnx":
-        is_clone = path.is_file() and b"shapechanger-clone" in path.read_bytes()
+        is_clone = path.is_file() and CLONE_CARD.encode() in path.read_bytes()
         return "clone-onnx" if is_clone else "trained-onnx"
     try:
         _require_file(path)
         with path.open("rb") as file:
             length = int.from_bytes(file.read(_LENGTH_BYTES), "little")
             return _metadata(file.read(min(length, _MAX_HEADER_BYTES))).get(_KIND, "")
-    except _UNREADABLE:
+    except (OSError, LookupError, ValueError, msgspec.MsgspecError):
         return ""
 
 
@@ -186,7 +194,7 @@ def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[A
 
 
 def _safetensors() -> Any:
-    """Import safetensors, which robots that run ONNX files do without."""
+    """Import safetensors, which robots that run ONNX files lack."""
     try:
         from safetensors import numpy
     except ImportError as error:

@@ -9,7 +9,7 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
-from shapechanger.transfer.onnx_policy import OnnxPolicy
+from shapechanger.transfer.learners.card import OnnxPolicy
 from tests.cli.running import Cli
 
 _TINY = [

@@ -1,5 +1,6 @@
 """Recordings loaded as arrays."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.demos.dataset import load_dataset
+from shapechanger.demos.dataset import load_dataset, merged
 from shapechanger.demos.episodes import EpisodeWriter, drop
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError, UnknownName
@@ -46,6 +47,20 @@ def test_kept_steps_of_persons_are_loaded_in_order(tmp_path: Path) -> None:
     assert data.states.shape == (9, 2)
     assert (data.action_layout, data.state_layout) == (ACTIONS, STATES)
     assert data.files[1].endswith("step 2")
+    assert data.duration_s == pytest.approx(sum(data.times_s[[3, 8]]) + 2.0 / data.control_hz)
+
+
+def test_parts_are_merged_to_the_whole(tmp_path: Path) -> None:
+    for _ in range(2):
+        _recorded(tmp_path)
+    data = replace(load_dataset(tmp_path), states=None, state_layout=None)
+    early = np.arange(len(data)) < 3
+    parts = data.part(early), data.part(~early)
+    assert [part.episodes for part in parts] == [(3,), (2, 5)]
+    whole = merged(parts)
+    assert whole.files == data.files
+    for name in ("pictures", "actions", "times_s"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(data, name))
 
 
 def test_a_shared_frame_is_kept_for_its_step_and_shrunk(tmp_path: Path) -> None:

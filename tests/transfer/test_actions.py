@@ -21,11 +21,11 @@ from shapechanger.transfer.actions import ActionScale, learners_space, require_r
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.export import export_onnx
 from shapechanger.transfer.learners.algorithms import SpacesOnly
+from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import Sb3Settings
-from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.transplant import transplant
 from tests.transfer.test_learners import SHORT
 

@@ -14,17 +14,14 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.files import from_builtins
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners import SharedFile
+from shapechanger.transfer.learners import PolicyOrigin, SharedFile
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from shapechanger.vehicles import cloning
-from shapechanger.vehicles.cloning import (
-    CloneLearner,
-    CloningSettings,
-    record_demonstrations,
-)
+from shapechanger.vehicles.cloning import CloneLearner, CloningSettings, record_demonstrations
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG, curves
 
@@ -47,12 +44,11 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 def test_demonstrations_pair_images_with_intended_actions() -> None:
     """Recorded actions are the intended ones for the image before them."""
     shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
+    assert shown.pictures is not None
     assert shown.pictures.shape == (150, 12, 20, 3)
     assert shown.episodes == (20,) * 7 + (10,)
     bright = shown.pictures[:, 6, :, 0].argmax(axis=1)
-    left = (
-        bright < 8
-    )  # The stripe is on the left: the lane env is right of the middle and must go left.
+    left = bright < 8  # The env is right of the middle, and must go left.
     right = bright > 9
     assert left.any()
     assert right.any()
@@ -62,7 +58,7 @@ def test_demonstrations_pair_images_with_intended_actions() -> None:
 
 def test_fewer_demonstrations_are_the_first_of_more() -> None:
     more, fewer = (record_demonstrations(LANE, steps, 20, 3, _FRAMING) for steps in (50, 30))
-    first = more.first(30)
+    first = more.part(np.arange(50) < 30)
     np.testing.assert_array_equal(first.pictures, fewer.pictures)
     np.testing.assert_array_equal(first.actions, fewer.actions)
     assert first.episodes == fewer.episodes == (20, 10)
@@ -222,14 +218,8 @@ def test_settings_that_contradict_themselves_are_refused() -> None:
 
 
 def test_steps_are_rounded_up_to_a_budget() -> None:
-    assert [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)] == [
-        30,
-        30,
-        60,
-        120,
-        120,
-    ]
-    assert TINY_CLONING.within(60) == (30, 60)
+    rounded = [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)]
+    assert rounded == [30, 30, 60, 120, 120]
     assert (TINY_CLONING.steps, TINY_CLONING.eval_every) == (120, 30)
 
 
@@ -242,3 +232,22 @@ def test_the_learner_is_found_by_name() -> None:
     again = msgspec.json.decode(msgspec.json.encode(plan), type=Plan, dec_hook=from_builtins)
     assert again == plan
     assert isinstance(again.settings, CloningSettings)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_envs_without_a_demonstrator_are_refused(order: int) -> None:
+    task = TransferTask(*(LANE, BIG)[::order])
+    with pytest.raises(
+        StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and cloning"
+    ):
+        make_plan(task, "cloning", TINY_CLONING, seeds=2)
+
+
+@pytest.mark.parametrize("vehicle", CLONES)
+def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
+    """Their cards name the env and the 12,000 demonstrated steps."""
+    settings = LEARNERS["cloning"]
+    assert isinstance(settings, CloningSettings)
+    env = EnvRef(f"shapechanger/{vehicle.capitalize()}-v1", {"put_back": True})
+    origin = CloneLearner("cloning", settings).origin(CLONES[vehicle])
+    assert origin == PolicyOrigin(env, 12_000, {})

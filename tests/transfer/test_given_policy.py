@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
@@ -76,16 +77,17 @@ def test_a_study_resumes_with_its_planned_clone_only(clone_file: Path, tmp_path:
         run_study(_plan(clone_file), tmp_path / "study", source_policy=other, executor=Serial())
 
 
-def test_a_clone_of_another_body_is_refused(clone_file: Path) -> None:
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (WET, r"was trained in .*Dry-v1, and the source is .*Wet-v1"),
+        (msgspec.structs.replace(DRY, kwargs={"grip": 0.1}), r"is .*Dry-v1 \(grip=0\.1\)"),
+    ],
+)
+def test_a_clone_of_another_source_is_refused(clone_file: Path, source: EnvRef, words: str) -> None:
     """The message names the env that it was trained in."""
-    with pytest.raises(SpaceMismatch, match=r"was trained in .*Dry-v1, and the source is .*Wet-v1"):
-        _plan(clone_file, task=TransferTask(WET, ICY))
-
-
-def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Path) -> None:
-    slippery = msgspec.structs.replace(DRY, kwargs={"grip": 0.1})
-    with pytest.raises(SpaceMismatch, match=r"the source is .*Dry-v1 \(grip=0\.1\)"):
-        _plan(clone_file, task=TransferTask(slippery, ICY))
+    with pytest.raises(SpaceMismatch, match=words):
+        _plan(clone_file, task=TransferTask(source, ICY))
 
 
 def test_ppo_refuses_a_clone(clone_file: Path) -> None:
@@ -125,9 +127,6 @@ def test_invalid_policy_files_are_refused(clone_file: Path, tmp_path: Path) -> N
     (tmp_path / "text.safetensors").write_text("not at all")
     with pytest.raises(CorruptStudy, match=r"text\.safetensors is not a policy"):
         _plan(tmp_path / "text.safetensors")
-    (tmp_path / "half.safetensors").write_bytes(clone_file.read_bytes()[:5000])
-    with pytest.raises(PolicyError, match=r"half\.safetensors is not a cloned policy"):
-        _plan(tmp_path / "half.safetensors")
     damaged = bytearray(clone_file.read_bytes())
     damaged[-2000] ^= 0xFF
     (tmp_path / "damaged.safetensors").write_bytes(damaged)

@@ -19,12 +19,12 @@ from shapechanger.errors import CorruptStudy, StudyError, UnknownName
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_onnx
+from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import ImportedSettings, OffPolicySettings, Sb3Settings
-from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 

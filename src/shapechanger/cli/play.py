@@ -24,9 +24,8 @@ from shapechanger.transfer.identities import ENV, require_same_env
 from shapechanger.transfer.learners.evaluation import random_actions
 
 if TYPE_CHECKING:
+    from shapechanger.transfer.learners.card import PolicyCard
     from shapechanger.transfer.learners.evaluation import Act
-    from shapechanger.transfer.learners.policy_file import PolicyCard
-    from shapechanger.transfer.onnx_policy import OnnxCard
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,9 +119,9 @@ def load_any_policy(file: Path, learner: str = "") -> Any:
     return load_policy(file, learner)
 
 
-def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
+def _fitting(env: gym.Env[Any, Any], card: PolicyCard) -> gym.Env[Any, Any]:
     """Return an env with a policy's layouts, through the body map of same names if needed."""
-    settings: Any = getattr(card, "settings", None)
+    settings: Any = card.settings
     if settings is not None and "many bodies" in settings.takes:
         from shapechanger.transfer.limbs.envs import fitted  # PyTorch.
 

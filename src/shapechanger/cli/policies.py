@@ -18,7 +18,6 @@ from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
 from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
 from shapechanger.cli.play import Watching, acting_in, load_any_policy
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
-from shapechanger.demos.cloning.onnx_policy import export_clone
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.envs.naming import allow_own_modules, driven, env_ref
 from shapechanger.errors import HubError, ShapechangerError, StudyError
@@ -236,7 +235,7 @@ class PoliciesExport(_InEnv):
             raise StudyError(f"{self.file} has been exported already.")
         if kind == "clone":
             body, control_hz = _learned_with(policy.card)
-            export_clone(policy, self.out, body=body, control_hz=control_hz)
+            policy.export(self.out, body=body, control_hz=control_hz)
         else:
             from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
 

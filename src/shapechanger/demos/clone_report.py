@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.demos.cloning.evaluation import Bin, EvaluationResult, named, outlook
-from shapechanger.files import write_json
+from shapechanger.files import write_atomic, write_json
 from shapechanger.reports.charts import BLUE, GREEN, GREY, ORANGE, PINK, SQUARE, WIDE, svg_chart
 from shapechanger.reports.page import png_uri, render, svg_uri
 
@@ -25,42 +25,19 @@ _MAX_SCATTERS: Final = 4
 _MAGNIFICATION: Final = 3
 
 
-def write_numbers(
-    path: Path, policy: CameraPolicy, evaluation: EvaluationResult, training: Training | None
-) -> None:
-    """Write the report's numbers as JSON.
-
-    Args:
-        path: The file.
-        policy: The policy.
-        evaluation: Its evaluation.
-        training: How it was trained; None if unknown.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
-    write_json(
-        path,
-        {
-            "evaluation": evaluation,
-            "training": training,
-            "policy": policy.card,
-            "outlook": outlook(policy.card),
-        },
-    )
-
-
-def clone_html(
+def write_report(
+    page: Path,
     name: str,
     policy: CameraPolicy,
     data: Dataset,
     evaluation: EvaluationResult,
     training: Training | None,
     data_note: str,
-) -> str:
-    """Render the report.
+) -> Path:
+    """Write the report, and its numbers as JSON next to it.
 
     Args:
+        page: The file of the report.
         name: Name of the policy.
         policy: The policy.
         data: The steps that it was evaluated on, which `evaluation.worst` indexes.
@@ -68,12 +45,17 @@ def clone_html(
         training: How it was trained; None if unknown.
         data_note: A sentence on the steps that it was evaluated on.
 
+    Returns:
+        The file of the numbers.
+
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
+        OutputError: If a file cannot be written.
     """
     card = policy.card
     by_class = evaluation.head == "class"
-    return render(
+    ahead = outlook(card)
+    html = render(
         Path(__file__).with_name("clone.html"),
         title=name,
         verdict=(
@@ -82,7 +64,7 @@ def clone_html(
             f"{evaluation.majority_baseline:.1%}. {data_note}"
         ),
         cards=_cards(evaluation),
-        outlook=outlook(policy.card),
+        outlook=ahead,
         evaluation=evaluation,
         errors=[
             (number, f"{error:.4g}")
@@ -105,6 +87,11 @@ def clone_html(
         ),
         weights=sum(p.numel() for p in policy.network.parameters()),
     )
+    write_atomic(page, html.encode())
+    numbers = page.with_suffix(".json")
+    found = {"evaluation": evaluation, "training": training, "policy": card, "outlook": ahead}
+    write_json(numbers, found)
+    return numbers
 
 
 def _cards(evaluation: EvaluationResult) -> list[tuple[str, str]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -43,7 +44,7 @@ class Dataset:
         actions: Decided actions, shape (n, m), in the order of the layout.
         episodes: Number of steps of each episode, in order; each positive.
         times_s: Time of each step since the start of its episode, s, shape (n,).
-        files: Origin of each step, for people to read.
+        files: Origin of each step, for people to read; () if unknown.
         action_layout: Meaning of the values of an action.
         state_layout: Meaning of the values of a state; None without states.
         control_hz: Steps per second.
@@ -71,6 +72,42 @@ class Dataset:
         """Describe the shapes instead of printing the arrays."""
         seen = "no pictures" if self.pictures is None else f"pictures {self.pictures.shape[1:]}"
         return f"Dataset({len(self)} steps of {len(self.episodes)} episodes, {seen})"
+
+    @property
+    def duration_s(self) -> float:
+        """Length by the times, s; the last step of an episode takes the inverse of the rate."""
+        ends = np.cumsum(self.episodes)
+        begins = ends - np.asarray(self.episodes)
+        total = float((self.times_s[ends - 1] - self.times_s[begins]).sum())
+        return total + (len(ends) / self.control_hz if self.control_hz > 0.0 else 0.0)
+
+    def part(self, which: NDArray[np.bool_]) -> Dataset:
+        """Return the steps that a mask of shape (n,) selects."""
+        episodes = np.split(which, np.cumsum(self.episodes)[:-1])
+        return replace(
+            self,
+            pictures=None if self.pictures is None else self.pictures[which],
+            states=None if self.states is None else self.states[which],
+            actions=self.actions[which],
+            episodes=tuple(int(steps.sum()) for steps in episodes if steps.any()),
+            times_s=self.times_s[which],
+            files=tuple(compress(self.files, which)),
+        )
+
+
+def merged(datasets: Sequence[Dataset]) -> Dataset:
+    """Return the steps of several datasets of images, whose other attributes are of the first."""
+    pictures = [data.pictures for data in datasets if data.pictures is not None]
+    return replace(
+        datasets[0],
+        pictures=np.concatenate(pictures),
+        states=None,
+        actions=np.concatenate([data.actions for data in datasets]),
+        episodes=tuple(length for data in datasets for length in data.episodes),
+        times_s=np.concatenate([data.times_s for data in datasets]),
+        files=tuple(file for data in datasets for file in data.files),
+        state_layout=None,
+    )
 
 
 def load_dataset(

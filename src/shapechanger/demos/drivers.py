@@ -205,7 +205,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     def fitting(actions: NDArray[Any]) -> NDArray[np.float32]:
         return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
 
-    if kind_of(path) == "clone":
+    if kind_of(path).startswith("clone"):
         clone = _clone(path, env)
         return lambda seen: fitting(clone(seen))
     policy = load_policy(path)
@@ -219,9 +219,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
 
 def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
     """Load a clone, and check that it fits the env's frames, state and actions."""
-    from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
-
-    clone = CameraPolicy.load(path)
+    clone = load_policy(path)
     encoder = ObservationEncoder(env, QUALITY)
     needs = {"image": clone.card.eyes != "none", "state": clone.card.state_layout is not None}
     if needs["image"] and not encoder.has_picture:

@@ -18,13 +18,13 @@ from torch import Tensor, nn
 
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError, TransplantError
-from shapechanger.onnx_file import export_network
+from shapechanger.onnx_file import CARD, export_network
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.identities import identities_in
+from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.limbs.envs import fitted
 from shapechanger.transfer.limbs.rows import LimbRows
-from shapechanger.transfer.onnx_policy import OnnxCard
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 from shapechanger.transfer.transplant.model import check_supported
 
@@ -48,8 +48,7 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
         check_supported(policy.model)
     except TransplantError as error:
         raise StudyError(f"This policy cannot be exported: {error}") from error
-    card = msgspec.convert(policy.card, OnnxCard, from_attributes=True)
-    _write(_MeanActions(policy), card, path)
+    _write(_MeanActions(policy), policy.card, path)
 
 
 def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, path: Path) -> None:
@@ -71,7 +70,7 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
     rows = fitted(env, policy.card.observation, settings.room).rows
     observation, action = layouts_of(env)
     card = msgspec.structs.replace(
-        msgspec.convert(policy.card, OnnxCard, from_attributes=True),
+        policy.card,
         env=ref,
         observation=observation,
         action=action,
@@ -80,7 +79,8 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
     _write(_LimbActions(policy.model.policy, rows), card, path)
 
 
-def _write(network: nn.Module, card: OnnxCard, path: Path) -> None:
+def _write(network: nn.Module, card: PolicyCard, path: Path) -> None:
+    card = msgspec.structs.replace(card, settings=None)
     names = {
         "observation_names": json.dumps(card.observation.names),
         "action_names": json.dumps(card.action.names),
@@ -90,7 +90,7 @@ def _write(network: nn.Module, card: OnnxCard, path: Path) -> None:
         {"observation": torch.zeros((2, card.observation.size), dtype=torch.float64)},
         "action",
         path,
-        {**names, "shapechanger": msgspec.json.encode(card).decode()},
+        {**names, CARD: msgspec.json.encode(card).decode()},
     )
 
 

@@ -13,9 +13,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from itertools import accumulate, chain, pairwise
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 import msgspec
@@ -30,12 +31,14 @@ from shapechanger.contract.env_ref import (
     TaskDemonstrator,
     layouts_of,
 )
-from shapechanger.demos.cloning.learn import clone
+from shapechanger.demos.cloning.learn import learn
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.demos.dataset import Dataset, merged
 from shapechanger.errors import StudyError
 from shapechanger.files import make_folder
+from shapechanger.layout import Layout
 from shapechanger.policy import kind_of, load_policy
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.identities import ENV, identify, known, require_same_env
@@ -52,6 +55,7 @@ from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
 )
+from shapechanger.vehicles.expert import PERIOD_S
 from shapechanger.vehicles.waypoints import LEAST_THROTTLE
 
 if TYPE_CHECKING:
@@ -121,31 +125,6 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
             "cloned again from the same start, and all arms use the same demonstrations."
         )
 
-    def within(self, steps: int) -> tuple[int, ...]:
-        """Return the budgets up to `steps`."""
-        return tuple(budget for budget in self.budgets if budget <= steps)
-
-
-class Demonstrations(NamedTuple):
-    """Recorded demonstrations.
-
-    Attributes:
-        pictures: (n, h, w, 3) as a policy sees them.
-        actions: (n, 2) intended action of the demonstrator at each image.
-        episodes: Number of steps of each episode, in order.
-    """
-
-    pictures: NDArray[np.uint8]
-    actions: NDArray[np.float32]
-    episodes: tuple[int, ...]
-
-    def first(self, steps: int) -> Demonstrations:
-        """Return the first `steps` steps."""
-        begins = [0, *accumulate(self.episodes)]
-        lengths = (min(end, steps) - begin for begin, end in pairwise(begins))
-        kept = tuple(length for length in lengths if length > 0)
-        return Demonstrations(self.pictures[:steps], self.actions[:steps], kept)
-
 
 def drive(
     env: gym.Env[Any, Any],
@@ -155,7 +134,7 @@ def drive(
     seed: int | None,
     chosen: Callable[[NDArray[np.uint8], NDArray[np.float32]], NDArray[np.float32]],
     on_steps: Callable[[int], None] = lambda steps: None,
-) -> Demonstrations:
+) -> Dataset:
     """Drive, and record what a demonstrator does.
 
     Args:
@@ -166,6 +145,9 @@ def drive(
         seed: Seed of the first reset.
         chosen: Returns the action to take, for a frame and the demonstrator's disturbed action.
         on_steps: Called with the number of steps driven, after each episode.
+
+    Returns:
+        Frames as a policy sees them, with the action that the demonstrator intended at each.
     """
     pictures: list[NDArray[np.uint8]] = []
     actions = np.empty((steps, 2), np.float32)
@@ -182,13 +164,30 @@ def drive(
             episodes[-1] += 1
             over = terminated or truncated
         on_steps(len(pictures))
-    return Demonstrations(np.stack(pictures), actions, tuple(episodes))
+    return _dataset(np.stack(pictures), actions, episodes, layouts_of(env)[1])
+
+
+def _dataset(
+    pictures: NDArray[np.uint8], actions: NDArray[np.float32], episodes: list[int], layout: Layout
+) -> Dataset:
+    times_s = PERIOD_S * np.concatenate([np.arange(length) for length in episodes])
+    return Dataset(
+        pictures,
+        None,
+        actions,
+        tuple(episodes),
+        times_s.astype(np.float64),
+        (),
+        layout,
+        None,
+        1.0 / PERIOD_S,
+    )
 
 
 def record_demonstrations(
     env: EnvRef, steps: int, episode_steps: int, seed: int, framing: Framing
-) -> Demonstrations:
-    """Record the demonstrator of an env."""
+) -> Dataset:
+    """Record the demonstrator of an env, as `drive` does."""
     with closing(env.make(max_episode_steps=episode_steps)) as made:
         if not isinstance(made.unwrapped, HasDemonstrator):
             raise StudyError(f"{env} has no demonstrator to learn from.")
@@ -198,22 +197,28 @@ def record_demonstrations(
 
 def load_or_record(
     file: SharedFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
-) -> Demonstrations:
+) -> Dataset:
     """Load demonstrations from a file that has enough of them, or record and write it."""
     path = file.path
     if path.exists():
-        with np.load(path) as arrays:
-            episodes = tuple(arrays["episodes"].tolist())
-            found = Demonstrations(arrays["pictures"], arrays["actions"], episodes)
-        if len(found.actions) >= steps:
-            return found.first(steps)
+        with np.load(path) as arrays, closing(env.make()) as made:
+            if len(arrays["actions"]) >= steps:
+                episodes, layout = arrays["episodes"].tolist(), layouts_of(made)[1]
+                return _first(
+                    _dataset(arrays["pictures"], arrays["actions"], episodes, layout), steps
+                )
     recorded = record_demonstrations(env, steps, episode_steps, file.seed, framing)
     make_folder(path.parent)
     # Two arms may record the same demonstrations at the same time, each in its own process.
     part = path.with_name(f".{path.stem}.{os.getpid()}.npz")
-    np.savez(part, **recorded._asdict())
+    arrays = {name: getattr(recorded, name) for name in ("pictures", "actions", "episodes")}
+    np.savez(part, **arrays)
     part.replace(path)
     return recorded
+
+
+def _first(data: Dataset, steps: int) -> Dataset:
+    return data.part(np.arange(len(data)) < steps)
 
 
 class _CardData(msgspec.Struct):
@@ -273,7 +278,7 @@ class CloneLearner(Learner[CloningSettings]):
             The clone of the last budget.
         """
         del body_map
-        settings = self.settings.clone
+        settings, own_seed = self.settings.clone, seed % 2**31
         policy = CameraPolicy.fresh(settings, seed) if start is None else start
         on_evaluation(self.evaluate(env, policy))
         length = self.settings.episode_steps
@@ -281,18 +286,19 @@ class CloneLearner(Learner[CloningSettings]):
         mixed = None
         if rehearsed is not None:
             of_source, some, file = rehearsed
-            seen = load_or_record(file, of_source, some, length, settings.framing)
-            mixed = seen.pictures, seen.actions
-        for budget in (steps,) if only_last else self.settings.within(steps):
-            part = recorded.first(budget)
-            policy, _ = clone(
-                part.pictures,
-                part.actions,
+            mixed = load_or_record(file, of_source, some, length, settings.framing)
+        if start is None:
+            start = CameraPolicy.fresh(settings, own_seed, recorded.action_layout)
+        for budget in (steps,) if only_last else self.settings.budgets:
+            if budget > steps:
+                break
+            policy, _ = learn(
+                _first(recorded, budget),
                 settings=settings,
-                seed=seed % 2**31,
-                episodes=part.episodes,
+                seed=own_seed,
                 start=start,
                 rehearsal=mixed,
+                symmetric=True,
             )
             on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
             on_steps(budget)
@@ -343,20 +349,9 @@ class CloneLearner(Learner[CloningSettings]):
 
 
 def stated(policy: CameraPolicy, env: EnvRef, **data: Any) -> CameraPolicy:
-    """State in a clone's card its env, and what its actions mean."""
+    """State in a clone's card the env that it learned in."""
     identity = known({ENV: identify(env).identity})
-    policy = state_actions(policy, env)
     return policy.described(identity=identity, env=env.id, arguments=env.kwargs, **data)
-
-
-def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
-    """State in a clone's card what its actions mean, unless they are steering and throttle."""
-    with closing(env.make()) as made:
-        _, layout = layouts_of(made)
-    if layout.names == ("steering", "throttle"):
-        return policy
-    card = msgspec.structs.replace(policy.card, action_layout=layout)
-    return CameraPolicy(policy.network, card)
 
 
 STUDENT_STEPS: Final = 7200
@@ -419,9 +414,7 @@ def train_student(
             require_same_env(teacher.card.identity, teacher.card.env, now, "the teacher", remedy)
         driver = inner.taught_by(teacher.act, seed)
 
-        def lesson(
-            steps: int, before: int = 0, student: CameraPolicy | None = None
-        ) -> Demonstrations:
+        def lesson(steps: int, before: int = 0, student: CameraPolicy | None = None) -> Dataset:
             return drive(
                 made,
                 driver,
@@ -435,9 +428,9 @@ def train_student(
         each = steps // (1 + _ROUNDS)
         shown = [lesson(steps - _ROUNDS * each)]
         for _ in range(_ROUNDS):
-            student = _student(shown, settings, seed, most_steps=_BETWEEN)
-            shown.append(lesson(each, sum(len(one.actions) for one in shown), student))
-    policy = _student(shown, settings, seed)
+            student = _student(shown, settings, seed, min(_BETWEEN, settings.most_steps))
+            shown.append(lesson(each, sum(map(len, shown)), student))
+    policy = _student(shown, settings, seed, settings.most_steps)
     return stated(policy, env, demonstrated_steps=steps, teacher=taught)
 
 
@@ -451,24 +444,19 @@ def _moving(action: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _student(
-    shown: Sequence[Demonstrations],
-    settings: CloneSettings,
-    seed: int,
-    most_steps: int | None = None,
+    shown: Sequence[Dataset], settings: CloneSettings, seed: int, most_steps: int
 ) -> CameraPolicy:
     """Clone a teacher from all that was recorded, in at most this many training steps."""
-    most = min(most_steps or settings.most_steps, settings.most_steps)
-    fewest = min(settings.fewest_steps, most)
-    pictures, labels, episodes = zip(*shown, strict=True)
-    actions = _moving(np.concatenate(labels))
+    data = merged(shown)
+    actions = _moving(data.actions)
     # The whole range of the throttle above the least is the range of the network's output.
     actions[:, 1] = 2.0 * ((actions[:, 1] - LEAST_THROTTLE) / (1.0 - LEAST_THROTTLE)) - 1.0
-    policy, _ = clone(
-        np.concatenate(pictures),
-        actions,
-        settings=msgspec.structs.replace(settings, most_steps=most, fewest_steps=fewest),
-        seed=seed % 2**31,
-        episodes=tuple(chain(*episodes)),
+    settings = msgspec.structs.replace(
+        settings, most_steps=most_steps, fewest_steps=min(settings.fewest_steps, most_steps)
     )
+    seed %= 2**31
+    start = CameraPolicy.fresh(settings, seed, data.action_layout)
+    data = replace(data, actions=actions)
+    policy, _ = learn(data, settings=settings, seed=seed, start=start, symmetric=True)
     card = msgspec.structs.replace(policy.card, low=(-1.0, LEAST_THROTTLE), high=(1.0, 1.0))
     return CameraPolicy(policy.network, card)

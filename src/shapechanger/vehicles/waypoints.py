@@ -426,7 +426,6 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     kept = labels.usable
     if not kept.any():
         raise DemosError("In no step of these demonstrations does the vehicle drive forward.")
-    lengths = [int(part.sum()) for part in np.split(kept, np.cumsum(data.episodes)[:-1])]
     outside = np.abs(labels.actions[kept, 0]) * WIDEST_RAD > HALF_WIDTH_RAD
     notes = (
         f"The vehicle turns {response.per_metre:.2f} rad for each metre and "
@@ -439,13 +438,9 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
         "may be farther aside.",
     )
     converted = dataclasses.replace(
-        data,
-        pictures=data.pictures[kept],
+        data.part(kept),
         states=None,
         actions=labels.actions[kept],
-        episodes=tuple(length for length in lengths if length),
-        times_s=data.times_s[kept],
-        files=tuple(file for file, keep in zip(data.files, kept, strict=True) if keep),
         action_layout=ACTION_LAYOUT,
         state_layout=None,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from shapechanger.demos.cloning.network import DIRECTIONS, EdgeEyes, edges
+from shapechanger.demos.cloning.network import DIRECTIONS, Eyes, edges
 from shapechanger.demos.cloning.pictures import Framing
 
 
@@ -36,7 +36,7 @@ def test_a_black_image_has_no_edges() -> None:
 
 def test_images_of_any_size_have_features() -> None:
     for height, width in ((48, 64), (30, 41), (3, 5)):
-        eyes = EdgeEyes(Framing(height=height, width=width, top=0.0), (8, 8), 5)
+        eyes = Eyes(Framing(height=height, width=width, top=0.0), (8, 8), 5, by_edges=True)
         found = eyes(torch.rand(2, 3, height, width))
         assert found.shape == (2, 5)
         assert bool((found >= 0.0).all())

@@ -11,11 +11,7 @@ from shapechanger.demos.cloning.card import CloneCard, class_numbers
 from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
 from shapechanger.demos.cloning.pictures import CloningError, Framing
 from shapechanger.layout import Feature, Layout
-
-_KEYS = Layout(
-    tuple(Feature(name, "1", 0.0, 1.0) for name in ("forward", "backward", "right", "left"))
-)
-_STEERS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+from tests.demos.cloning.data import KEYS, STEERS
 
 
 def _keys(text: str) -> np.ndarray:
@@ -34,14 +30,14 @@ def _card(
 
 
 def test_keys_become_classes_with_names() -> None:
-    card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), _KEYS, "auto")
+    card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), KEYS, "auto")
     assert (card.head, card.class_names) == ("class", ("forward", "left", "none"))
     assert card.targets(_keys("LFNB")).tolist() == [1, 0, 2, -1]
 
 
 def test_mirrored_actions_are_classes_too() -> None:
     actions = _keys("FFFFFFFFLLLLLLLL")
-    card = _card(actions, _KEYS, "class", actions[:, [0, 1, 3, 2]])
+    card = _card(actions, KEYS, "class", actions[:, [0, 1, 3, 2]])
     assert set(card.class_names) == {"forward", "left", "right"}
 
 
@@ -55,7 +51,7 @@ def test_numbers_are_scaled_by_their_layout() -> None:
 
 def test_many_distinct_actions_give_regression() -> None:
     rng = np.random.default_rng(0)
-    card = _card(rng.uniform(-1, 1, (10, 2)).astype(np.float32), _STEERS, "auto")
+    card = _card(rng.uniform(-1, 1, (10, 2)).astype(np.float32), STEERS, "auto")
     assert card.head == "regression"
 
 
@@ -63,9 +59,9 @@ def test_unsuitable_classes_are_refused() -> None:
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
     with pytest.raises(CloningError, match="200 different actions, but at most 16"):
-        output_fields(many, _STEERS, "class")
+        output_fields(many, STEERS, "class")
     with pytest.raises(CloningError, match=r"All of 5 actions are equal \(left\)"):
-        output_fields(_keys("LLLLL"), _KEYS, "auto")
+        output_fields(_keys("LLLLL"), KEYS, "auto")
 
 
 def test_an_action_outside_the_classes() -> None:

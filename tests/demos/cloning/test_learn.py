@@ -1,29 +1,54 @@
-"""Learning from images or states, with classes or regression."""
+"""Learning from images or states, with classes or regression, from scratch or further."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.evaluation import evaluate
-from shapechanger.demos.cloning.learn import Inputs, Training, learn
+from shapechanger.demos.cloning.learn import Inputs, MemberCheck, Training, learn
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.demos.dataset import Dataset
 from shapechanger.layout import Feature, Layout
-from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
+from tests.demos.cloning.data import KEYS, QUICK, SMALL, STEERS, corridor, error, stripes
+
+_FEW = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
+_HASTY = msgspec.structs.replace(SMALL, fewest_steps=4, most_steps=4, checks=2, warm_up=1)
+
+Cloned = tuple[CameraPolicy, Training]
 
 
 @pytest.fixture(scope="module")
-def keys() -> tuple[CameraPolicy, Training]:
+def keys() -> Cloned:
     """A policy that learned which key is held."""
     return learn(stripes(200, 0), settings=QUICK, seed=3)
 
 
-def test_it_learns_which_key_is_held(keys: tuple[CameraPolicy, Training]) -> None:
+def _cloned(
+    data: Dataset, settings: CloneSettings, start: CameraPolicy | None = None, **more: Any
+) -> Cloned:
+    """Clone an expert, as a study does."""
+    start = CameraPolicy.fresh(settings, 0, data.action_layout) if start is None else start
+    return learn(data, settings=settings, start=start, symmetric=True, **more)
+
+
+@pytest.fixture(scope="module")
+def driver() -> Cloned:
+    """A policy that learned to drive in corridors, from 600 images."""
+    return _cloned(corridor(600, 1), SMALL)
+
+
+def test_it_learns_which_key_is_held(keys: Cloned) -> None:
     policy, training = keys
     report = evaluate(policy, stripes(90, 1))
     assert report.accuracy > 0.9
@@ -33,7 +58,7 @@ def test_it_learns_which_key_is_held(keys: tuple[CameraPolicy, Training]) -> Non
     assert training.mirrored > 0.3  # The data go to both sides.
 
 
-def test_actions_follow_the_layout(keys: tuple[CameraPolicy, Training]) -> None:
+def test_actions_follow_the_layout(keys: Cloned) -> None:
     done = keys[0].predict_many(stripes(30, 2).pictures)
     assert done.shape == (30, 4)
     assert set(map(tuple, done.tolist())) <= set(keys[0].card.classes)
@@ -51,40 +76,35 @@ def test_regression_from_any_input(inputs: Inputs) -> None:
     assert report.errors[1] < 0.1
 
 
-def test_applied_actions_are_not_inputs() -> None:
-    policy, _ = learn(stripes(100, 0, STEERS), settings=QUICK, inputs="state")
-    assert policy.card.unseen == ("steering/applied",)
-    states = stripes(10, 1, STEERS).states
-    assert states is not None
-    other = states.copy()
-    other[:, 2] = 0.123
-    np.testing.assert_array_equal(
-        policy.predict_many(None, states), policy.predict_many(None, other)
-    )
-
-
-def test_missing_state_values_are_handled() -> None:
+def test_applied_actions_are_not_inputs_and_missing_values_are_handled() -> None:
     data = stripes(100, 0, STEERS)
     assert data.states is not None
     data.states[::3, 1] = np.nan
     policy, _ = learn(data, settings=QUICK, inputs="state")
+    assert policy.card.unseen == ("steering/applied",)
+    other = data.states.copy()
+    other[:, 2] = 0.123
+    done = policy.predict_many(None, data.states)
+    np.testing.assert_array_equal(done, policy.predict_many(None, other))
     for value in (np.nan, np.inf, 1e30):
         assert np.isfinite(policy.predict(None, np.full(3, value))).all()
 
 
 def test_one_sided_data_are_not_mirrored() -> None:
     data = stripes(200, 0)
-    to_the_right = data.actions[:, 2] > 0
-    data.actions[to_the_right] = [1, 0, 0, 0]
-    _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
+    data.actions[data.actions[:, 2] > 0] = [1, 0, 0, 0]
+    _, training = learn(data, settings=_FEW)
     assert training.mirrored == 0.0
     assert "one side" in training.mirror_note
+    _, training = learn(data, settings=_FEW, symmetric=True)
+    assert (training.mirrored, training.mirror_note) == (0.5, "")
 
 
-def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_a_layout_without_a_mirror_is_not_mirrored(symmetric: bool) -> None:
     odd = Layout(tuple(Feature(f"joint_{i}/angle", "rad", -1.0, 1.0) for i in range(4)))
     data = replace(stripes(60, 0), action_layout=odd)
-    _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
+    _, training = learn(data, settings=_FEW, symmetric=symmetric)
     assert training.mirrored == 0.0
     assert training.mirror_note == (
         "No image is mirrored, because the mirror image of joint_0/angle is unknown."
@@ -92,49 +112,127 @@ def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
 
 
 def test_the_same_seed_gives_the_same_policy() -> None:
-    few = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
-    data, test = stripes(40, 0), stripes(10, 1).pictures
-
-    def outputs(seed: int) -> np.ndarray:
-        return learn(data, settings=few, seed=seed)[0].outputs(test)
-
-    first = outputs(1)
-    torch.rand(3)
-    np.testing.assert_array_equal(outputs(1), first)
-    assert not np.array_equal(outputs(2), first)
+    keys, drive = stripes(40, 0), corridor(40, 5)
+    ways: list[Callable[[int], NDArray[np.float32]]] = [
+        lambda seed: learn(keys, settings=_FEW, seed=seed)[0].outputs(keys.pictures),
+        lambda seed: _cloned(drive, _HASTY, seed=seed)[0].outputs(drive.pictures),
+    ]
+    for outputs in ways:
+        first = outputs(1)
+        torch.rand(3)
+        np.testing.assert_array_equal(outputs(1), first)
+        assert not np.array_equal(outputs(2), first)
 
 
 def test_held_out_steps_are_not_learned_from() -> None:
-    few = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
-    data = stripes(60, 0)
+    data, test = stripes(60, 0), stripes(10, 1).pictures
     learned = np.arange(60) < 40
-    first, _ = learn(data, learned, settings=few)
+    first, _ = learn(data, learned, settings=_FEW)
     assert data.pictures is not None
     data.pictures[40:] = 255
     data.actions[40:] = [0, 1, 0, 0]
-    again, _ = learn(data, learned, settings=few)
-    test = stripes(10, 1).pictures
+    again, _ = learn(data, learned, settings=_FEW)
     np.testing.assert_array_equal(first.outputs(test), again.outputs(test))
 
 
-def test_a_policy_for_another_layout_is_refused(keys: tuple[CameraPolicy, Training]) -> None:
+def test_a_policy_for_another_layout_is_refused(keys: Cloned) -> None:
     with pytest.raises(PolicyError, match=r"policy are forward \[1\].*here are steering \[1\]"):
         evaluate(keys[0], stripes(10, 0, STEERS))
+    with pytest.raises(PolicyError, match=r"policy are forward \[1\].*here are steering \[1\]"):
+        learn(stripes(10, 0, STEERS), settings=_FEW, start=keys[0])
     keys[0].card.require_layouts(KEYS)
-    felt, _ = learn(
-        stripes(40, 0),
-        settings=msgspec.structs.replace(QUICK, fewest_steps=1, most_steps=1),
-        inputs="state",
-    )
+    felt, _ = learn(stripes(40, 0), settings=_FEW, inputs="state")
     with pytest.raises(PolicyError, match=r"needs the state distance \[m\].*gets none"):
         felt.card.require_layouts(KEYS)
-
-
-def test_a_policy_without_layouts_needs_steering_and_throttle() -> None:
-    policy = CameraPolicy.fresh(QUICK, 0)
-    policy.card.require_layouts(STEERS)
+    plain = CameraPolicy.fresh(QUICK, 0, STEERS)
+    assert plain.card.action_layout is None
+    plain.card.require_layouts(STEERS)
     with pytest.raises(PolicyError, match="policy are steering, throttle"):
-        policy.card.require_layouts(KEYS)
+        plain.card.require_layouts(KEYS)
+
+
+def test_it_learns_to_drive(driver: Cloned) -> None:
+    """On new corridors, the error is far below that of the median action."""
+    test = corridor(200, 2)
+    steering, throttle = np.abs(driver[0].predict_many(test.pictures) - test.actions).mean(axis=0)
+    guess = np.abs(test.actions - np.median(test.actions, axis=0)).mean(axis=0)
+    assert steering < 0.35 * guess[0]
+    assert throttle < 0.6 * guess[1]
+
+
+def test_the_training_log_matches_the_policy(driver: Cloned) -> None:
+    policy, training = driver
+    assert [check.step for check in training.checks] == [0, 30, 60, 90, 120, 150]
+    best = min(training.checks, key=lambda check: check.error)
+    assert training.best_steps == (best.step,) == (policy.card.steps,)
+
+
+def test_a_start_policy_helps_with_few_images(driver: Cloned) -> None:
+    few, test = corridor(30, 3, gain=0.5), corridor(200, 4, gain=0.5)
+    settings = msgspec.structs.replace(SMALL, fewest_steps=80, most_steps=80)
+    scratch, further = (_cloned(few, settings, start)[0] for start in (None, driver[0]))
+    assert error(further, test) < 0.8 * error(scratch, test)
+    assert error(further, test) < 0.8 * error(driver[0], test)
+
+
+def test_rehearsal_prevents_forgetting(driver: Cloned) -> None:
+    """The target steers the opposite way, and rehearsal keeps the source skill."""
+    source, target = corridor(100, 1), corridor(60, 3, gain=-1.0)
+    settings = msgspec.structs.replace(SMALL, rehearsal=0.5, fewest_steps=40, most_steps=40)
+    forgets, keeps = (
+        _cloned(target, settings, driver[0], rehearsal=rehearsal)[0] for rehearsal in (None, source)
+    )
+    old = corridor(200, 2)
+    assert error(keeps, old) < 0.9 * error(forgets, old)
+
+
+def test_a_start_policy_sets_the_architecture_and_is_not_changed(driver: Cloned) -> None:
+    policy, few = driver[0], corridor(20, 3)
+    before = policy.predict_many(few.pictures)
+    # Without held-out images, the last policy is kept.
+    settings = msgspec.structs.replace(_HASTY, held_out=0.0, channels=(4, 4))
+    further, _ = _cloned(few, settings, policy, seed=7)
+    np.testing.assert_array_equal(policy.predict_many(few.pictures), before)
+    assert not np.array_equal(further.predict_many(few.pictures), before)
+    assert (policy.card.seeds, further.card.seeds) == ((0,), (0, 7))
+    assert further.card.channels == SMALL.channels
+
+
+def test_one_image_is_enough() -> None:
+    one = corridor(1, 0)
+    policy, training = _cloned(one, _HASTY)
+    assert (training.best_steps, training.learned) == ((4,), 1)
+    assert all(math.isnan(check.error) for check in training.checks)
+    assert np.isfinite(policy.predict_many(one.pictures)).all()
+
+
+def test_training_stops_early() -> None:
+    """With random actions the held-out error does not fall, so training stops after `patience`."""
+    actions = np.random.default_rng(0).uniform(-1, 1, (40, 2)).astype(np.float32)
+    settings = msgspec.structs.replace(
+        SMALL, fewest_steps=60, most_steps=60, checks=30, patience=3, held_out=0.5
+    )
+    checks: list[MemberCheck] = []
+    noise = replace(corridor(40, 6), actions=actions)
+    _, training = _cloned(noise, settings, on_check=checks.append)
+    assert checks[-1].step < 60
+    assert training.best_steps == (checks[-1].step - 6,)
+    assert repr(tuple(checks)) == repr(training.checks)  # NaN is not equal to itself.
+
+
+def test_read_only_arrays_are_accepted() -> None:
+    few, old = corridor(12, 0), corridor(12, 1)
+    expected, _ = _cloned(few, _HASTY, rehearsal=old)
+    for data in (few, old):
+        assert data.pictures is not None
+        data.pictures.flags.writeable = data.actions.flags.writeable = False
+    policy, _ = _cloned(few, _HASTY, rehearsal=old)
+    np.testing.assert_array_equal(policy.outputs(few.pictures), expected.outputs(few.pictures))
+
+
+def test_the_number_of_steps_follows_the_images() -> None:
+    settings = CloneSettings(batch=10, passes=2.0, fewest_steps=50, most_steps=100)
+    assert [settings.steps(n) for n in (1, 400, 9000)] == [50, 80, 100]
 
 
 def test_invalid_data_are_refused() -> None:
@@ -148,3 +246,25 @@ def test_invalid_data_are_refused() -> None:
     data.actions[3, 0] = np.nan
     with pytest.raises(CloningError, match=r"Action 3 must be finite, got \[nan"):
         learn(data, settings=QUICK)
+    few = corridor(4, 0)
+    few.actions[2] = [0.0, 1.5]
+    with pytest.raises(CloningError, match=r"action 2 is \[0.0, 1.5\]"):
+        _cloned(few, _HASTY)
+    with pytest.raises(CloningError, match="needs an image"):
+        _cloned(replace(corridor(4, 0), pictures=None), _HASTY)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"channels": ()},
+        {"batch": 0},
+        {"most_steps": 10},
+        {"learning_rate": 0.0},
+        {"held_out": 1.0},
+        {"weight_decay": -1.0},
+    ],
+)
+def test_settings_that_contradict_themselves_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(CloningError):
+        CloneSettings(**wrong)  # pyright: ignore[reportArgumentType]

@@ -7,13 +7,12 @@ import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.evaluation import CORRECTED, EXPERT, Driven, duration_s, outlook
+from shapechanger.demos.cloning.evaluation import CORRECTED, EXPERT, Driven, outlook
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.layout import Feature, Layout
 from tests.demos.cloning.data import KEYS, STATE, STEERS
@@ -81,8 +80,3 @@ def test_other_robots_are_promised_nothing() -> None:
     assert outlook(_card(60.0, None)) is None
     assert outlook(_card(60.0, Layout((Feature("tension/FDP", "N"),)))) is None
     assert outlook(_card(60.0, eyes="none", nerves=(4,), state_layout=STATE)) is None
-
-
-def test_a_duration_follows_the_times_of_each_episode() -> None:
-    assert duration_s(np.array([0.0, 0.1, 5.0, 0.0, 0.1]), [3, 2], 10.0) == pytest.approx(5.3)
-    assert duration_s(np.array([0.0, 2.0]), [2], 0.0) == 2.0

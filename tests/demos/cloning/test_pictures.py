@@ -52,10 +52,6 @@ def test_a_uniform_image_stays_uniform() -> None:
 def test_prepared_images_are_returned_unchanged() -> None:
     small = prepare(_pictures(2), _FRAMING)
     assert prepare(small, _FRAMING) is small
-
-
-def test_an_empty_batch() -> None:
-    """An empty input gives an empty output of the right shape."""
     assert prepare(_pictures(0), _FRAMING).shape == (0, 48, 80, 3)
 
 

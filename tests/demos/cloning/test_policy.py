@@ -6,26 +6,25 @@ import json
 import pickle
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-import msgspec
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.pictures import CloningError, PolicyError
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
-from shapechanger.demos.cloning.settings import CloneSettings
-from shapechanger.errors import OutputError
 from shapechanger.policy import read_tensors, tensor_bytes
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from tests.demos.cloning.small import SMALL, demonstrations
+from tests.demos.cloning.data import SMALL, STATE, corridor
 
-_PICTURES = demonstrations(20, 0).pictures
+_PICTURES = cast("NDArray[np.uint8]", corridor(20, 0).pictures)
 
 
-def _policy(settings: CloneSettings = SMALL) -> CameraPolicy:
-    return CameraPolicy.fresh(settings, 0)
+def _policy() -> CameraPolicy:
+    return CameraPolicy.fresh(SMALL, 0)
 
 
 @pytest.fixture
@@ -44,16 +43,8 @@ def test_a_policy_round_trips(path: Path) -> None:
     assert again.card == policy.card
     assert again.card.data == {"minutes": 3, "seeds": [1, 2]}
     assert again.card.command == "clone it"
-
-
-def test_the_same_policy_is_the_same_file(path: Path, tmp_path: Path) -> None:
-    CameraPolicy.load(path).save(tmp_path / "again.safetensors")
-    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
-
-
-def test_a_policy_of_the_default_settings_is_small(path: Path) -> None:
-    _policy(CloneSettings()).save(path)
-    assert path.stat().st_size < 1_000_000
+    again.save(path.with_name("again.safetensors"))
+    assert path.with_name("again.safetensors").read_bytes() == path.read_bytes()
 
 
 def test_single_and_batch_predictions_agree() -> None:
@@ -102,7 +93,7 @@ def test_unsuitable_weights_are_refused(path: Path) -> None:
         {},
     ):
         _changed(path, weights)
-        with pytest.raises(PolicyError, match="is not a cloned policy: "):
+        with pytest.raises(PolicyError, match="is not a policy that"):
             CameraPolicy.load(path)
 
 
@@ -155,42 +146,40 @@ def test_an_invalid_card_is_refused(path: Path, changes: dict[str, Any]) -> None
     [
         (lambda content: content[:-100] + bytes([content[-100] ^ 1]) + content[-99:], "its hash"),
         (lambda content: tensor_bytes({"policy.weight": np.zeros(3)}, b"{}"), "it is a policy"),
-        *((lambda content, new=new: new, "") for new in (b"", b"PK\x03\x04", b"not a policy")),
-        *(
-            (lambda content, share=share: content[: int(share * len(content))], "")
-            for share in (0.1, 0.5, 0.9, 0.999)
-        ),
+        (lambda content: content[: len(content) // 2], ""),
+        (lambda _: b"PK\x03\x04", ""),
     ],
 )
 def test_another_or_damaged_file_is_refused(
     path: Path, change: Callable[[bytes], bytes], words: str
 ) -> None:
     path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(
-        PolicyError, match=rf"corridor\.safetensors is not a cloned policy.*{words}"
-    ):
+    with pytest.raises(PolicyError, match=rf"corridor\.safetensors is not a policy that.*{words}"):
         CameraPolicy.load(path)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match=r"There is no policy file .*nowhere\.safetensors"):
         CameraPolicy.load(tmp_path / "nowhere.safetensors")
-    with pytest.raises(PolicyError, match="is not a cloned policy"):
+    with pytest.raises(PolicyError, match="is not a policy that"):
         CameraPolicy.load(tmp_path)
 
 
-def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
-    (tmp_path / "taken").mkdir()
-    with pytest.raises(OutputError, match="Cannot write"):
-        _policy().save(tmp_path / "taken")
-    assert [file.name for file in tmp_path.iterdir()] == ["taken"]
-
-
-def test_copies_share_nothing() -> None:
-    """A copy can be trained without changing the original."""
-    policy = _policy()
-    copy = policy.copy()
-    with torch.no_grad():
-        copy.network.hands.bias.add_(1.0)
-    assert not torch.equal(copy.network.hands.bias, policy.network.hands.bias)
-    assert msgspec.json.encode(copy.card) == msgspec.json.encode(policy.card)
+@pytest.mark.parametrize("eyes", ["none", "colours"])
+def test_a_clone_with_a_state_acts_on_states(eyes: Any) -> None:
+    """Without images an observation is the state; with both it is a mapping."""
+    card = CloneCard(
+        framing=Framing(height=24, width=32),
+        channels=(4, 6),
+        features=8,
+        eyes=eyes,
+        nerves=(8,),
+        state_layout=STATE,
+    )
+    clone = CameraPolicy.blank(card, seed=1)
+    states = np.array([[0.5, 1.0, 0.1], [1.5, 0.2, 0.3]])
+    images = None if eyes == "none" else np.full((2, 60, 80, 3), 90, np.uint8)
+    observations = states if images is None else {"image": images, "state": states}
+    acted = clone.act(observations)
+    np.testing.assert_array_equal(acted, clone.predict_many(images, states))
+    assert not np.array_equal(acted[0], acted[1])

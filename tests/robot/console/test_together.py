@@ -14,7 +14,6 @@ import pytest
 from playwright.sync_api import Browser
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.onnx_policy import export_clone
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import episodes_of, read_episode
@@ -273,7 +272,7 @@ def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_pa
     )
     folder = tmp_path / "policies"
     for name in ("novice", "student"):
-        export_clone(CameraPolicy.blank(card, seed=0), folder / f"{name}.onnx")
+        CameraPolicy.blank(card, seed=0).export(folder / f"{name}.onnx")
     arguments = (*IN_A_ROOM, "--policy", str(folder))
     with (
         run_robot(car, folder=tmp_path, arguments=arguments) as robot,

@@ -16,6 +16,7 @@ from shapechanger.errors import StudyError, TransplantError
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_limbs
+from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import LimbSettings
@@ -23,7 +24,6 @@ from shapechanger.transfer.limbs.envs import fitted, limb_envs
 from shapechanger.transfer.limbs.learner import LimbLearner
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.methods import generalist
-from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 

@@ -17,6 +17,7 @@ from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.export import export_limbs
+from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.rsl import RslVecEnv
@@ -24,7 +25,6 @@ from shapechanger.transfer.learners.settings import RslLimbSettings
 from shapechanger.transfer.limbs.device import DeviceRows, LimbModel, RslLimbLearner
 from shapechanger.transfer.limbs.envs import fitted, rows_of_each
 from shapechanger.transfer.limbs.policy import LimbPolicy
-from shapechanger.transfer.onnx_policy import OnnxPolicy
 
 ANT: Final = EnvRef("shapechanger/Ant-v1", {"max_episode_steps": 20})
 EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1", {"max_episode_steps": 20})

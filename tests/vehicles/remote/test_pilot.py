@@ -16,7 +16,6 @@ from msgspec.structs import replace
 
 from shapechanger.cli import main
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.onnx_policy import export_clone
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import RobotRefused
@@ -55,9 +54,9 @@ _WAYPOINTS = CloneCard(framing=Framing(), channels=(1,), features=1, action_layo
 
 def test_policies_that_fit() -> None:
     """A clone of the same body and rate, and waypoints from any body."""
-    require_fit(_CLONE, _CAR, measures=False, body="car", control_hz=20.0)
+    require_fit(replace(_CLONE, body="car", control_hz=20.0), _CAR, measures=False)
     require_fit(_CLONE, _CAR, measures=False)
-    require_fit(_WAYPOINTS, _CAR, measures=False, control_hz=20.0)
+    require_fit(replace(_WAYPOINTS, control_hz=20.0), _CAR, measures=False)
     require_fit(_WAYPOINTS, replace(_CAR, turning=None), measures=True)
 
 
@@ -82,7 +81,7 @@ def test_policies_that_do_not_fit(
 ) -> None:
     """The sentence names what differs."""
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
-        require_fit(card, robot, measures=False, **origin)
+        require_fit(replace(card, **origin), robot, measures=False)
     assert words in str(refusal.value)
 
 
@@ -100,9 +99,9 @@ def test_a_rate_within_the_jitter_of_the_recording_fits(
     hz: float, jitter: object, fits: bool
 ) -> None:
     """A policy's own demonstrations say how exactly its rate is known."""
-    card = replace(_CLONE, data={"rate_jitter": jitter})
+    card = replace(_CLONE, data={"rate_jitter": jitter}, control_hz=hz)
     with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
-        require_fit(card, _CAR, measures=False, control_hz=hz)
+        require_fit(card, _CAR, measures=False)
 
 
 @pytest.fixture(scope="module")
@@ -222,7 +221,7 @@ def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
     policy = CameraPolicy.blank(_CLONE, seed=0)
     policy.network.hands.bias.data[:] = np.nan
     file = tmp_path / "nan.onnx"
-    export_clone(policy, file)
+    policy.export(file)
     with _served(file, "twin") as (_, person):
         until(lambda: person.policies is not None and person.policies.running == "")
         assert person.policies is not None

@@ -12,10 +12,10 @@ import numpy as np
 import tyro
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
-from shapechanger.demos.clone_report import clone_html, write_numbers
-from shapechanger.demos.cloning.evaluation import duration_s, evaluate, outlook
+from shapechanger.demos.clone_report import write_report
+from shapechanger.demos.cloning.evaluation import evaluate, outlook
+from shapechanger.demos.cloning.pictures import ShrunkFrames
 from shapechanger.demos.cloning.settings import settings_for
-from shapechanger.demos.cloning.shrinking import ShrunkFrames
 from shapechanger.demos.dataset import Dataset, count_steps, load_dataset
 from shapechanger.errors import DemosError, OutputError, StudyError, check_seed
 from shapechanger.files import require_file, write_atomic
@@ -138,7 +138,7 @@ class DemosTrain(_Waypoints):
             data=str(self.data),
             digest=shrinking.digest(data.actions),
             learned=n,
-            learned_s=n / len(data) * duration_s(data.times_s, data.episodes, data.control_hz),
+            learned_s=n / len(data) * data.duration_s,
             steps=len(data),
             body="" if view is not None else data.body,
             control_hz=data.control_hz,
@@ -152,10 +152,8 @@ class DemosTrain(_Waypoints):
         evaluation = evaluate(policy, data, evaluated)
         policy.save(self.out)
         self._write_for_sb3(policy, shrinking.size)
-        page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
-        report = clone_html(self.out.name, policy, data, evaluation, training, note)
-        write_atomic(page, report.encode())
-        write_numbers(numbers, policy, evaluation, training)
+        page = self.out.with_suffix(".html")
+        numbers = write_report(page, self.out.name, policy, data, evaluation, training, note)
         say(f"wrote {self.out}, {page} and {numbers}")
         say(note)
         if (ahead := outlook(policy.card)) is not None:
@@ -241,9 +239,8 @@ class DemosEvaluate(_Waypoints):
             say(note)
         if self.report is not None:
             require_file(self.report)
-            page = clone_html(self.policy.name, policy, data, evaluation, None, note)
-            write_atomic(self.report, page.encode())
-            numbers = self.report.with_suffix(".json")
-            write_numbers(numbers, policy, evaluation, None)
+            numbers = write_report(
+                self.report, self.policy.name, policy, data, evaluation, None, note
+            )
             say(f"wrote {self.report} and {numbers}")
         _print_evaluation(evaluation)

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
 from shapechanger.cli.robot.remote import RobotName
-from shapechanger.demos.cloning.onnx_policy import OnnxClone
+from shapechanger.demos.cloning.card import OnnxClone
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
@@ -304,14 +304,12 @@ class Driving:
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
     policy: CameraPolicy | OnnxClone
-    body, hz = "", None
     if path.suffix == ".onnx":
-        policy = exported = OnnxClone(path)
-        body, hz = exported.body, exported.control_hz
+        policy = OnnxClone(path)
     else:
         from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
 
         policy = CameraPolicy.load(path)
     with RobotClient.connect(robot, frames=False) as there:
-        require_fit(policy.card, there.welcome, measures=True, body=body, control_hz=hz)
+        require_fit(policy.card, there.welcome, measures=True)
     return PolicyDriver(policy, path.stem, robot)

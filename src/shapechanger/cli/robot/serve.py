@@ -16,7 +16,7 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import require_port
-from shapechanger.demos.cloning.onnx_policy import OnnxClone
+from shapechanger.demos.cloning.card import OnnxClone
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.errors import (
     MissingExtra,
@@ -123,9 +123,8 @@ class RobotServe(Service):
             )
         for file in files:
             policy = OnnxClone(file)
-            body, hz = policy.body, policy.control_hz
             try:
-                require_policy(policy.card, plan.card, measures=False, body=body, control_hz=hz)
+                require_policy(policy.card, plan.card, measures=False)
             except (PolicyError, RobotRefused) as error:
                 raise PolicyError(f"{file} cannot drive {plan.card.robot}: {error}") from error
 

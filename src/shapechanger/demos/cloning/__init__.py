@@ -1,11 +1,10 @@
 """Behaviour cloning: driving policies learned from images, states and the actions of a driver.
 
 ```
-learn.clone          learn steering and throttle from arrays of pictures
 learn.learn          learn any actions from any demonstrations (`shapechanger demos train`)
-policy.CameraPolicy  predict, save and load
-evaluation.evaluate compare a policy with a driver on held-out steps
-sb3, replay          continue with reinforcement learning in Stable-Baselines3
+policy.CameraPolicy  predict, save, load and export
+evaluation.evaluate  compare a policy with a driver on held-out steps
+sb3                  continue with reinforcement learning in Stable-Baselines3
 ```
 
 Nothing is imported here, so that settings can be read without PyTorch.

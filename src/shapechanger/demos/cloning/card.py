@@ -1,10 +1,11 @@
-"""Card of a policy: metadata that is stored with the weights."""
+"""Cards of cloned policies, stored with the weights, and policies that run without PyTorch."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 import msgspec
@@ -15,12 +16,16 @@ from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyErr
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
+from shapechanger.onnx_file import read_network
+from shapechanger.policy import CLONE_CARD
 
 Head = Literal["regression", "class"]
 """Kind of output: continuous actions, or a choice among the actions that were demonstrated."""
 
+STEERING: Final = ("steering", "throttle")
+"""Names of the values of an action of a policy without an action layout."""
+
 _MAX_MEMBERS: Final = 32  # Bounds the work that a forged card can cause.
-_STEERING: Final = ("steering", "throttle")
 _ROUNDING: Final = 1e-4  # Of actions in single precision.
 
 
@@ -112,15 +117,36 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         """Number of outputs of the network."""
         return len(self.classes) or self.action_size
 
+    @property
+    def inputs(self) -> dict[str, list[int]]:
+        """Shapes of the inputs of the network, `picture` and `state`, without their first axis."""
+        shapes: dict[str, list[int]] = {}
+        if self.eyes != "none":
+            shapes["picture"] = list(self.framing.shape)
+        if self.state_size:
+            shapes["state"] = [self.state_size]
+        return shapes
+
     def targets(self, actions: NDArray[np.float32]) -> NDArray[Any]:
         """Return the target outputs of the network for actions of shape (n, m).
 
         Returns:
             Class indices, shape (n,), -1 for an unknown action; or actions scaled to [-1, 1], shape
             (n, m).
+
+        Raises:
+            CloningError: If an action is out of range, where the card states no other than [-1, 1].
         """
         if self.classes:
             return class_numbers(actions, self.classes)
+        if not self.low:
+            if (wrong := ~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1)).any():
+                first = int(wrong.argmax())
+                raise CloningError(
+                    f"Steering and throttle must be in [-1, 1], but action {first} is "
+                    f"{actions[first].tolist()}."
+                )
+            return actions.astype(np.float32)
         low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
         return (2.0 * (actions - low) / (high - low) - 1.0).astype(np.float32).clip(-1.0, 1.0)
 
@@ -180,7 +206,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         Raises:
             PolicyError: If the layouts differ.
         """
-        mine = _STEERING if self.action_layout is None else _words(self.action_layout)
+        mine = STEERING if self.action_layout is None else _words(self.action_layout)
         theirs = _words(actions)
         if self.action_layout is None:
             theirs = tuple(word.split(" ")[0] for word in theirs)
@@ -272,6 +298,37 @@ class ActingClone(ABC):
             return self.predict_many(named.get("image"), named.get("state"))
         values: NDArray[Any] = np.asarray(observations)
         return self.predict_many(*((None, values) if self.card.eyes == "none" else (values,)))
+
+
+class OnnxClone(ActingClone):
+    """A cloned policy from an ONNX file, which runs without PyTorch.
+
+    Attributes:
+        card: Card of the policy.
+
+    Args:
+        path: The file, read once: a later change of it changes nothing here.
+
+    Raises:
+        MissingExtra: If onnxruntime is not installed.
+        PolicyError: If the file is missing or is not such a policy.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.card, self._run = read_network(
+            path,
+            CloneCard,
+            lambda card: card.inputs | {"output": [card.outputs]},
+            PolicyError,
+            CLONE_CARD,
+        )
+
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the outputs of the network, as `ActingClone` describes them."""
+        given = zip(("picture", "state"), self.card.prepared(pictures, states), strict=True)
+        return self._run({name: part for name, part in given if part is not None})
 
 
 def _words(layout: Layout) -> tuple[str, ...]:

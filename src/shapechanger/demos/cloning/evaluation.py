@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
@@ -324,6 +323,12 @@ class Driven(NamedTuple):
     by_seed: tuple[float, ...]
     row: str
 
+    def __str__(self) -> str:
+        rate = f"{self.per_100_m:.1f}"
+        if not self.by_seed:
+            return rate
+        return f"{rate} ({max(self.by_seed):.1f} for the worst of {len(self.by_seed)} seeds)"
+
 
 # Measured by `python -m benchmarks.run corrections`: 9 km of held-out corridors each.
 EXPERT: Final = (
@@ -355,21 +360,6 @@ class Outlook:
     next_step: str
 
 
-def duration_s(times_s: NDArray[np.float64], episodes: Sequence[int], control_hz: float) -> float:
-    """Return the length of demonstrations, s, by their times.
-
-    Args:
-        times_s: Time of each step since the start of its episode, s, shape (n,).
-        episodes: Number of steps of each episode, in order.
-        control_hz: Steps per second; the last step of an episode takes the inverse.
-    """
-    total, end = 0.0, 0
-    for length in episodes:
-        end += length
-        total += float(times_s[end - 1]) - float(times_s[end - length])
-    return total + (len(episodes) / control_hz if control_hz > 0.0 else 0.0)
-
-
 def outlook(card: CloneCard) -> Outlook | None:
     """Return the collisions to expect of a cloned driver, from its card.
 
@@ -398,17 +388,10 @@ def _rate(minutes: float) -> str:
     less = [row for row in EXPERT if row.minutes <= minutes]
     more = [row for row in EXPERT if row.minutes > minutes]
     if not less:
-        return f"more than {_described(more[0])} collisions"
+        return f"more than {more[0]} collisions"
     if not more:
-        return f"about {_described(less[-1])} collisions or fewer"
-    return f"{more[0].per_100_m:.1f} to {_described(less[-1])} collisions"
-
-
-def _described(row: Driven) -> str:
-    """Return a rate with the worst seed's."""
-    if not row.by_seed:
-        return f"{row.per_100_m:.1f}"
-    return f"{row.per_100_m:.1f} ({max(row.by_seed):.1f} for the worst of {len(row.by_seed)} seeds)"
+        return f"about {less[-1]} collisions or fewer"
+    return f"{more[0].per_100_m:.1f} to {less[-1]} collisions"
 
 
 def _next_step(minutes: float) -> str:

@@ -1,14 +1,13 @@
-"""Behaviour cloning: steering from images, or any actions from any demonstrations."""
+"""Behaviour cloning: any actions from any demonstrations."""
 
 from __future__ import annotations
 
 import copy
 import math
 import time
-from collections.abc import Callable, Generator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, cast
+from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 import numpy as np
@@ -16,16 +15,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.evaluation import AskedHead, output_fields
-from shapechanger.demos.cloning.examples import (
-    Examples,
-    Mirror,
-    held_out,
-    mirror_of,
-    steering_examples,
-    stretch,
-)
-from shapechanger.demos.cloning.pictures import CloningError, prepare
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.settings import CloneSettings, settings_for
 from shapechanger.errors import MissingExtra, check_seed
 
@@ -34,8 +24,9 @@ try:
     from torch import Tensor
     from torch.nn import functional
 
-    from shapechanger.demos.cloning.examples import Batches
+    from shapechanger.demos.cloning.examples import Examples, Mirror, batches, mirror_of, stretch
     from shapechanger.demos.cloning.network import CameraNetwork, joined
+    from shapechanger.demos.cloning.policy import CameraPolicy, seeded
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
@@ -98,74 +89,6 @@ class Training:
     seconds: float
 
 
-def clone(
-    pictures: NDArray[np.uint8],
-    actions: NDArray[np.floating],
-    *,
-    settings: CloneSettings | None = None,
-    seed: int,
-    episodes: Sequence[int] = (),
-    start: CameraPolicy | None = None,
-    rehearsal: tuple[NDArray[np.uint8], NDArray[np.floating]] | None = None,
-    on_check: Callable[[MemberCheck], None] = lambda check: None,
-) -> tuple[CameraPolicy, Training]:
-    """Learn the steering and throttle of a driver from images, with one network.
-
-    Equal arguments give an equal policy on the same machine with the same number of threads.
-
-    Args:
-        pictures: Shape (n, H, W, 3), raw or prepared.
-        actions: Steering and throttle in [-1, 1], shape (n, 2).
-        settings: Hyperparameters; None for the defaults. `members`, `dropout` and `smoothing` are
-            ignored.
-        seed: Seed of all randomness.
-        episodes: Number of images of each episode, in order; () for a single episode. The end of
-            each one is used for early stopping, by the sum of the mean absolute errors.
-        start: Policy to train further, which is not changed; None to start from scratch.
-        rehearsal: Images and actions that `start` was trained on, mixed in so that they are not
-            forgotten.
-        on_check: Called after each validation.
-
-    Returns:
-        The policy that was best on the held-out images, or the last one without them, and the
-        course of the training.
-
-    Raises:
-        CloningError: If there are no examples, or an array is invalid.
-    """
-    began = time.monotonic()
-    given = CloneSettings() if settings is None else settings
-    settings = msgspec.structs.replace(given, members=1, dropout=0.0, smoothing=0.0)
-    framing = settings.framing if start is None else start.card.framing
-    shown = steering_examples(pictures, actions, framing)
-    kept_back = held_out(len(shown), episodes, settings.held_out)
-    policy = CameraPolicy.fresh(settings, seed) if start is None else start.copy()
-    lesson = _Lesson(
-        shown,
-        settings,
-        settings.learning_rate if start is None else settings.further_rate,
-        torch.tensor([1.0, settings.throttle_weight]),
-        None if rehearsal is None else steering_examples(*rehearsal, framing),
-        on_check,
-    )
-    if start is None:
-        lesson.begin(policy, ~kept_back)
-
-    def error(network: CameraNetwork, validation: Examples) -> float:
-        done = CameraPolicy(network, policy.card).predict_many(validation.pictures)
-        return sum(np.abs(done - validation.targets).mean(axis=0).tolist())
-
-    with _seeded(seed):
-        checks, best = lesson.fit(policy, kept_back, seed, 0, error)
-    card = msgspec.structs.replace(
-        policy.card, seeds=(*policy.card.seeds, seed), steps=best, settings=given
-    )
-    learned, seconds = int((~kept_back).sum()), time.monotonic() - began
-    mirrored = settings.augmentation.mirror
-    training = Training(tuple(checks), (best,), learned, mirrored, "", seconds)
-    return CameraPolicy(policy.network, card), training
-
-
 def learn(
     data: Dataset,
     learned: NDArray[np.bool_] | None = None,
@@ -174,6 +97,9 @@ def learn(
     head: AskedHead = "auto",
     inputs: Inputs = "auto",
     seed: int = 0,
+    start: CameraPolicy | None = None,
+    rehearsal: Dataset | None = None,
+    symmetric: bool = False,
     on_check: Callable[[MemberCheck], None] = lambda check: None,
 ) -> tuple[CameraPolicy, Training]:
     """Learn the actions of a driver.
@@ -185,10 +111,17 @@ def learn(
     Args:
         data: The demonstrations.
         learned: Mask of the steps to learn from, shape (n,); None for all.
-        settings: Hyperparameters; None for those of `settings_for`. `throttle_weight` is ignored.
+        settings: Hyperparameters; None for those of `settings_for`.
         head: Kind of output.
         inputs: Inputs of the policy.
         seed: Seed of all randomness.
+        start: Policy to train further, which is not changed; one network then keeps its inputs and
+            outputs. None for a new one.
+        rehearsal: Demonstrations that `start` was trained on, mixed in so that they are not
+            forgotten; None for none.
+        symmetric: Whether the driver steers to both sides alike, as an expert in random worlds
+            does, so that the share of mirrored images is that of the settings. Otherwise it depends
+            on how evenly the driver steered.
         on_check: Called after each validation.
 
     Returns:
@@ -197,73 +130,81 @@ def learn(
     Raises:
         CloningError: If the data are unsuitable, or the seed is not a whole number from 0 to
             2^32 - 1.
+        PolicyError: If the layouts of the data are other ones than those of `start`.
     """
     seed = check_seed(seed, CloningError)
     began = time.monotonic()
-    which = np.ones(len(data.actions), np.bool_) if learned is None else learned
-    if not which.any():
-        raise CloningError("There is no step to learn from.")
-    settings = settings_for(int(which.sum())) if settings is None else settings
-    actions = data.actions[which]
-    if not np.isfinite(actions).all():
-        first = int(np.flatnonzero(~np.isfinite(data.actions).all(axis=1) & which)[0])
+    which = np.ones(len(data), np.bool_) if learned is None else learned
+    if (wrong := which & ~np.isfinite(data.actions).all(axis=1)).any():
+        first = int(wrong.argmax())
         raise CloningError(f"Action {first} must be finite, got {data.actions[first].tolist()}.")
-    with_pictures, with_states = _inputs_of(data, inputs)
-    mirror, state_mirror, share, note = _mirrors(data, actions, with_states)
+    data = data.part(which)
+    if not len(data):
+        raise CloningError("There is no step to learn from.")
+    settings = settings_for(len(data)) if settings is None else settings
+    if start is None:
+        with_pictures, with_states = _inputs_of(data, inputs)
+    else:
+        start.card.require_layouts(data.action_layout, data.state_layout)
+        with_pictures, with_states = start.card.eyes != "none", bool(start.card.nerves)
+    mirror, state_mirror, share, note = _mirrors(data, with_states)
+    if symmetric and mirror is not None:
+        share, note = settings.augmentation.mirror, ""
+    mirror = mirror if share else None
     settings = msgspec.structs.replace(
         settings, augmentation=msgspec.structs.replace(settings.augmentation, mirror=share)
     )
-    mirrored = mirror(actions) if mirror and share else None
-    unseen = _unseen(data) if with_states else ()
-    states = None
-    if with_states and data.states is not None and data.state_layout is not None:
-        states = data.states[which].astype(np.float32)
-        for name in unseen:
-            states[:, data.state_layout.slices[name]] = np.nan
-    card = CloneCard(
-        framing=settings.framing,
-        channels=settings.channels,
-        features=settings.features,
-        eyes=settings.eyes if with_pictures else "none",
-        nerves=settings.nerves if with_states else (),
-        action_layout=data.action_layout,
-        state_layout=data.state_layout if with_states else None,
-        unseen=unseen,
-        **output_fields(actions, data.action_layout, head, mirrored),
+    card = (
+        start.card
+        if start is not None
+        else CloneCard(
+            framing=settings.framing,
+            channels=settings.channels,
+            features=settings.features,
+            eyes=settings.eyes if with_pictures else "none",
+            nerves=settings.nerves if with_states else (),
+            action_layout=data.action_layout,
+            state_layout=data.state_layout if with_states else None,
+            unseen=_unseen(data) if with_states else (),
+            **output_fields(
+                data.actions, data.action_layout, head, mirror and mirror(data.actions)
+            ),
+        )
     )
-    shown = Examples(
-        prepare(data.pictures[which], settings.framing)
-        if with_pictures and data.pictures is not None
-        else None,
-        states,
-        card.targets(actions),
-        states if states is None or state_mirror is None else state_mirror(states),
-        card.targets(actions if mirrored is None else mirrored),
-    )
-    lesson = _Lesson(shown, settings, settings.learning_rate, None, None, on_check)
-    members = [
-        lesson.member(card, stretch(len(shown), n, settings.members, settings.held_out), seed, n)
-        for n in range(settings.members)
-    ]
-    networks, checks, steps, logits, wanted = (list(each) for each in zip(*members, strict=True))
+    shown = Examples.of(data, card, mirror, state_mirror)
+    again = None if rehearsal is None else Examples.of(rehearsal, card, mirror, state_mirror)
+    lesson = _Lesson(shown, again, settings, on_check)
+    members = settings.members if start is None else 1
+    networks: list[CameraNetwork] = []
+    checks: list[MemberCheck] = []
+    steps: list[int] = []
+    validated: list[tuple[Tensor, Tensor]] = []
+    for member in range(members):
+        own_seed = seed * members + member
+        policy = CameraPolicy.blank(card, own_seed) if start is None else start.copy()
+        kept_back = stretch(len(shown), member, members, settings.held_out)
+        with seeded(own_seed):  # Dropout draws from the global generator.
+            found, best = lesson.fit(policy, kept_back, own_seed, member)
+        networks.append(policy.network)
+        checks += found
+        steps.append(best)
+        validated.append(_validation(policy, shown.part(kept_back)))
     card = msgspec.structs.replace(
-        card, members=len(members), seeds=(seed,), steps=max(steps), settings=settings
+        card,
+        members=card.members if members == 1 else members,
+        seeds=(*card.seeds, seed),
+        steps=max(steps),
+        settings=settings,
     )
-    whole = joined(card, networks)
+    whole = networks[0] if members == 1 else joined(card, networks)
     if card.classes:
         # Scale the logits so that confidence matches accuracy on held-out steps.
-        temperature = best_temperature(torch.cat(logits), torch.cat(wanted))
+        temperature = best_temperature(*map(torch.cat, zip(*validated, strict=True)))
         with torch.no_grad():
             whole.hands.weight.div_(temperature)
             whole.hands.bias.div_(temperature)
-    training = Training(
-        tuple(check for own in checks for check in own),
-        tuple(steps),
-        len(actions),
-        share,
-        note,
-        time.monotonic() - began,
-    )
+    seconds = time.monotonic() - began
+    training = Training(tuple(checks), tuple(steps), len(data), share, note, seconds)
     return CameraPolicy(whole, card), training
 
 
@@ -279,9 +220,7 @@ def _inputs_of(data: Dataset, inputs: Inputs) -> tuple[bool, bool]:
     return with_pictures, with_states
 
 
-def _mirrors(
-    data: Dataset, actions: NDArray[np.float32], with_states: bool
-) -> tuple[Mirror | None, Mirror | None, float, str]:
+def _mirrors(data: Dataset, with_states: bool) -> tuple[Mirror | None, Mirror | None, float, str]:
     """Return the mirrors of actions and states, the share to mirror, and the reason for it."""
     try:
         mirror = mirror_of(data.action_layout)
@@ -289,7 +228,7 @@ def _mirrors(
         of_states = mirror_of(layout) if with_states and layout is not None else None
     except CloningError as reason:
         return None, None, 0.0, f"No image is mirrored, because {reason}."
-    balance = mirror.balance(actions)
+    balance = mirror.balance(data.actions)
     share = 0.5 * balance
     note = (
         f"{share:.1%} of the images are mirrored, because the driver steered to one side "
@@ -310,45 +249,26 @@ def _unseen(data: Dataset) -> tuple[str, ...]:
     return unseen
 
 
+def _validation(policy: CameraPolicy, shown: Examples) -> tuple[Tensor, Tensor]:
+    """Return the outputs of the last layer for examples, and their targets."""
+    return policy.logits(shown.pictures, shown.states), torch.as_tensor(shown.targets)
+
+
+def _loss(card: CloneCard, out: Tensor, wanted: Tensor, smoothing: float = 0.0) -> Tensor:
+    """Return the mean loss of outputs of the last layer."""
+    if card.classes:
+        return functional.cross_entropy(out, wanted, label_smoothing=smoothing)
+    return functional.smooth_l1_loss(torch.tanh(out), wanted, beta=_HUBER_BETA)
+
+
 @dataclass(frozen=True, slots=True)
 class _Lesson:
-    """Training of networks on examples.
-
-    Attributes:
-        shown: The examples.
-        settings: Number of steps, validations, and patience.
-        rate: Maximum learning rate.
-        weights: Weight of each value's error, shape (m,); None for equal ones, or classes.
-        rehearsal: Examples to mix in; None for none.
-        on_check: Called after each validation.
-    """
+    """Training of networks on examples."""
 
     shown: Examples
-    settings: CloneSettings
-    rate: float
-    weights: Tensor | None
     rehearsal: Examples | None
+    settings: CloneSettings
     on_check: Callable[[MemberCheck], None]
-
-    def member(
-        self, card: CloneCard, kept_back: NDArray[np.bool_], seed: int, member: int
-    ) -> tuple[CameraNetwork, list[MemberCheck], int, Tensor, Tensor]:
-        """Train one member of several."""
-        seed = seed * self.settings.members + member
-        policy = CameraPolicy.blank(card, seed)
-        self.begin(policy, ~kept_back)
-        wanted = torch.as_tensor(self.shown.targets[kept_back])
-
-        def logits(network: CameraNetwork, validation: Examples) -> Tensor:
-            return CameraPolicy(network, card).logits(validation.pictures, validation.states)
-
-        def error(network: CameraNetwork, validation: Examples) -> float:
-            return float(self.loss(card, logits(network, validation), wanted, smoothing=0.0))
-
-        with _seeded(seed):
-            checks, best = self.fit(policy, kept_back, seed, member, error)
-        outputs = logits(policy.network, self.shown.part(kept_back))
-        return policy.network, checks, best, outputs, wanted
 
     def begin(self, policy: CameraPolicy, learned: NDArray[np.bool_]) -> None:
         """Initialise the output to the mean action or the frequencies, and normalise the states."""
@@ -364,35 +284,24 @@ class _Lesson:
         if shown.states is not None:
             _normalise(network, shown.states)
 
-    def loss(self, card: CloneCard, out: Tensor, wanted: Tensor, smoothing: float) -> Tensor:
-        """Return the mean loss of outputs."""
-        if card.classes:
-            return functional.cross_entropy(out, wanted, label_smoothing=smoothing)
-        out = torch.tanh(out)
-        if self.weights is None:
-            return functional.smooth_l1_loss(out, wanted, beta=_HUBER_BETA)
-        each = functional.smooth_l1_loss(out, wanted, reduction="none", beta=_HUBER_BETA)
-        return (each * self.weights).mean()
-
     def fit(
-        self,
-        policy: CameraPolicy,
-        kept_back: NDArray[np.bool_],
-        seed: int,
-        member: int,
-        error: Callable[[CameraNetwork, Examples], float],
+        self, policy: CameraPolicy, kept_back: NDArray[np.bool_], seed: int, member: int
     ) -> tuple[list[MemberCheck], int]:
         """Train the network of a policy in place, and restore its best weights at the end."""
-        network, settings = policy.network, self.settings
-        batches = Batches(self.shown, ~kept_back, self.rehearsal, settings, seed)
+        network, card, settings = policy.network, policy.card, self.settings
+        rate = settings.further_rate
+        if not card.seeds:  # It is untrained.
+            rate = settings.learning_rate
+            self.begin(policy, ~kept_back)
+        drawn = batches(self.shown, ~kept_back, self.rehearsal, settings, seed)
         validation = self.shown.part(kept_back)
         optimizer = torch.optim.AdamW(
-            network.parameters(), lr=self.rate, weight_decay=settings.weight_decay
+            network.parameters(), lr=rate, weight_decay=settings.weight_decay
         )
-        total = settings.steps(batches.size)
+        total = settings.steps(len(kept_back) - len(validation))
         every = max(total // settings.checks, 1)
         # Validated and kept: the network itself, or the average of its weights.
-        kept = copy.deepcopy(network) if settings.averaging else network
+        kept = CameraPolicy(copy.deepcopy(network) if settings.averaging else network, card)
         checks: list[MemberCheck] = []
         losses: list[float] = []
         best, best_weights = -1, dict[str, Tensor]()
@@ -400,7 +309,10 @@ class _Lesson:
         while True:
             if step % every == 0 or step == total:
                 mean_loss = sum(losses) / len(losses) if losses else math.nan
-                now = error(kept.eval(), validation) if len(validation) else math.nan
+                kept.network.eval()
+                now = math.nan
+                if len(validation):
+                    now = float(_loss(card, *_validation(kept, validation)))
                 checks.append(MemberCheck(member, step, mean_loss, now))
                 self.on_check(checks[-1])
                 losses.clear()
@@ -408,42 +320,31 @@ class _Lesson:
                 # NaN without held-out data: keep the last.
                 if best < 0 or not now >= checks[best].error:
                     best, worse = len(checks) - 1, 0
-                    best_weights = {name: w.clone() for name, w in kept.state_dict().items()}
+                    best_weights = {n: w.clone() for n, w in kept.network.state_dict().items()}
                 if step == total or worse >= settings.patience:
                     break
             for group in optimizer.param_groups:
-                group["lr"] = self.rate * _share_of_rate(step, total, settings.warm_up)
+                group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
             network.train()
-            batch = batches.draw()
+            batch = next(drawn)
             found = network.perceive(batch.pictures, batch.states)
             out = network.hands(functional.dropout(found, settings.dropout))
-            batch_loss = self.loss(policy.card, out, batch.targets, settings.smoothing)
+            loss = _loss(card, out, batch.targets, settings.smoothing)
             optimizer.zero_grad()
-            batch_loss.backward()  # pyright: ignore[reportUnknownMemberType]
+            loss.backward()  # pyright: ignore[reportUnknownMemberType]
             torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
             optimizer.step()  # pyright: ignore[reportUnknownMemberType]
-            losses.append(batch_loss.item())
+            losses.append(loss.item())
             step += 1
             if settings.averaging:
                 share = min(settings.averaging, step / (step + _AVERAGE_FROM))
+                pairs = zip(kept.network.parameters(), network.parameters(), strict=True)
                 with torch.no_grad():
-                    for old, new in zip(kept.parameters(), network.parameters(), strict=True):
+                    for old, new in pairs:
                         old.lerp_(new, 1.0 - share)
         network.load_state_dict(best_weights)
         network.eval()
         return checks, checks[best].step
-
-
-@contextmanager
-def _seeded(seed: int) -> Generator[None]:
-    """Seed the global generator, which dropout draws from; earlier draws must not matter."""
-    fork = cast(
-        "AbstractContextManager[None]",
-        torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
-    )
-    with fork:
-        torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
-        yield
 
 
 def _normalise(network: CameraNetwork, states: NDArray[np.float32]) -> None:

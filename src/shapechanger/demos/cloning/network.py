@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import CHANNELS, Framing
+from shapechanger.demos.cloning.pictures import Framing
 
 DIRECTIONS: Final = 6
 """Number of edge directions over half a turn: 30 degrees each."""
@@ -29,53 +29,6 @@ _MIN_EDGE: Final = 1e-4
 # of a covered lens, from being amplified into noise.
 _MIN_SPREAD: Final = 0.02
 _MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more information.
-
-
-def _convolutions(
-    channels: tuple[int, ...], features: int, before: int, size: tuple[int, int], first: int
-) -> tuple[nn.Sequential, nn.Linear]:
-    """Return convolutions, each of which halves rows and columns, and a layer to the features.
-
-    Args:
-        channels: Filters of each convolution.
-        features: Number of features.
-        before: Number of colours or directions.
-        size: Rows and columns.
-        first: Side of the first filters, pixels.
-    """
-    layers: list[nn.Module] = []
-    height, width = size
-    for i, after in enumerate(channels):
-        side = 3 if i else first
-        layers += [nn.Conv2d(before, after, side, stride=2, padding=side // 2), nn.ReLU()]
-        height, width, before = (height + 1) // 2, (width + 1) // 2, after
-    return nn.Sequential(*layers), nn.Linear(before * height * width, features)
-
-
-class EdgeEyes(nn.Module):
-    """Encoder of an image by its edges.
-
-    Args:
-        framing: Size of the images.
-        channels: Filters of each convolution after the edges.
-        features: Number of features.
-    """
-
-    def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
-        super().__init__()
-        self._cells = max(framing.height // _CELL, 1), max(framing.width // _CELL, 1)
-        self.filters, self.boiled_down = _convolutions(
-            channels, features, DIRECTIONS, self._cells, first=3
-        )
-
-    def forward(self, pictures: Tensor) -> Tensor:
-        """Return the features, shape (n, features).
-
-        Args:
-            pictures: In [0, 1], shape (n, 3, height, width).
-        """
-        found = self.filters(edges(pictures, self._cells) - 1.0)
-        return torch.relu(self.boiled_down(found.flatten(1)))
 
 
 def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
@@ -101,32 +54,51 @@ def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
 
 
 class Eyes(nn.Module):
-    """Encoder of an image by its colours.
+    """Encoder of an image by its colours or edges.
 
-    Each image is normalised by its own mean and standard deviation, so that neither daylight nor
-    exposure matters.
+    Colours are normalised by the mean and standard deviation of their image, so that neither
+    daylight nor exposure matters.
 
     Args:
         framing: Size of the images.
-        channels: Filters of each convolution.
+        channels: Filters of each convolution, which halves rows and columns.
         features: Number of features.
+        by_edges: Whether the first layer sees edges instead of colours.
     """
 
-    def __init__(self, framing: Framing, channels: tuple[int, ...], features: int) -> None:
+    def __init__(
+        self, framing: Framing, channels: tuple[int, ...], features: int, by_edges: bool
+    ) -> None:
         super().__init__()
-        # The first filters are wider, to find edges.
-        self.filters, self.boiled_down = _convolutions(
-            channels, features, CHANNELS, (framing.height, framing.width), first=5
-        )
+        self._cells: tuple[int, int] | None = None
+        height, width, before = framing.shape
+        if by_edges:
+            height, width = max(height // _CELL, 1), max(width // _CELL, 1)
+            self._cells, before = (height, width), DIRECTIONS
+        layers: list[nn.Module] = []
+        for i, after in enumerate(channels):
+            # The first filters of colours are wider, to find edges.
+            side = 3 if i or by_edges else 5
+            layers += [nn.Conv2d(before, after, side, stride=2, padding=side // 2), nn.ReLU()]
+            height, width, before = (height + 1) // 2, (width + 1) // 2, after
+        self.filters = nn.Sequential(*layers)
+        self.boiled_down = nn.Linear(before * height * width, features)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Return the features, with the shapes of `EdgeEyes`."""
-        # Colours are last in memory, so that each image is one row: several times faster than
-        # over three dimensions.
-        rows = pictures.permute(0, 2, 3, 1).flatten(1)
-        spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
-        found = self.filters((pictures - mean) / (spread + _MIN_SPREAD))
-        return torch.relu(self.boiled_down(found.flatten(1)))
+        """Return the features, shape (n, features).
+
+        Args:
+            pictures: In [0, 1], shape (n, 3, height, width).
+        """
+        if self._cells is not None:
+            seen = edges(pictures, self._cells) - 1.0
+        else:
+            # Colours are last in memory, so that each image is one row: several times faster than
+            # over three dimensions.
+            rows = pictures.permute(0, 2, 3, 1).flatten(1)
+            spread, mean = (x[:, None, None, None] for x in torch.std_mean(rows, dim=1))
+            seen = (pictures - mean) / (spread + _MIN_SPREAD)
+        return torch.relu(self.boiled_down(self.filters(seen).flatten(1)))
 
 
 class Nerves(nn.Module):
@@ -176,9 +148,8 @@ class CameraNetwork(nn.Module):
 
     def __init__(self, card: CloneCard) -> None:
         super().__init__()
-        kind = EdgeEyes if card.eyes == "edges" else Eyes
         eyes = [
-            kind(card.framing, card.channels, card.features)
+            Eyes(card.framing, card.channels, card.features, card.eyes == "edges")
             for _ in range(card.members if card.eyes != "none" else 0)
         ]
         nerves = [
@@ -214,9 +185,6 @@ def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
         members: Networks of the same architecture, each with one member.
     """
     network = CameraNetwork(card)
-    if len(members) == 1:
-        network.load_state_dict(members[0].state_dict())
-        return network
     for name in ("eyes", "nerves"):
         several = getattr(network, name)
         if several is not None:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Final
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import ShapechangerError
+
+if TYPE_CHECKING:
+    from shapechanger.demos.episodes import EpisodeHeader
 
 
 class CloningError(ShapechangerError, ValueError):
@@ -125,3 +131,34 @@ def area_shares(before: int, after: int) -> NDArray[np.float32]:
     overlap = np.minimum(edges[1:, None], old + 1) - np.maximum(edges[:-1, None], old)
     shares = np.clip(overlap, 0.0, None)
     return (shares / shares.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+@dataclass
+class ShrunkFrames:
+    """Convert frames to a policy's view while they are read, and record their digests.
+
+    Attributes:
+        framing: Crop and resolution.
+        view: Returns the frame of another camera for a frame and the header of its episode; None
+            for the same camera.
+        size: Rows and columns of the last frame before; None before the first.
+        seen: Digests of the frames.
+    """
+
+    framing: Framing
+    view: Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]] | None = None
+    size: tuple[int, int] | None = None
+    seen: list[bytes] = field(default_factory=list[bytes])
+
+    def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
+        """Return the policy's view of a frame of an episode."""
+        if self.view is not None:
+            picture = self.view(picture, header)
+        self.size = picture.shape[0], picture.shape[1]
+        small = prepare(picture[None], self.framing)[0]
+        self.seen.append(hashlib.sha256(picture.tobytes()).digest())
+        return small
+
+    def digest(self, actions: NDArray[np.float32]) -> str:
+        """Return a digest of the demonstrations."""
+        return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()

@@ -6,27 +6,30 @@ The file holds the weights as safetensors, with a card in JSON that describes th
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import ActingClone, CloneCard
-from shapechanger.demos.cloning.pictures import CloningError, PolicyError
+from shapechanger.demos.cloning.card import STEERING, ActingClone, CloneCard
+from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.cloning.settings import CloneSettings
-from shapechanger.errors import MissingExtra, no_policy_file
-from shapechanger.files import cannot_write, write_atomic
+from shapechanger.errors import MissingExtra
+from shapechanger.files import make_folder, write_atomic
 from shapechanger.identity import Identity
-from shapechanger.policy import UNUSABLE, read_tensors, tensor_bytes
+from shapechanger.layout import Layout
+from shapechanger.onnx_file import export_network
+from shapechanger.policy import CLONE_CARD, read_tensors, refusing, tensor_bytes
 
 try:
     import torch
-    from torch import Tensor
+    from torch import Tensor, nn
 
-    from shapechanger.demos.cloning.examples import plain
+    from shapechanger.demos.cloning.examples import scaled
     from shapechanger.demos.cloning.network import CameraNetwork
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error
@@ -49,22 +52,26 @@ class CameraPolicy(ActingClone):
         self.card = card
 
     @classmethod
-    def fresh(cls, settings: CloneSettings, seed: int) -> CameraPolicy:
-        """Return an untrained policy for steering and throttle from an image.
+    def fresh(
+        cls, settings: CloneSettings, seed: int, actions: Layout | None = None
+    ) -> CameraPolicy:
+        """Return an untrained policy whose actions are in [-1, 1], from an image.
 
         Args:
             settings: Architecture of the network.
             seed: Seed of the weights.
+            actions: Meaning of the actions; None for the steering and throttle of any vehicle.
         """
-        return cls.blank(
-            CloneCard(
-                framing=settings.framing,
-                channels=settings.channels,
-                features=settings.features,
-                eyes=settings.eyes,
-            ),
-            seed,
+        if actions is not None and actions.names == STEERING:
+            actions = None
+        card = CloneCard(
+            framing=settings.framing,
+            channels=settings.channels,
+            features=settings.features,
+            eyes=settings.eyes,
+            action_layout=actions,
         )
+        return cls.blank(card, seed)
 
     @classmethod
     def blank(cls, card: CloneCard, seed: int) -> CameraPolicy:
@@ -74,16 +81,14 @@ class CameraPolicy(ActingClone):
             card: Architecture of the network.
             seed: Seed of the weights.
         """
-        with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
-            torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
+        with seeded(seed):
             return cls(CameraNetwork(card), card)
 
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
         """Return the outputs of the network, as `ActingClone` describes them."""
-        out = self.logits(pictures, states)
-        return (torch.softmax(out, dim=1) if self.card.classes else torch.tanh(out)).numpy()
+        return _activated(self.logits(pictures, states), self.card).numpy()
 
     def logits(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
@@ -98,7 +103,7 @@ class CameraPolicy(ActingClone):
                 some = slice(start, start + _CHUNK)
                 part = None if small is None else torch.as_tensor(small[some].copy())
                 found[some] = self.network.perceive(
-                    None if part is None else plain(part, torch.arange(len(part))),
+                    None if part is None else scaled(part),
                     None if known is None else known[some],
                 )
             return self.network.hands(found)
@@ -132,10 +137,7 @@ class CameraPolicy(ActingClone):
             OutputError: If the file cannot be written.
         """
         weights = {name: value.numpy() for name, value in self.network.state_dict().items()}
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(path, error) from error
+        make_folder(path.parent)
         write_atomic(path, tensor_bytes(weights, msgspec.json.encode(self.card), KIND))
 
     @classmethod
@@ -145,16 +147,65 @@ class CameraPolicy(ActingClone):
         Raises:
             PolicyError: If the file is missing or damaged, or contains anything but a policy.
         """
-        try:
+        with refusing(path, PolicyError):
             content, weights = read_tensors(path, KIND)
             card = msgspec.json.decode(content, type=CloneCard)
             return cls(_network(card, weights), card)
-        except FileNotFoundError as error:
-            raise PolicyError(no_policy_file(path)) from error
-        except (*UNUSABLE, CloningError) as error:
-            # Messages of PyTorch fill a page; the first line is enough.
-            reason = str(error).strip().partition("\n")[0].rstrip(".:") or type(error).__name__
-            raise PolicyError(f"{path} is not a cloned policy: {reason}.") from error
+
+    def export(self, path: Path, *, body: str = "", control_hz: float | None = None) -> None:
+        """Write the policy as ONNX, which a robot runs without PyTorch.
+
+        Its inputs are `picture`, uint8 of the shape (n, height, width, 3) that the card's framing
+        gives, and `state`, float32 of shape (n, values); its output is `output`, float32: actions
+        in [-1, 1], or probabilities of the card's classes.
+
+        Args:
+            path: The file, such as `car.onnx`.
+            body: Kind of robot that it learned in; "" for any.
+            control_hz: Actions per second that it learned with; None if unknown.
+
+        Raises:
+            MissingExtra: If onnx or onnxscript is not installed.
+            OutputError: If the file cannot be written.
+        """
+        card = msgspec.structs.replace(self.card, body=body, control_hz=control_hz)
+        kinds = {"picture": torch.uint8, "state": torch.float32}
+        inputs = {
+            name: torch.zeros((2, *shape), dtype=kinds[name]) for name, shape in card.inputs.items()
+        }
+        facts = {CLONE_CARD: msgspec.json.encode(card).decode()}
+        export_network(_Whole(self.network, card), inputs, "output", path, facts)
+
+
+@contextmanager
+def seeded(seed: int) -> Generator[None]:
+    """Seed the global generator, and restore it at the end."""
+    fork = cast(
+        "AbstractContextManager[None]",
+        torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
+    )
+    with fork:
+        torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
+        yield
+
+
+class _Whole(nn.Module):
+    """A network with the scaling of images and outputs."""
+
+    def __init__(self, network: CameraNetwork, card: CloneCard) -> None:
+        super().__init__()
+        self.network, self.card = network, card
+
+    def forward(self, *given: Tensor) -> Tensor:
+        named = dict(zip(self.card.inputs, given, strict=True))
+        seen = scaled(named["picture"]) if "picture" in named else None
+        out = self.network.hands(self.network.perceive(seen, named.get("state")))
+        return _activated(out, self.card)
+
+
+def _activated(out: Tensor, card: CloneCard) -> Tensor:
+    """Return probabilities of classes, or actions in [-1, 1], for outputs of the last layer."""
+    return torch.softmax(out, dim=1) if card.classes else torch.tanh(out)
 
 
 def _network(card: CloneCard, weights: Mapping[str, NDArray[Any]]) -> CameraNetwork:

@@ -58,9 +58,8 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         further_rate: Initial learning rate when another policy is trained further.
         warm_up: Steps in which the rate rises from 0.
         weight_decay: Of AdamW.
-        throttle_weight: Weight of errors of the throttle relative to those of the steering.
-        held_out: Share at the end of each episode, in [0, 1), that is not learned from but used for
-            early stopping.
+        held_out: Share of the steps, in [0, 1), in one stretch, that is not learned from but used
+            for early stopping.
         checks: Number of validations during training.
         patience: Number of validations without improvement after which training stops.
         rehearsal: Share of each batch that comes from the rehearsal data, if there are any.
@@ -88,7 +87,6 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     further_rate: float = 1e-3
     warm_up: int = 50
     weight_decay: float = 1e-3
-    throttle_weight: float = 1.0
     held_out: float = 0.1
     checks: int = 10
     patience: int = 10
@@ -117,8 +115,8 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
             raise CloningError("passes and both learning rates must be positive.")
         if not (0.0 <= self.held_out < 1.0 and 0.0 <= self.rehearsal < 1.0):
             raise CloningError("held_out and rehearsal must be in [0, 1).")
-        if min(self.warm_up, self.weight_decay, self.throttle_weight) < 0:
-            raise CloningError("warm_up, weight_decay and throttle_weight must be at least 0.")
+        if min(self.warm_up, self.weight_decay) < 0:
+            raise CloningError("warm_up and weight_decay must be at least 0.")
         if not self.nerves or min(self.members, *self.nerves) < 1:
             raise CloningError("members and nerves must be at least 1.")
         if not all(0.0 <= x < 1.0 for x in (self.dropout, self.smoothing, self.averaging)):

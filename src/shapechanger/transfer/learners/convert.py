@@ -21,7 +21,8 @@ from shapechanger.layout import Layout
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import Identities
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
-from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
+from shapechanger.transfer.learners.card import PolicyCard
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import OffPolicySettings, PpoSettings, Sb3Settings
 from shapechanger.transfer.transplant.model import check_supported
 
@@ -49,16 +50,16 @@ def convert_zip(
     check_size("observation of the policy", model.observation_space, observation)
     check_size("action of the policy", model.action_space, action)
     card = PolicyCard(
-        env,
-        observation,
-        action,
-        "converted",
-        settings_of_model(model),
-        int(model.num_timesteps),
-        int(model.seed or 0),
-        version("shapechanger"),
-        identity,
-        command,
+        env=env,
+        observation=observation,
+        action=action,
+        learner="converted",
+        settings=settings_of_model(model),
+        steps=int(model.num_timesteps),
+        seed=int(model.seed or 0),
+        version=version("shapechanger"),
+        identity=identity,
+        command=command,
     )
     return TrainedPolicy(model, None, card)
 

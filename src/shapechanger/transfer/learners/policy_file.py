@@ -21,15 +21,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import CorruptStudy, MissingExtra, no_policy_file
+from shapechanger.errors import CorruptStudy, MissingExtra
 from shapechanger.files import from_builtins, write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
-from shapechanger.policy import UNUSABLE, read_tensors, refusal, tensor_bytes
+from shapechanger.policy import read_tensors, refusing, tensor_bytes
 from shapechanger.transfer.actions import ActionScale
-from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
+from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 
 try:
@@ -49,37 +48,6 @@ _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
 _SPACES: Final = "spaces."
 _MOST_ENVS: Final = 4096
-
-
-class PolicyCard(msgspec.Struct, frozen=True):
-    """Provenance of a policy.
-
-    Attributes:
-        env: The env that it was trained in.
-        observation: Layout of its observations.
-        action: Layout of its actions.
-        learner: Name of the learner.
-        settings: Settings of the learner.
-        steps: Env steps of training.
-        seed: Seed of the training.
-        version: Version of Shapechanger.
-        identity: Version of the env and of the learner, see `shapechanger.transfer.versions`.
-        command: The command that wrote it; empty in a study, where `study.json` holds it.
-        start_log_std: Logarithm of the standard deviation of each action where its training started
-            from another policy; None if it did not, or if the deviation is no parameter.
-    """
-
-    env: EnvRef
-    observation: Layout
-    action: Layout
-    learner: str
-    settings: LearnerSettings
-    steps: int
-    seed: int
-    version: str
-    identity: dict[str, Identity]
-    command: str = ""
-    start_log_std: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -167,20 +135,11 @@ class TrainedPolicy:
         Raises:
             CorruptStudy: If the file is missing, is not such a policy, or has been changed.
         """
-        try:
+        with refusing(path, CorruptStudy):
             content, tensors = read_tensors(path)
             card = msgspec.json.decode(content, type=PolicyCard, dec_hook=from_builtins)
             _require_numbers(card, tensors)
             return cls(_model(card, tensors, algorithm), _read_statistics(card, tensors), card)
-        except FileNotFoundError as error:
-            raise CorruptStudy(no_policy_file(path)) from error
-        except CorruptStudy:  # Which is a ValueError, too.
-            raise
-        except UNUSABLE as error:
-            raise CorruptStudy(
-                f"{path} is not a policy that `shapechanger train` or a study has written "
-                f"({refusal(error)})."
-            ) from error
 
 
 def actor(
@@ -198,10 +157,10 @@ def actor(
         action: Layout of the env's actions.
         deterministic: Whether actions are the mean ones, without exploration noise.
     """
+    if deterministic and hasattr(model.policy, "act"):
+        return cast("Any", model).policy.act  # Rows of limbs are scaled already, and of any body.
     mean = _mean_action(model) if deterministic else None
     scale = ActionScale.between(cast("Any", model).action_space, action)
-    if mean is not None and hasattr(model.policy, "act"):
-        return mean  # Rows of limbs are scaled already, and of any body.
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         inputs = observations
@@ -221,8 +180,6 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
     long as the network itself.
     """
     policy: Any = model.policy
-    if hasattr(policy, "act"):  # It defines its own mean actions.
-        return policy.act
     kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
     if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):
         return None

@@ -27,17 +27,13 @@ from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import identities_in
 from shapechanger.transfer.learners import Learner, PolicyOrigin, ignore
 from shapechanger.transfer.learners.algorithms import build_model
+from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
     evaluation_seed,
 )
-from shapechanger.transfer.learners.policy_file import (
-    Normalisation,
-    PolicyCard,
-    TrainedPolicy,
-    actor,
-)
+from shapechanger.transfer.learners.policy_file import Normalisation, TrainedPolicy, actor
 from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import training_vec_env, with_scaled_actions
 from shapechanger.transfer.transplant import transplant
@@ -155,8 +151,18 @@ class Sb3Learner(Learner[Sb3Settings]):
         explores: tuple[float, ...] | None,
     ) -> TrainedPolicy:
         """Return a trained model with its card and the statistics of its envs."""
-        own = self.name, settings, int(model.num_timesteps), seed, version("shapechanger"), identity
-        card = PolicyCard(env, *layouts, *own, start_log_std=explores)
+        card = PolicyCard(
+            env=env,
+            observation=layouts[0],
+            action=layouts[1],
+            learner=self.name,
+            settings=settings,
+            steps=int(model.num_timesteps),
+            seed=seed,
+            version=version("shapechanger"),
+            identity=identity,
+            start_log_std=explores,
+        )
         return TrainedPolicy(model, statistics_of(envs), card)
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:

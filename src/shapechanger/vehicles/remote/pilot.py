@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from shapechanger.demos.cloning.onnx_policy import OnnxClone
+from shapechanger.demos.cloning.card import OnnxClone
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.statistics import is_same_rate
 from shapechanger.errors import RobotRefused, ShapechangerError
@@ -31,7 +31,6 @@ from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
-    from shapechanger.demos.cloning.onnx_policy import OnnxClone
     from shapechanger.demos.cloning.policy import CameraPolicy
 
 # s. A reset waits in steps of this length, and checks between them whether to end.
@@ -40,39 +39,30 @@ _END_S: Final = 10.0
 _WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
 
 
-def require_fit(
-    card: CloneCard,
-    robot: RobotCard,
-    *,
-    measures: bool,
-    body: str = "",
-    control_hz: float | None = None,
-) -> None:
+def require_fit(card: CloneCard, robot: RobotCard, *, measures: bool) -> None:
     """Refuse a policy that does not fit a robot; the message names what differs.
 
     Args:
         card: Card of the policy.
         robot: The robot.
         measures: Whether the vehicle's turning may be measured before it drives.
-        body: Kind of robot that the policy learned to steer, such as "car"; "" for any.
-        control_hz: Actions per second that it learned with; None if unknown.
 
     Raises:
         PolicyError: If body, rate, actions or state differ.
         RobotRefused: If the robot has no camera, or its card lacks how the camera looks or how the
             vehicle turns.
     """
-    if body and body != robot.body:
+    if card.body and card.body != robot.body:
         raise PolicyError(
-            f"The policy learned to steer a {body}, and {robot.robot} is a {robot.body}: only "
+            f"The policy learned to steer a {card.body}, and {robot.robot} is a {robot.body}: only "
             "policies of waypoints move from one body to another."
         )
     jitter = card.data.get("rate_jitter", 0.0)
     jitter = float(jitter) if isinstance(jitter, int | float) else 0.0
-    if control_hz is not None and not is_same_rate(control_hz, robot.control_hz, jitter):
+    if (hz := card.control_hz) is not None and not is_same_rate(hz, robot.control_hz, jitter):
         within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
         raise PolicyError(
-            f"The policy learned at {control_hz:g} actions a second{within}, and {robot.robot} has "
+            f"The policy learned at {hz:g} actions a second{within}, and {robot.robot} has "
             f"control_hz = {robot.control_hz:g}."
         )
     has_waypoints = _has_waypoints(card)
@@ -239,9 +229,7 @@ def main() -> int:
         policy = OnnxClone(file)
         with RobotClient.connect(robot, frames=False) as there:
             card = there.welcome
-        require_fit(
-            policy.card, card, measures=False, body=policy.body, control_hz=policy.control_hz
-        )
+        require_fit(policy.card, card, measures=False)
         driver = PolicyDriver(
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )

@@ -1,4 +1,4 @@
-"""Augmentation of images and its effect on their actions."""
+"""Augmentation, mirror images, and splits of demonstrations."""
 
 from __future__ import annotations
 
@@ -7,9 +7,17 @@ import pytest
 import torch
 from torch import Tensor
 
-from shapechanger.demos.cloning.examples import STEERING, augmented, plain
+from shapechanger.demos.cloning.examples import (
+    augmented,
+    evaluated_steps,
+    mirror_of,
+    scaled,
+    stretch,
+)
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.settings import Augmentation
+from shapechanger.layout import Feature, Layout
+from tests.demos.cloning.data import KEYS, STEERS
 
 _NOTHING = {"mirror": 0.0, "shift": 0, "gain": 1.0, "colour": 1.0, "offset": 0.0, "noise": 0.0}
 _NOTHING_ELSE = {"noisy": 0.0, "blurred": 0.0}
@@ -28,9 +36,9 @@ def _augmented(seed: int = 0, **changes: float) -> tuple[Tensor, Tensor, Tensor,
     augmentation = Augmentation(**{**_NOTHING, **_NOTHING_ELSE, **changes})  # pyright: ignore[reportArgumentType]
     generator = torch.Generator().manual_seed(seed)
     seen, turned = augmented(pictures, index, augmentation, generator)
-    mirrored = torch.as_tensor(STEERING(actions.numpy()))
+    mirrored = torch.as_tensor(mirror_of(STEERS)(actions.numpy()))
     wanted = torch.where(turned[:, None], mirrored, actions)
-    return seen, wanted, plain(pictures, index), actions
+    return seen, wanted, scaled(pictures), actions
 
 
 def test_a_neutral_augmentation_changes_nothing() -> None:
@@ -95,15 +103,89 @@ def test_values_stay_in_range() -> None:
     assert float(seen.max()) <= 1.0
 
 
-def test_the_same_seed_gives_the_same_images() -> None:
-    changes = {"mirror": 0.5, "shift": 2, "gain": 1.5, "noise": 0.1, "noisy": 0.5, "blurred": 0.5}
-    assert torch.equal(_augmented(3, **changes)[0], _augmented(3, **changes)[0])
-    assert not torch.equal(_augmented(3, **changes)[0], _augmented(4, **changes)[0])
-
-
 @pytest.mark.parametrize(
     "wrong", [{"mirror": 1.5}, {"noisy": -0.1}, {"shift": -1}, {"noise": -1.0}, {"gain": 0.5}]
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(CloningError):
         Augmentation(**wrong)  # pyright: ignore[reportArgumentType]
+
+
+def _layout(*names: str, low: float = -1.0) -> Layout:
+    return Layout(tuple(Feature(name, "1", low, 1.0) for name in names))
+
+
+def test_steering_is_negated_and_throttle_kept() -> None:
+    turned = mirror_of(_layout("throttle", "steering"))(np.array([[0.5, -0.25]], np.float32))
+    np.testing.assert_array_equal(turned, [[0.5, 0.25]])
+
+
+def test_left_and_right_are_swapped() -> None:
+    keys = mirror_of(KEYS)
+    left, right = np.eye(4, dtype=np.float32)[[3]], np.eye(4, dtype=np.float32)[[2]]
+    np.testing.assert_array_equal(keys(left), right)
+    np.testing.assert_array_equal(keys(keys(left)), left)
+    tracks = mirror_of(_layout("left", "right"))
+    np.testing.assert_array_equal(tracks(np.array([[1.0, -0.5]], np.float32)), [[-0.5, 1.0]])
+
+
+def test_a_state_is_mirrored_with_its_image() -> None:
+    layout = Layout((Feature("speed", "m/s"), Feature("yaw_rate", "rad/s")))
+    turned = mirror_of(layout)(np.array([[2.0, 0.5]], np.float32))
+    np.testing.assert_array_equal(turned, [[2.0, -0.5]])
+
+
+@pytest.mark.parametrize(
+    ("layout", "name"),
+    [
+        (_layout("hip_1/angle", "throttle"), "hip_1/angle"),
+        (_layout("left", "throttle"), "left"),
+        (_layout("steering", low=0.0), "steering"),
+        (Layout((Feature("speed", "1", shape=(3,)),)), "array speed"),
+    ],
+)
+def test_a_layout_without_a_mirror_is_refused(layout: Layout, name: str) -> None:
+    with pytest.raises(CloningError, match=f"the mirror image of .*{name}"):
+        mirror_of(layout)
+
+
+def test_balance_of_both_sides() -> None:
+    keys = mirror_of(KEYS)
+    forward, _, right, left = np.eye(4, dtype=np.float32)
+    assert keys.balance(np.stack([left, left, forward])) == 0.0
+    assert keys.balance(np.stack([left, left, right])) == 0.5
+    assert keys.balance(np.stack([forward, forward])) == 1.0
+    assert mirror_of(STEERS).balance(np.array([[-0.5, 1.0], [1.0, 1.0]], np.float32)) == 0.5
+
+
+def test_split_by_time() -> None:
+    """The last steps over all episodes are the test set."""
+    assert np.flatnonzero(evaluated_steps([6, 4], "time", 0.3)).tolist() == [7, 8, 9]
+    assert not evaluated_steps([6, 4], "time", 0.0).any()
+
+
+def test_split_by_episode() -> None:
+    """Whole episodes: at least the share, at least one, never all."""
+    assert np.flatnonzero(evaluated_steps([6, 3, 1], "episode", 0.2)).tolist() == [6, 7, 8, 9]
+    assert np.flatnonzero(evaluated_steps([6, 4], "episode", 0.01)).tolist() == [6, 7, 8, 9]
+    assert evaluated_steps([6, 4], "episode", 0.99).sum() == 4
+
+
+def test_invalid_splits_are_refused() -> None:
+    with pytest.raises(CloningError, match=r"one episode only.*split by time"):
+        evaluated_steps([10, 0], "episode", 0.2)
+    with pytest.raises(CloningError, match=r"share must be in \[0, 1\)"):
+        evaluated_steps([10], "time", 1.0)
+
+
+def test_each_member_holds_out_its_own_stretch() -> None:
+    masks = [stretch(100, member, 4, 0.15) for member in range(4)]
+    assert [int(mask.sum()) for mask in masks] == [15] * 4
+    assert sum(masks).max() == 1  # pyright: ignore[reportAttributeAccessIssue]
+    assert masks[3][85:].all()
+    assert all(np.ptp(np.flatnonzero(mask)) == 14 for mask in masks)
+
+
+def test_a_stretch_is_limited() -> None:
+    assert stretch(3, 0, 1, 0.9).sum() == 1
+    assert stretch(1, 0, 4, 0.5).sum() == 0

@@ -1,4 +1,4 @@
-"""Trained policies from ONNX files, which run without PyTorch; `export` writes them."""
+"""Cards of trained policies, and policies from ONNX files, which run without PyTorch."""
 
 from __future__ import annotations
 
@@ -13,31 +13,39 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import CorruptStudy, StudyError
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
-from shapechanger.onnx_file import OnnxNetwork
+from shapechanger.onnx_file import read_network
+from shapechanger.transfer.learners import LearnerSettings
 
 
-class OnnxCard(msgspec.Struct, frozen=True):
-    """Provenance of a policy in an ONNX file: a part of its `PolicyCard`.
+class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
+    """Provenance of a policy.
 
     Attributes:
         env: The env that it was trained in.
         observation: Layout of its observations.
         action: Layout of its actions.
         learner: Name of the learner.
+        settings: Settings of the learner; None in an ONNX file.
         steps: Env steps of training.
         seed: Seed of the training.
         version: Version of Shapechanger.
-        identity: Version of the env and of the learner.
+        identity: Version of the env and of the learner, see `shapechanger.transfer.versions`.
+        command: The command that wrote it; empty in a study, where `study.json` holds it.
+        start_log_std: Logarithm of the standard deviation of each action where its training started
+            from another policy; None if it did not, or if the deviation is no parameter.
     """
 
     env: EnvRef
     observation: Layout
     action: Layout
     learner: str
+    settings: LearnerSettings | None = None
     steps: int
     seed: int
     version: str
     identity: dict[str, Identity]
+    command: str = ""
+    start_log_std: tuple[float, ...] | None = None
 
 
 class OnnxPolicy:
@@ -55,8 +63,12 @@ class OnnxPolicy:
     """
 
     def __init__(self, path: Path) -> None:
-        self._network = OnnxNetwork(path, OnnxCard, _shapes, CorruptStudy)
-        self.card = self._network.card
+        self.card, self._run = read_network(
+            path,
+            PolicyCard,
+            lambda card: {"observation": [card.observation.size], "action": [card.action.size]},
+            CorruptStudy,
+        )
 
     def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
         """Return the mean actions, shape (n, actions), for observations of shape (n, observations).
@@ -69,8 +81,4 @@ class OnnxPolicy:
                 f"This policy takes observations of shape (n, {self.card.observation.size}), got "
                 f"{observations.shape}."
             )
-        return self._network.run({"observation": np.asarray(observations, np.float64)})
-
-
-def _shapes(card: OnnxCard) -> dict[str, list[int]]:
-    return {"observation": [card.observation.size], "action": [card.action.size]}
+        return self._run({"observation": np.asarray(observations, np.float64)})
