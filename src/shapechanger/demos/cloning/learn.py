@@ -119,9 +119,9 @@ def learn(
             outputs. None for a new one.
         rehearsal: Demonstrations that `start` was trained on, mixed in so that they are not
             forgotten; None for none.
-        symmetric: Whether the driver steers to both sides alike, as an expert in random worlds
-            does, so that the share of mirrored images is that of the settings. Otherwise it depends
-            on how evenly the driver steered.
+        symmetric: Whether the driver steers to both sides equally in the long run, as an expert in
+            random worlds does. The settings then state the share of mirrored images; otherwise it
+            depends on how evenly the driver steered.
         on_check: Called after each validation.
 
     Returns:
