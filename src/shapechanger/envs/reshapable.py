@@ -35,7 +35,7 @@ from shapechanger.envs.renderer import (
 )
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
-from shapechanger.morphology.certificate import Certifiable, Certificate, certify
+from shapechanger.morphology.certificate import Certificate, certify
 from shapechanger.morphology.families import BodyLike, Family, Split
 from shapechanger.morphology.pose import (
     StartRules,
@@ -412,9 +412,7 @@ class Reshapable(MujocoEnv):
         Raises:
             EmptyShift: If they do not differ and `allow_empty` is false.
         """
-        return certify(
-            cast("Certifiable", source), cast("Certifiable", target), allow_empty=allow_empty
-        )
+        return certify(source, target, allow_empty=allow_empty)
 
     @property
     def family_name(self) -> str:

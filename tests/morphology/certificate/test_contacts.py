@@ -18,7 +18,7 @@ _SHAPES = {
 }
 _SCENE = """
 <mujoco>
-  <option timestep="0.002" cone="elliptic" {option}><flag {flag}/></option>
+  <option cone="elliptic" {option}><flag {flag}/></option>
   <asset>{assets}</asset>
   <worldbody>
     <geom name="floor" type="plane" size="1 1 1" {floor}/>
@@ -36,16 +36,8 @@ _SCENE = """
 
 def _scene(**parts: str) -> mujoco.MjModel:
     """Return a ball that penetrates the floor, with optional attributes and neighbours."""
-    defaults = {
-        "assets": "",
-        "option": "",
-        "flag": "contact='enable'",
-        "floor": "",
-        "ball": "",
-        "children": "",
-        "bodies": "",
-        "contact": "",
-    }
+    names = ("assets", "option", "floor", "ball", "children", "bodies", "contact")
+    defaults = dict.fromkeys(names, "") | {"flag": "contact='enable'"}
     return mujoco.MjModel.from_xml_string(_SCENE.format(**(defaults | parts)))
 
 
@@ -67,14 +59,11 @@ def _contacts(model: mujoco.MjModel) -> dict[str, _Contact]:
     }
 
 
-def _acting(contact: _Contact) -> list[float]:
-    return [float(value) for value in contact["friction"] if value]
-
-
 def _assert_equal(ours: _Contact, theirs: mujoco.MjContact) -> None:
     assert ours["dimension"] == (theirs.dim,)
+    acting = [value for value in ours["friction"] if value]
     counts = {1: 0, 3: 2, 4: 3, 6: 5}
-    np.testing.assert_array_equal(_acting(ours), theirs.friction[: counts[theirs.dim]])
+    np.testing.assert_array_equal(acting, theirs.friction[: counts[theirs.dim]])
     np.testing.assert_allclose(np.array(ours["solref"], float), theirs.solref, rtol=1e-15)
     np.testing.assert_allclose(np.array(ours["solimp"], float), theirs.solimp, rtol=1e-15)
     assert ours["margin"] == (theirs.includemargin,)
@@ -199,31 +188,18 @@ def test_an_explicit_pair_has_its_own_parameters() -> None:
     assert predicted["ball + floor"]["friction solref"] == (0.1, 2.0)
     for name, (contact,) in simulated.items():
         _assert_equal(predicted[name], contact)
-
-
-def test_own_softness_of_friction_counts_only_in_elliptic_cones() -> None:
-    """Pyramidal cones ignore `solreffriction`."""
-    pair = "<pair geom1='floor' geom2='ball' solreffriction='.1 2'/>"
-    model = _scene(contact=pair)
-    assert _contacts(model)["ball + floor"]["friction solref"] == (0.1, 2.0)
-    model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-    assert _contacts(model)["ball + floor"].get("friction solref") is None
+    model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL  # These ignore `solreffriction`.
+    assert "friction solref" not in _contacts(model)["ball + floor"]
 
 
 def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
     pair = "<pair geom1='floor' geom2='ball'/><pair geom1='ball' geom2='floor' condim='1'/>"
-    model = _scene(contact=pair)
-    predicted = _contacts(model)
-    assert {name: contact["dimension"] for name, contact in predicted.items()} == {
-        "ball + floor": (3,),
-        "ball + floor (2)": (1,),
+    found = {
+        name: contact["dimension"] for name, contact in _contacts(_scene(contact=pair)).items()
     }
-    assert [contact.dim for contact in _simulated(model)["ball + floor"]] == [3, 1]
-
-
-@pytest.mark.parametrize("flag", ["contact='disable'", "constraint='disable'"])
-def test_disabled_contacts_are_left_out(flag: str) -> None:
-    assert _contacts(_scene(flag=flag, contact="<pair geom1='floor' geom2='ball'/>")) == {}
+    assert found == {"ball + floor": (3,), "ball + floor (2)": (1,)}
+    for flag in ("contact='disable'", "constraint='disable'"):
+        assert _contacts(_scene(flag=flag, contact=pair)) == {}
 
 
 def test_static_and_unsupported_pairs_are_left_out() -> None:
@@ -242,9 +218,6 @@ def test_static_and_unsupported_pairs_are_left_out() -> None:
     }
 
 
-_HARD, _HARDER = "0.012 1", "0.002 1"
-
-
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast", "discrete"])
 @pytest.mark.parametrize("refsafe", ["enable", "disable"])
 def test_contact_stiffness_is_limited_by_the_time_step(integrator: str, refsafe: str) -> None:
@@ -253,17 +226,11 @@ def test_contact_stiffness_is_limited_by_the_time_step(integrator: str, refsafe:
     The integrator `discrete` does not clip them, nor does a model with `refsafe` disabled.
     """
     effective, moved = [], []
-    for solref in (_HARD, _HARDER):
-        model = _scene(
-            option=f"integrator='{integrator}'",
-            flag=f"refsafe='{refsafe}'",
-            floor=f"solref='{solref}'",
-            ball=f"solref='{solref}'",
-        )
-        model.opt.timestep = 0.01
+    for solref in ("solref='0.012 1'", "solref='0.002 1'"):
+        option = f"integrator='{integrator}' timestep='0.01'"
+        model = _scene(option=option, flag=f"refsafe='{refsafe}'", floor=solref, ball=solref)
         data = mujoco.MjData(model)
-        for _ in range(20):
-            mujoco.mj_step(model, data)
+        mujoco.mj_step(model, data, nstep=20)
         effective.append(_contacts(model))
         moved.append(data.qpos.copy())
     same = integrator != "discrete" and refsafe == "enable"

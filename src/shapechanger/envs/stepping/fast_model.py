@@ -109,7 +109,7 @@ def _without_search(
     result = spec.compile()
     if not _same_but_for_pairs(model, result):
         return None
-    joined = geoms_of_pairs(result, np.arange(result.npair))
+    joined = geoms_of_pairs(result)
     for parameter, values in mixed_parameters(result, joined).items():
         getattr(result, f"pair_{parameter}")[:] = values
     # Leave no geom to the search, neither by its own bits nor by its body's.

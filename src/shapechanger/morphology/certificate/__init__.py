@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from shapechanger.morphology.certificate.certify import Certificate, certify, inconsistencies
+from shapechanger.morphology.certificate.certify import (
+    Certificate,
+    Rollout,
+    certify,
+    inconsistencies,
+)
 from shapechanger.morphology.certificate.changes import Change, compare, fingerprint
-from shapechanger.morphology.certificate.rollout import Certifiable, Rollout
 
 __all__ = [
-    "Certifiable",
     "Certificate",
     "Change",
     "Rollout",

@@ -10,7 +10,7 @@ from typing import Final
 import msgspec
 import mujoco
 
-from shapechanger.morphology.certificate.fields import MOVED, SENSED, Field, Numbers, Values
+from shapechanger.morphology.certificate.fields import KINDS, MOVED, SENSED, Field, Numbers, Values
 from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
 
 Amount = float | str | tuple[float | str, ...] | None
@@ -27,12 +27,11 @@ _ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `R
 # 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
 
-_KINDS: Final = MOVED | SENSED
-_TITLES: Final = frozenset(kind.title for kind in _KINDS.values())
+_TITLES: Final = frozenset(kind.title for kind in KINDS.values())
 # Quantities whose ratios mean nothing.
 _WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
 _DIGITS: Final = (4, 8, 17)
-_ROUND: Final = ("capsule", "cylinder")
+_ROUND: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 
 
 class Change(msgspec.Struct, frozen=True):
@@ -65,8 +64,17 @@ def change(
 ) -> Change:
     """Describe a change of a quantity of an element, which has it before, after, or both."""
     old, new = _plain(before), _plain(after)
-    words = _words(quantity, old, new, unit)
-    return Change(quantity, element, old, new, unit, f"{element}: {words}")
+    suffix = f" {unit}" if unit not in ("", "1") else ""
+    if quantity in _TITLES:
+        there, done = (old, "removed") if new is None else (new, "added")
+        words = f"{done} ({_shown(there, _DIGITS[0])}{suffix})"
+    else:
+        pairs = [(_shown(old, digits), _shown(new, digits)) for digits in _DIGITS]
+        # As many digits as it takes to tell the two apart.
+        texts = next((pair for pair in pairs if pair[0] != pair[1]), pairs[-1])
+        words = " -> ".join(text if text == "none" else f"{text}{suffix}" for text in texts)
+        words += "" if quantity in _WITHOUT_RATIO else _times(old, new)
+    return Change(quantity, element, old, new, unit, f"{element}: {quantity} {words}")
 
 
 def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
@@ -93,24 +101,6 @@ def _plain(values: Sequence[float | str] | None) -> Amount:
     return finite[0] if len(finite) == 1 else finite
 
 
-def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
-    """Format the part of a sentence after the name of the element."""
-    suffix = f" {unit}" if unit not in ("", "1") else ""
-    if quantity in _TITLES:
-        there = before if after is None else after
-        done = "removed" if after is None else "added"
-        return f"{quantity} {done} ({_shown(there, _DIGITS[0])}{suffix})"
-    old, new = "", ""
-    for digits in _DIGITS:  # As many digits as it takes to tell the two apart.
-        old, new = _shown(before, digits), _shown(after, digits)
-        if old != new:
-            break
-    old, new = (text if text == "none" else f"{text}{suffix}" for text in (old, new))
-    ratio = None if quantity in _WITHOUT_RATIO else _ratio(before, after)
-    times = "" if ratio is None else f" (x{ratio:.3g})"
-    return f"{quantity} {old} -> {new}{'' if times == ' (x1)' else times}"
-
-
 def _shown(amount: Amount, digits: int) -> str:
     """Format an amount with so many significant digits; equal numbers of a list are shown once."""
     if isinstance(amount, tuple):
@@ -123,21 +113,20 @@ def _shown(amount: Amount, digits: int) -> str:
     return amount if isinstance(amount, str) else f"{amount:.{digits}g}"
 
 
-def _ratio(before: Amount, after: Amount) -> float | None:
-    """Return new over old, if it is the same for all numbers that are not zero in both."""
-    old = before if isinstance(before, tuple) else (before,)
-    new = after if isinstance(after, tuple) else (after,)
-    if len(old) != len(new):
-        return None
+def _times(before: Amount, after: Amount) -> str:
+    """Format new over old, if it is the same for all numbers that are not zero in both."""
+    old, new = (each if isinstance(each, tuple) else (each,) for each in (before, after))
     ratios: list[float] = []
-    for a, b in zip(old, new, strict=True):
+    for a, b in zip(old, new, strict=False):
         if not isinstance(a, float) or not isinstance(b, float) or (a == 0.0) != (b == 0.0):
-            return None
+            return ""
         if a != 0.0:
             ratios.append(b / a)
     # Three digits are shown, so ratios that agree to four are one ratio.
-    same = all(math.isclose(ratio, ratios[0], rel_tol=1e-4) for ratio in ratios)
-    return ratios[0] if ratios and same else None
+    same = ratios and all(math.isclose(ratio, ratios[0], rel_tol=1e-4) for ratio in ratios)
+    if len(old) != len(new) or not same or f"{ratios[0]:.3g}" == "1":
+        return ""
+    return f" (x{ratios[0]:.3g})"
 
 
 def compare(
@@ -154,8 +143,8 @@ def compare(
         standing_height: Height at which the source and the target stand, m, if known.
 
     Returns:
-        The changes, empty for models that move equally, whatever their elements are called:
-        standing height, dimensions and total mass first, then element by element.
+        The changes: standing height, dimensions and total mass first, then element by element.
+        Empty for models whose elements have the same names and numbers.
     """
     changes: list[Change] = []
     before, after = standing_height
@@ -163,9 +152,6 @@ def compare(
         changes.append(change("standing height", "robot", (before,), (after,), "m"))
     one, two = moved_numbers(source), moved_numbers(target)
     found = differences(one, two)
-    if found and names_of(source) != names_of(target):
-        unnamed = [moved_numbers(model, anonymous=True) for model in (source, target)]
-        found = found if differences(*unnamed) else ()
     if not found:
         return tuple(changes)
     if source.nbody != target.nbody:
@@ -175,54 +161,40 @@ def compare(
     # The order of the bodies may change the last digit of the sum.
     if not math.isclose(old, new, rel_tol=ROUNDING):
         changes.append(change("total mass", "robot", (old,), (new,), "kg"))
-    changes += _lengths(source, target, one, two)
+    lengths, measured = _lengths(source, target, one, two)
+    changes += lengths
     if found[0].quantity == "derived constant" and changes:
         return tuple(changes)
-    # `_lengths` covers the sizes of round geoms.
-    return (*changes, *(item for item in found if not _is_round(item, one, two)))
-
-
-def _is_round(item: Change, one: Numbers, two: Numbers) -> bool:
-    """Return whether a change is of the sizes of a capsule or cylinder."""
-    geoms = [numbers["geoms"].get(item.element, {}) for numbers in (one, two)]
-    types = {geom.get("type", ("",))[0] for geom in geoms}
-    return item.quantity == "size" and len(types) == 1 and types <= set(_ROUND)
+    found = (item for item in found if item.quantity != "size" or item.element not in measured)
+    return (*changes, *found)
 
 
 def _lengths(
     source: mujoco.MjModel, target: mujoco.MjModel, one: Numbers, two: Numbers
-) -> list[Change]:
-    """Return the differences of lengths, without caps, and radii of capsules and cylinders, m.
+) -> tuple[list[Change], set[str]]:
+    """Return changes of the lengths, without caps, and radii of round geoms, and their names.
 
     A geom that touches nothing is reported only if its body differs; one that is the only one of
     its body is called by the name of the body.
     """
-    found: list[Change] = []
-    before, after = _segments(source), _segments(target)
-    touching = one["geoms"].keys() & two["geoms"].keys()
-    for geom in [geom for geom in before if geom in after]:
-        (kind, body, label, old), (new_kind, _, _, new) = before[geom], after[geom]
-        same_body = one["bodies"].get(body) == two["bodies"].get(body)
-        if kind != new_kind or (geom not in touching and same_body):
+    found, measured = list[Change](), set[str]()
+    names, targets = names_of(source), names_of(target)["geoms"]
+    for i, geom in enumerate(names["geoms"]):
+        kind, owner = source.geom_type[i], int(source.geom_bodyid[i])
+        j = targets.index(geom) if kind in _ROUND and geom in targets else -1
+        if j < 0 or target.geom_type[j] != kind:
             continue
+        measured.add(geom)
+        body = names["bodies"][owner]
+        touches = geom in one["geoms"] and geom in two["geoms"]
+        if not touches and one["bodies"].get(body) == two["bodies"].get(body):
+            continue
+        label = body if source.body_geomnum[owner] == 1 else geom
+        old, new = source.geom_size[i].tolist(), target.geom_size[j].tolist()
         for quantity, a, b in (("length", 2.0 * old[1], 2.0 * new[1]), ("radius", old[0], new[0])):
             if not _equal((a,), (b,)):
                 found.append(change(quantity, label, (a,), (b,), "m"))
-    return found
-
-
-def _segments(model: mujoco.MjModel) -> dict[str, tuple[str, str, str, list[float]]]:
-    """Return type, body, label and sizes of each capsule and cylinder by its name."""
-    names = names_of(model)
-    found: dict[str, tuple[str, str, str, list[float]]] = {}
-    for i, geom in enumerate(names["geoms"]):
-        kind = mujoco.mjtGeom(model.geom_type[i]).name.partition("_")[2].lower()
-        if kind in _ROUND:
-            owner = int(model.geom_bodyid[i])
-            body = names["bodies"][owner]
-            label = body if model.body_geomnum[owner] == 1 else geom
-            found[geom] = (kind, body, label, model.geom_size[i].tolist())
-    return found
+    return found, measured
 
 
 def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
@@ -247,23 +219,22 @@ def _section(
 ) -> list[Change]:
     """Return the differences within one section."""
     found: list[Change] = []
-    kind, scales = _KINDS[section], _scales(before, after)
-    table = {field.quantity: field for field in kind.fields}
+    kind, fields, scales = KINDS[section], (MOVED | SENSED)[section], _scales(before, after)
     for element in dict.fromkeys((*before, *after)):
         old, new = before.get(element), after.get(element)
         if old is None or new is None:
-            field = table.get(kind.described_by)
+            described = fields.get(kind.described_by)
             there, then = (
-                None if fields is None else fields.get(kind.described_by, ("there",))
-                for fields in (old, new)
+                None if values is None else values.get(kind.described_by, ("there",))
+                for values in (old, new)
             )
-            unit = field.unit if field and isinstance(field.unit, str) else ""
+            unit = described.unit if described and isinstance(described.unit, str) else ""
             found.append(change(kind.title, element, there, then, unit))
             continue
         for quantity in dict.fromkeys((*old, *new)):
             if not _equal(old.get(quantity), new.get(quantity), scales[quantity]):
-                field = table.get(quantity, Field(quantity, ""))
-                found.append(_difference(field, element, old, new))
+                field = fields.get(quantity, Field(""))
+                found.append(_difference(quantity, field, element, old, new))
     old_order = [name for name in before if name in after]
     new_order = [name for name in after if name in before]
     if old_order != new_order:
@@ -272,24 +243,23 @@ def _section(
 
 
 def _difference(
-    field: Field, element: str, before: dict[str, Values], after: dict[str, Values]
+    quantity: str, field: Field, element: str, before: dict[str, Values], after: dict[str, Values]
 ) -> Change:
-    """Describe one field that differs, in its usual unit."""
-    old, new, unit = before.get(field.quantity), after.get(field.quantity), field.unit
+    """Describe a quantity that differs, in its usual unit."""
+    old, new, unit = before.get(quantity), after.get(quantity), field.unit
     if field.padded and old is not None and new is not None:
         used = [i for values in (old, new) for i, value in enumerate(values) if value != 0.0]
         count = max(used, default=0) + 1
         old, new = old[:count], new[:count]
     if isinstance(unit, tuple):
-        sliding, turning = unit
-        kinds = {"slide": sliding, "hinge": turning, "ball": turning}
+        kinds = {"slide": unit[0], "hinge": unit[1], "ball": unit[1]}
         unit = kinds.get(str(before["type"][0]), "")
     if unit == "deg":
         old, new = (
             None if values is None else tuple(math.degrees(float(value)) for value in values)
             for values in (old, new)
         )
-    return change(field.quantity, element, old, new, unit)
+    return change(quantity, element, old, new, unit)
 
 
 def _scales(*sections: dict[str, dict[str, Values]]) -> dict[str, float]:
@@ -309,25 +279,18 @@ def _largest(values: Iterable[float | str]) -> float:
 
 
 def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> bool:
-    """Return whether the values of a field agree up to rounding.
-
-    Args:
-        before: Values before.
-        after: Values after.
-        scale: Largest number of this field in both models; 0 if it has no other elements.
-    """
+    """Return whether values agree up to rounding; `scale` is the largest of their field."""
     if before == after or before is None or after is None or len(before) != len(after):
         return before == after
     limit = max(ROUNDING * _largest((*before, *after)), _NOISE * scale)
-    return all(
-        old == new
-        or (
-            not isinstance(old, str)
-            and not isinstance(new, str)
-            and (abs(old - new) <= limit or (math.isnan(old) and math.isnan(new)))
-        )
-        for old, new in zip(before, after, strict=True)
-    )
+    for old, new in zip(before, after, strict=True):
+        if isinstance(old, str) or isinstance(new, str):
+            near = old == new
+        else:
+            near = old == new or abs(old - new) <= limit or (math.isnan(old) and math.isnan(new))
+        if not near:
+            return False
+    return True
 
 
 def fingerprint(model: mujoco.MjModel) -> str:
@@ -353,12 +316,7 @@ def _digest_of(numbers: Numbers) -> str:
 
 
 def _rounded(values: Values, scale: float) -> Values:
-    """Round the numbers of a field to as many digits as all machines agree on.
-
-    Args:
-        values: The numbers; words stay as they are.
-        scale: The largest number of this field in the model.
-    """
+    """Round numbers, of a field up to `scale`, to as many digits as all machines agree on."""
     # Slightly more, so that a number just below a power of ten counts as that power.
     largest = max(_largest(values), _NOISE / 10.0 ** (1 - _ROUNDED_TO) * scale) * (1.0 + ROUNDING)
     places = _ROUNDED_TO - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
@@ -373,22 +331,13 @@ class ModelNumbers:
 
     @staticmethod
     def read(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
-        """Return the fingerprints of the motion and of the other numbers, and all numbers.
-
-        Args:
-            model: The compiled model.
-            drawn: Whether frames are observed.
-        """
+        """Return the fingerprints of the motion and of other numbers, and all as MessagePack."""
         moved, sensed = moved_numbers(model), sensed_numbers(model, drawn=drawn)
         return _digest_of(moved), _digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
 
     @staticmethod
     def changes(old: bytes, new: bytes) -> tuple[str, ...]:
-        """Return the differences of two models in words.
-
-        Args:
-            old: Numbers of the old model, as MessagePack.
-            new: Numbers of the new one.
+        """Return the differences in words between the numbers of two models.
 
         Raises:
             msgspec.MsgspecError: If they are not such numbers.

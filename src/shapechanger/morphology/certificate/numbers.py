@@ -25,12 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.certificate.fields import (
-    CONTACT_FIELDS,
     MOVED,
-    NAMED,
     SENSED,
+    TABLE,
     Field,
-    Kind,
     Numbers,
     Values,
     kinds_of,
@@ -46,53 +44,6 @@ _DISABLE: Final = mujoco.mjtDisableBit
 _FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
 _SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
 _FLAT: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-# Arrays with several rows to an element, and its first row.
-_FIRST_ROWS: Final = {
-    "qpos0": "jnt_qposadr",
-    "qpos_spring": "jnt_qposadr",
-    "wrap_type": "tendon_adr",
-    "wrap_objid": "tendon_adr",
-    "wrap_side": "tendon_adr",
-    "wrap_coefficient": "tendon_adr",
-    "actuator_gear": "actuator_outadr",
-    "actuator_lengthrange": "actuator_outadr",
-    "actuator_ctrlrange": "actuator_ctrladr",
-    "actuator_ctrllimited": "actuator_ctrladr",
-    "numeric_data": "numeric_adr",
-}
-# Arrays that count as a whole where there is one of an element.
-_WHOLE: Final = {
-    "shapes of flexes": (
-        "nflex",
-        *("flex_vertbodyid", "flex_nodebodyid", "flex_elem", "flex_vert", "flex_node"),
-        *("flex_stiffness", "flex_bending", "flexedge_length0"),
-    ),
-    "engine plugins": (
-        "nplugin",
-        *("plugin", "plugin_attr", "body_plugin", "geom_plugin", "actuator_plugin"),
-    ),
-}
-# Constants of `mujoco.mj_setConst`, and the mask of the elements that they count for.
-_DERIVED: Final = {
-    "body_subtreemass": "moving",
-    "body_invweight0": "moving",
-    "body_margin": "bodies",
-    "geom_rbound": "geoms",
-    "dof_invweight0": "",
-    "dof_M0": "",
-    "tendon_length0": "",
-    "tendon_invweight0": "",
-    "actuator_length0": "",
-    "actuator_acc0": "",
-}
-_DRAWN: Final = (
-    *("geom_rgba", "geom_matid", "site_rgba", "site_matid", "skin_rgba", "mat_rgba", "mat_texid"),
-    *("mat_texrepeat", "mat_texuniform", "mat_emission", "mat_specular", "mat_shininess"),
-    *("mat_reflectance", "tex_type", "tex_height", "tex_width", "tex_nchannel", "tex_data"),
-    *("light_pos", "light_dir", "light_diffuse", "light_ambient", "light_specular"),
-    *("light_castshadow", "light_active", "light_type", "skin_vert", "skin_face", "tendon_rgba"),
-    *("tendon_width", "mesh_texcoord", "mesh_normal"),
-)
 
 
 def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
@@ -105,19 +56,19 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
     flags = model.opt.disableflags
     if flags & (_DISABLE.mjDSBL_CONSTRAINT | _DISABLE.mjDSBL_CONTACT):
         return np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
-    explicit = np.arange(model.npair)
-    described = geoms_of_pairs(model, explicit)
+    described = geoms_of_pairs(model)
     candidates = np.flatnonzero(model.geom_contype | model.geom_conaffinity)
-    first, second = np.triu_indices(candidates.size, k=1)
-    pairs = np.stack([candidates[first], candidates[second]], axis=1)
+    pairs = candidates[np.stack(np.triu_indices(candidates.size, k=1), axis=1)]
     bodies = model.geom_bodyid[pairs]
     welds = model.body_weldid[bodies]
+    accepted = _can_matter(model, pairs) & (welds[:, 0] != welds[:, 1])
     # Bodies carry the bits of all their geoms as they were compiled: bits that are set in a
     # compiled model later have no effect.
-    accepted = _bits_match(model.geom_contype[pairs], model.geom_conaffinity[pairs])
-    accepted &= _bits_match(model.body_contype[bodies], model.body_conaffinity[bodies])
-    accepted &= _can_matter(model, pairs)
-    accepted &= welds[:, 0] != welds[:, 1]
+    for types, affinities in (
+        (model.geom_contype[pairs], model.geom_conaffinity[pairs]),
+        (model.body_contype[bodies], model.body_conaffinity[bodies]),
+    ):
+        accepted &= ((types & affinities[:, ::-1]) != 0).any(axis=1)
     if not flags & _DISABLE.mjDSBL_FILTERPARENT:
         parents = model.body_weldid[model.body_parentid[welds]]
         related = (welds == parents[:, ::-1]).any(axis=1)
@@ -126,12 +77,7 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
     accepted &= ~np.isin((ends[:, 0] << 16) + ends[:, 1], model.exclude_signature)
     codes, own = (x[:, 0] * model.ngeom + x[:, 1] for x in (pairs, np.sort(described, axis=1)))
     accepted &= ~np.isin(codes, own)
-    return explicit[_can_matter(model, described)], pairs[accepted]
-
-
-def _bits_match(types: NDArray[Any], affinities: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return for pairs whether the type of one is among the affinities of the other."""
-    return ((types & affinities[:, ::-1]) != 0).any(axis=1)
+    return np.flatnonzero(_can_matter(model, described)), pairs[accepted]
 
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
@@ -141,25 +87,17 @@ def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
     return np.logical_and(~flat, np.any(moving, axis=1))
 
 
-def geoms_of_pairs(model: mujoco.MjModel, explicit: _Ints) -> _Ints:
-    """Return the geoms of explicit contact pairs, shape (n, 2).
-
-    Args:
-        model: The model.
-        explicit: Indices of the pairs, shape (n,).
-    """
-    both = np.stack([model.pair_geom1, model.pair_geom2], axis=1)
-    return both[explicit].astype(np.int64)
+def geoms_of_pairs(model: mujoco.MjModel) -> _Ints:
+    """Return the geoms of the explicit contact pairs of a model, shape (npair, 2)."""
+    return np.stack([model.pair_geom1, model.pair_geom2], axis=1).astype(np.int64)
 
 
 def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
     """Return the contacts that can move something, a row each, with the parameters that act.
 
-    Arrays are called as those of explicit pairs, with `contact_` in front: `contact_geoms` (n, 2),
-    `contact_dim`, `contact_friction` (n, 5): slide, slide, spin, roll, roll, 0 where it does not
-    act; `contact_solref`, `contact_solreffriction`, `contact_solimp`, `contact_margin`,
-    `contact_gap` and `contact_adhesion`. `contact_softens` tells whether friction has a solref of
-    its own.
+    Called as in `pair_*` with `contact_` in front, and `contact_geoms` (n, 2). Friction (n, 5) is
+    slide, slide, spin, roll, roll, 0 where it does not act; `contact_softens` is true where it has
+    a solref that differs.
     """
     explicit, dynamic = colliding_pairs(model)
     values: dict[str, NDArray[Any]] = {
@@ -183,46 +121,40 @@ def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
     values["softens"] = differs & (dimensions > 1) & elliptic
     # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
     values["adhesion"] = values["adhesion"] * model.flg_adhesion
-    values["geoms"] = np.vstack([geoms_of_pairs(model, explicit), dynamic])
+    values["geoms"] = np.vstack([geoms_of_pairs(model)[explicit], dynamic])
     return {f"contact_{name}": array for name, array in values.items()}
 
 
 def mixed_parameters(model: mujoco.MjModel, pairs: _Ints) -> dict[str, _Floats]:
-    """Return the parameters that MuJoCo mixes for pairs of geoms, called as in `pair_*`.
-
-    Args:
-        model: The model.
-        pairs: The geoms, shape (n, 2).
-    """
-    first, second = pairs.T
-    one = model.geom_priority[first] > model.geom_priority[second]
-    two = model.geom_priority[first] < model.geom_priority[second]
-
-    def pick(values: _Floats, if_equal: _Floats) -> _Floats:
-        wide = (slice(None),) + (None,) * (values.ndim - 1)
-        chosen = np.where(two[wide], values[second], if_equal)
-        return np.where(one[wide], values[first], chosen)
-
+    """Return the parameters that MuJoCo mixes for pairs of geoms (n, 2), called as in `pair_*`."""
+    priority = model.geom_priority[pairs[:, 0]] - model.geom_priority[pairs[:, 1]]
     # The weight of the first geom's solver parameters; half if neither states one.
     weights = model.geom_solmix[pairs]
     weights = np.where(weights < mujoco.mjMINVAL, 0.0, weights)
     total = weights.sum(axis=1)
     share = np.where(total, weights[:, 0] / np.where(total, total, 1.0), 0.5)[:, None]
-    dims, frictions = model.geom_condim.astype(np.float64), model.geom_friction
-    refs, imps, adhesions = model.geom_solref, model.geom_solimp, model.geom_adhesion
-    mixed_ref = share * refs[first] + (1.0 - share) * refs[second]
-    both_standard = (refs[first, 0] > 0.0) & (refs[second, 0] > 0.0)
-    mixed_ref = np.where(both_standard[:, None], mixed_ref, np.minimum(refs[first], refs[second]))
-    friction = pick(frictions, np.maximum(frictions[first], frictions[second]))
+
+    def weighted(one: _Floats, two: _Floats) -> _Floats:
+        return share * one + (1.0 - share) * two
+
+    def reference(one: _Floats, two: _Floats) -> _Floats:
+        both_standard = (one[:, :1] > 0.0) & (two[:, :1] > 0.0)
+        return np.where(both_standard, weighted(one, two), np.minimum(one, two))
+
+    def mixed(name: str, if_equal: Callable[[_Floats, _Floats], _Floats]) -> _Floats:
+        one, two = (getattr(model, f"geom_{name}")[side].astype(np.float64) for side in pairs.T)
+        first = priority.reshape(-1, *[1] * (one.ndim - 1))
+        return np.where(first > 0, one, np.where(first < 0, two, if_equal(one, two)))
+
     return {
-        "dim": pick(dims, np.maximum(dims[first], dims[second])),
-        "friction": friction[:, _SLIDE_SPIN_ROLL],
-        "solref": pick(refs, mixed_ref),
+        "dim": mixed("condim", np.maximum),
+        "friction": mixed("friction", np.maximum)[:, _SLIDE_SPIN_ROLL],
+        "solref": mixed("solref", reference),
         "solreffriction": np.zeros((len(pairs), 2)),
-        "solimp": pick(imps, share * imps[first] + (1.0 - share) * imps[second]),
-        "margin": model.geom_margin[first] + model.geom_margin[second],
-        "gap": model.geom_gap[first] + model.geom_gap[second],
-        "adhesion": pick(adhesions, adhesions[first] + adhesions[second]),
+        "solimp": mixed("solimp", weighted),
+        "margin": model.geom_margin[pairs].sum(axis=1),
+        "gap": model.geom_gap[pairs].sum(axis=1),
+        "adhesion": mixed("adhesion", np.add),
     }
 
 
@@ -236,152 +168,124 @@ def _safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
     return safe
 
 
-def moved_numbers(model: mujoco.MjModel, *, anonymous: bool = False) -> Numbers:
-    """Return the numbers that decide the motion of a compiled model.
-
-    Args:
-        model: The compiled model.
-        anonymous: Whether elements are numbered in the order of the model instead of named.
-    """
-    reader = _Reader(model, anonymous=anonymous)
-    kept = reader.kept
-    found = {section: reader.section(kind, kept.get(section)) for section, kind in MOVED.items()}
-    found["options"] = {"simulation": reader.rows(MOVED["options"].fields, 1)[0]}
+def moved_numbers(model: mujoco.MjModel) -> Numbers:
+    """Return the numbers that decide the motion of a compiled model."""
+    reader = _Reader(model)
+    found = {section: reader.section(section) for section in MOVED}
+    found["options"] = {"simulation": reader.rows(MOVED["options"], 1)[0]}
     found["sizes"] = {
         name: {"dimensions": (float(getattr(model, name)),)} for name in ("nq", "nv", "nu", "na")
     }
     geoms, free = reader.names["geoms"], unique_namer((), " ({})")
     pairs: list[list[int]] = reader.array("contact_geoms").tolist()
     contacts = [free(" + ".join(sorted(geoms[geom] for geom in pair))) for pair in pairs]
-    rows = reader.rows(CONTACT_FIELDS, len(contacts))
+    rows = reader.rows(MOVED["contacts"], len(contacts))
     found["contacts"] = dict(sorted(zip(contacts, rows, strict=True)))
     found["whole"] = {
         name: {"type": (_digest(*(reader.array(array) for array in arrays)),)}
-        for name, (count, *arrays) in _WHOLE.items()
+        for name, (count, *arrays) in TABLE.whole.items()
         if getattr(model, count)
     }
     found["derived"] = {
-        name: {"values": _plain(getattr(model, name)[kept[of]] if of else getattr(model, name))}
-        for name, of in _DERIVED.items()
+        name: {"values": _plain(getattr(model, name)[reader.kept[mask] if mask else slice(None)])}
+        for name, mask in TABLE.derived.items()
     }
     found["derived"]["meaninertia"] = {"values": (float(model.stat.meaninertia),)}
     return found
 
 
 def sensed_numbers(model: mujoco.MjModel, *, drawn: bool) -> Numbers:
-    """Return what may be read of a compiled model besides its motion.
-
-    Args:
-        model: The compiled model.
-        drawn: Whether frames are observed.
-    """
+    """Return what may be read of a model besides its motion; `drawn` if frames are observed."""
     reader = _Reader(model)
-    kinds = list(SENSED.items())
-    found = {section: reader.section(kind) for section, kind in (kinds if drawn else kinds[:-2])}
+    found = {section: reader.section(section) for section in (SENSED if drawn else [*SENSED][:-2])}
     if drawn:
-        found["drawing"] = {name: {"digest": (_digest(getattr(model, name)),)} for name in _DRAWN}
+        found["drawing"] = {
+            name: {"digest": (_digest(getattr(model, name)),)} for name in TABLE.drawn
+        }
     return found
 
 
 class _Reader:
     """Reads the arrays of a model by the table."""
 
-    def __init__(self, model: mujoco.MjModel, *, anonymous: bool = False) -> None:
+    def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
-        self._made = contact_arrays(model) | made_arrays(model)
-        self._made["geom_shape"] = [self._shape(geom) for geom in range(model.ngeom)]
+        self._made: dict[str, Any] = contact_arrays(model) | made_arrays(model)
+        self._made["geom_shape"] = [_shape(model, geom) for geom in range(model.ngeom)]
+        self.names = names_of(model)
         self.kept = self._relevant()
-        self.names = self._numbered() if anonymous else names_of(model)
 
-    def section(
-        self, kind: Kind, kept: NDArray[np.bool_] | None = None
-    ) -> dict[str, dict[str, Values]]:
-        """Return the elements of a kind with their fields, those of a mask or all."""
-        if not kind.element:
-            return {}
-        names = self.names[kind.element]
-        pairs = list(zip(names, self.rows(kind.fields, len(names)), strict=True))
-        if kept is not None:
-            pairs = [pair for pair, wanted in zip(pairs, kept.tolist(), strict=True) if wanted]
-        return dict(pairs if kind.in_order else sorted(pairs, key=lambda pair: pair[0]))
+    def section(self, section: str) -> dict[str, dict[str, Values]]:
+        """Return the elements of a section that count, with their quantities."""
+        names = self.names.get({"places": "geoms", "marks": "sites"}.get(section, section), [])
+        rows = self.rows((MOVED | SENSED)[section], len(names))
+        kept = self.kept.get(section, [True] * len(names))
+        found = {name: row for name, row, keep in zip(names, rows, kept, strict=True) if keep}
+        return found if section in TABLE.in_order else dict(sorted(found.items()))
 
-    def rows(self, fields: tuple[Field, ...], count: int) -> list[dict[str, Values]]:
-        """Return the fields of each of so many elements."""
+    def rows(self, fields: dict[str, Field], count: int) -> list[dict[str, Values]]:
+        """Return the quantities of each of so many elements."""
         rows: list[dict[str, Values]] = [{} for _ in range(count)]
-        for field in fields if count else ():
-            parts = self._split(field.array, self._values(field), count)
-            counts = self._split(field.where, self.array(field.where), count) if field.where else ()
-            for i, values in enumerate(parts):
-                if not field.where or np.any(counts[i]):
-                    rows[i][field.quantity] = _plain(values)
+        for quantity, field in fields.items() if count else ():
+            parts, acts = self._split(field.array, self._values(field)), [True] * count
+            if field.where:
+                acts = self._split(field.where, self.array(field.where))
+            for row, values, acting in zip(rows, parts, acts, strict=True):
+                if np.any(acting):
+                    row[quantity] = _plain(values)
         return rows
 
-    def _split(self, array: str, values: Any, count: int) -> list[Any]:
+    def _split(self, array: str, values: Any) -> list[Any]:
         """Return the rows of an array that belong to each element."""
-        first = "jnt_dofadr" if array.startswith("dof_") else _FIRST_ROWS.get(array, "")
-        if first:
-            return np.split(values, getattr(self._model, first)[1:])
-        return [values] if array.startswith("opt_") and count == 1 else list(values)
+        first = "jnt_dofadr" if array.startswith("dof_") else TABLE.first_rows.get(array, "")
+        return np.split(values, getattr(self._model, first)[1:]) if first else list(values)
 
     def array(self, name: str) -> Any:
-        """Return an array of the table."""
+        """Return an array of the table; of the options, with one row."""
         if name in self._made:
             return self._made[name]
         if name.startswith("opt_"):
-            return np.asarray(getattr(self._model.opt, name.removeprefix("opt_"))).reshape(-1)
+            return np.asarray(getattr(self._model.opt, name.removeprefix("opt_"))).reshape(1, -1)
         values = getattr(self._model, name)
         return np.frombuffer(bytes(values), np.uint8) if name == "plugin_attr" else values
 
     def _values(self, field: Field) -> Any:
         """Return an array with words for enumerations, and names for indices."""
         values = self.array(field.array)
-        if isinstance(field.of, type):
-            return np.array([field.of(v).name.partition("_")[2].lower() for v in values.tolist()])
-        if field.of is not None:
-            pairs = zip(self._kinds(field, values), values.tolist(), strict=True)
+        if field.of.startswith("mjt"):
+            members = [getattr(mujoco, field.of)(value) for value in values.ravel().tolist()]
+            return np.array([member.name.partition("_")[2].lower() for member in members])
+        if field.of:
+            pairs = zip(self._kinds(field), values.tolist(), strict=True)
             words: list[str] = [
-                (self.names[kind][i] if kind else str(i)) if i >= 0 else "" for kind, i in pairs
+                "" if i < 0 else self.names[kind][i] if kind else str(i) for kind, i in pairs
             ]
             return np.array(words, np.str_)
         if field.array.endswith("quat") and not field.array.startswith("key_"):
             # Of the two quaternions of each rotation, the one whose first number is above 0.
             leading = np.argmax(values != 0.0, axis=1)[:, None]
             return values * np.where(np.take_along_axis(values, leading, axis=1) < 0.0, -1.0, 1.0)
-        solref = field.quantity.endswith("solref")
-        if solref and not field.array.startswith(("flex_", "opt_")):
+        if "_solref" in field.array and not field.array.startswith("opt_"):
             return _safe_solref(self._model, values)
         return values
 
-    def _kinds(self, field: Field, values: Any) -> list[str]:
+    def _kinds(self, field: Field) -> list[str]:
         """Return the kind of element that each index of an array is of."""
-        return [field.of] * len(values) if field.of in NAMED else list(self._made[field.of])
-
-    def _shape(self, geom: int) -> str:
-        """Return a digest of the mesh or height field that shapes a geom; empty without one."""
-        model, data = self._model, int(self._model.geom_dataid[geom])
-        if data < 0:
-            return ""
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_HFIELD:
-            start, rows = model.hfield_adr[data], model.hfield_nrow[data : data + 1]
-            heights = model.hfield_data[start : start + int(rows[0]) * model.hfield_ncol[data]]
-            return _digest(model.hfield_size[data], rows, heights)
-        vertex, face = model.mesh_vertadr[data], model.mesh_faceadr[data]
-        return _digest(
-            model.mesh_vert[vertex : vertex + model.mesh_vertnum[data]],
-            model.mesh_face[face : face + model.mesh_facenum[data]],
-        )
+        several = self._made.get(field.of)
+        return [field.of] * len(self.array(field.array)) if several is None else several
 
     def _relevant(self) -> dict[str, NDArray[np.bool_]]:
         """Return masks of the bodies, geoms and sites that take part in the motion."""
         model, moving = self._model, self._made["body_moves"]
-        used: dict[str, set[int]] = {kind: set() for kind in (*NAMED, "")}
-        for kind in (MOVED["actuators"], MOVED["tendons"], MOVED["equalities"]):
-            for field in (field for field in kind.fields if isinstance(field.of, str)):
-                values = self.array(field.array)
-                if field.where:  # The second number of a transmission may be no site.
-                    values = np.where(self.array(field.where), values, -1)
-                for of, index in zip(self._kinds(field, values), values.tolist(), strict=True):
-                    used[of].add(index)
+        used: dict[str, set[int]] = {kind: set() for kind in (*self.names, "")}
+        for section in ("actuators", "tendons", "equalities"):
+            for field in MOVED[section].values():
+                if field.of and not field.of.startswith("mjt"):
+                    values = self.array(field.array)
+                    if field.where:  # The second number of a transmission may be no site.
+                        values = np.where(self.array(field.where), values, -1)
+                    for kind, index in zip(self._kinds(field), values.tolist(), strict=True):
+                        used[kind].add(index)
         geoms = self._made["geom_in_fluid"] | np.isin(np.arange(model.ngeom), list(used["geoms"]))
         geoms[self._made["contact_geoms"]] = True
         if model.nflex:  # Any geom that can touch may touch a flex.
@@ -396,17 +300,21 @@ class _Reader:
         bodies[0] = False  # The world is the same in every model.
         return {"bodies": bodies, "geoms": geoms, "sites": sites, "moving": bodies & moving}
 
-    def _numbered(self) -> dict[str, list[str]]:
-        """Return numbers for names; elements that do not count change none of them."""
-        found: dict[str, list[str]] = {}
-        for kind, (_, count) in NAMED.items():
-            everything = np.full(int(getattr(self._model, count)), fill_value=True)
-            kept = self.kept.get(kind, everything).copy()
-            if kind == "bodies":
-                kept[0] = True  # The world comes first, whatever else matters.
-            places = np.argsort(np.argsort(~kept, kind="stable"))
-            found[kind] = [f"{kind} {place:06}" for place in places.tolist()]
-        return found
+
+def _shape(model: mujoco.MjModel, geom: int) -> str:
+    """Return a digest of the mesh or height field that shapes a geom; empty without one."""
+    data = int(model.geom_dataid[geom])
+    if data < 0:
+        return ""
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_HFIELD:
+        start, rows = model.hfield_adr[data], model.hfield_nrow[data : data + 1]
+        heights = model.hfield_data[start : start + int(rows[0]) * model.hfield_ncol[data]]
+        return _digest(model.hfield_size[data], rows, heights)
+    vertex, face = model.mesh_vertadr[data], model.mesh_faceadr[data]
+    return _digest(
+        model.mesh_vert[vertex : vertex + model.mesh_vertnum[data]],
+        model.mesh_face[face : face + model.mesh_facenum[data]],
+    )
 
 
 def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
@@ -414,34 +322,35 @@ def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
 
     Elements without a name get one by the rule of `shapechanger.morphology.name_elements`.
     """
+    kinds = {name: kind for name, kind in TABLE.kinds.items() if kind.object}
     names = {
-        kind: [mujoco.mj_id2name(model, element, i) or "" for i in range(getattr(model, count))]
-        for kind, (element, count) in NAMED.items()
+        name: [
+            mujoco.mj_id2name(model, kind.type, i) or ""
+            for i in range(getattr(model, f"n{kind.prefix}"))
+        ]
+        for name, kind in kinds.items()
     }
-    joint_of_body: dict[int, str] = {}
-    for name, body in zip(names["joints"], model.jnt_bodyid.tolist(), strict=True):
-        if name:
-            joint_of_body.setdefault(body, name)
+    joints = list(zip(names["joints"], model.jnt_bodyid.tolist(), strict=True))
+    first_joints = {body: name for name, body in reversed(joints) if name}
     bodies, parents = names["bodies"], model.body_parentid.tolist()
-    _fill(bodies, lambda i: joint_of_body.get(i) or f"{bodies[parents[i]]}_part")
-    owners = {"joints": "jnt", "geoms": "geom", "sites": "site", "cameras": "cam"}
-    for kind, prefix in owners.items():
-        on, title = getattr(model, f"{prefix}_bodyid").tolist(), kind.removesuffix("s")
-        _fill(names[kind], lambda i, on=on, title=title: f"{bodies[on[i]]}_{title}")
-    for kind in ("tendons", "equalities", "flexes", "sensors", "keyframes", "custom"):
-        title = (MOVED | SENSED)[kind].title.partition(" ")[0]
-        _fill(names[kind], lambda _, title=title: title)
-    targets = kinds_of(model)["actuator_target_kinds"]
-    ends = list(zip(targets, model.actuator_trnid[:, 0].tolist(), strict=True))
-    _fill(names["actuators"], lambda i: names[ends[i][0]][ends[i][1]])
+    target_kinds = kinds_of(model)["actuator_target_kinds"]
+
+    def default(section: str, i: int) -> str:
+        if section == "bodies":
+            return first_joints.get(i) or f"{bodies[parents[i]]}_part"
+        if section == "actuators":
+            return names[target_kinds[i]][model.actuator_trnid[i, 0]]
+        kind = kinds[section]
+        owners = getattr(model, f"{kind.prefix}_bodyid", None)
+        title = kind.title.partition(" ")[0]
+        return title if owners is None else f"{bodies[owners[i]]}_{title}"
+
+    # Actuators come last, because they are called as their targets are.
+    for section in (*(kind for kind in kinds if kind != "actuators"), "actuators"):
+        free = unique_namer(names[section])
+        for i, name in enumerate(names[section]):
+            names[section][i] = name or free(default(section, i))
     return names
-
-
-def _fill(names: list[str], default: Callable[[int], str]) -> None:
-    """Replace each empty name by its default, numbered if that is taken, in place."""
-    free = unique_namer(names)
-    for i, name in enumerate(names):
-        names[i] = name or free(default(i))
 
 
 def _plain(values: Any) -> Values:
