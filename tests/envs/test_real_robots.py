@@ -32,8 +32,7 @@ from shapechanger.morphology import (
     Stretch,
     to_json,
 )
-from shapechanger.morphology.pose import StartRules
-from shapechanger.morphology.robot import robot_bodies
+from shapechanger.morphology.pose import StartRules, robot_bodies
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner

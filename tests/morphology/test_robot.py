@@ -10,12 +10,13 @@ from shapechanger.morphology import TotalMass, compile_body, reshape
 from shapechanger.morphology.pose import (
     StartRules,
     floor_height,
+    moved_trees,
+    robot_bodies,
     standing_height,
     start_pose,
     travelling_body,
     trunk_lift,
 )
-from shapechanger.morphology.robot import moved_trees, robot_bodies
 from shapechanger.morphology.tree import tree_of
 from tests.morphology.scenes import asset
 

@@ -115,15 +115,11 @@ def test_a_body_on_the_world() -> None:
     # The capsule's end is farther from the joint than the spheres.
     reach = _number(tree, "around", "end x") * _number(tree, "around", "length")
     assert reach == pytest.approx(0.5)
-
-
-def test_without_a_floor() -> None:
-    model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><body><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
-    )
+    ball = "<mujoco><worldbody><body><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
+    model = mujoco.MjModel.from_xml_string(ball)
     tree = tree_of(model, model.qpos0)
     assert tree.limbs == ()
-    assert tree.numbers[TRUNK_NUMBERS.index("friction")] == 1.0
+    assert tree.numbers[TRUNK_NUMBERS.index("friction")] == 1.0  # Without a floor.
 
 
 _TENDONS = """

@@ -41,12 +41,12 @@ from shapechanger.morphology.families import BodyLike
 from shapechanger.morphology.pose import (
     StartRules,
     floor_height,
+    robot_bodies,
     standing_height,
     start_pose,
     travelling_body,
     trunk_lift,
 )
-from shapechanger.morphology.robot import robot_bodies
 
 _Floats = NDArray[np.float64]
 
@@ -66,8 +66,9 @@ class OwnRobotEnv(Reshapable, EzPickle):
     - **Action**: one number per actuator, over its `ctrlrange`; `action_layout` has names, units
       and gains.
     - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
-    - **Robot**: all that the actuators move, see `shapechanger.morphology.robot`. Trunk, standing
-      height, noise and lift are the robot's alone, and objects keep the file's own start.
+    - **Robot**: all that the actuators move, see `shapechanger.morphology.pose.robot_bodies`.
+      Trunk, standing height, noise and lift are the robot's alone, and objects keep the file's own
+      start.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
       at least a tenth of its range inside its limits; the feet stand above the floor, and coupled
       joints and closed loops are closed as well as in the file. The standing height is the one of

@@ -25,6 +25,8 @@ from shapechanger.morphology.spec.elements import make_explicit
 Body = tuple[Edit, ...]
 """The edits, in order, that make a body from the model of its family."""
 
+# MuJoCo takes sparse constraint Jacobians from 60 degrees of freedom on. Newton's solver of this
+# version then factorises a wrong Hessian, which 4.0.1 mends (google-deepmind/mujoco#3767).
 _WRONG_SPARSE: Final = "4.0.0"
 # A motor that only one of two bodies has exists between them, with a gear that fades to zero.
 _ZERO_WHERE_NONE: Final = "gear"
@@ -63,14 +65,15 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
     if isinstance(value, Edit):
         return (value,)
     given: Any = value  # Not checked at run time.
-    edits = list(cast("Iterable[Any]", given)) if isinstance(given, Iterable) else [given]
-    # JSON that is parsed already, as of options that hold a body.
-    edits = [_edit(edit) if isinstance(edit, Mapping) else edit for edit in edits]
-    for edit in edits:
+    edits: list[Edit] = []
+    for item in cast("Iterable[Any]", given) if isinstance(given, Iterable) else [given]:
+        # JSON is parsed already in options that hold a body.
+        edit = _edit(item) if isinstance(item, Mapping) else item
         if not isinstance(edit, Edit):
             raise MorphologyError(
                 f"A body is made of edits such as Stretch('shank_*', 1.5), not of {edit!r}."
             )
+        edits.append(edit)
     return tuple(edits)
 
 
@@ -137,24 +140,17 @@ def _key(edit: Edit) -> Hashable:
 def _between(x: Edit, y: Edit, alpha: float) -> Edit:
     """Return the edit between two that differ in numbers only."""
     changes: dict[str, Any] = {}
-    for field in x.__struct_fields__:
-        old: Any = getattr(x, field)
-        new: Any = getattr(y, field)
-        if old == new:
-            continue
-        if field == _ZERO_WHERE_NONE:
-            old, new = old or 0.0, new or 0.0
-        value: Any = part_of_the_way(np.array(old, float), np.array(new, float), alpha)
-        changes[field] = tuple(value.tolist()) if isinstance(old, tuple) else float(value)
+    new: dict[str, Any] = msgspec.structs.asdict(y)
+    for field, old in msgspec.structs.asdict(x).items():
+        if old != new[field]:
+            start, end = (np.array(number or 0.0, float) for number in (old, new[field]))
+            value: Any = part_of_the_way(start, end, alpha)
+            changes[field] = tuple(value.tolist()) if isinstance(old, tuple) else float(value)
     return msgspec.structs.replace(x, **changes)
 
 
 def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
-    """Return a copy of a specification with edits applied.
-
-    Args:
-        spec: The specification; not changed.
-        edits: The edits, applied in order.
+    """Return a copy of a specification with edits applied in order.
 
     Raises:
         UnknownName: If an edit names an element that the model lacks.
@@ -174,11 +170,7 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
 
 
 def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjModel:
-    """Compile a specification with edits applied; derived constants are computed again.
-
-    Args:
-        spec: The specification; not changed.
-        edits: The edits, applied in order.
+    """Compile a copy of a specification with edits applied in order.
 
     Raises:
         UnknownName: If an edit names an element that the model lacks.
@@ -187,23 +179,12 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     """
     body = tuple(edits)
     try:
-        return solvable(reshape(spec, body).compile())
+        model = reshape(spec, body).compile()
     except (ValueError, mujoco.FatalError) as error:
         if isinstance(error, ShapechangerError):
             raise
         text = f"MuJoCo does not compile the body {to_json(body)}: {reason_of(error)}."
         raise BrokenModel(text) from error
-
-
-def solvable(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return a model with dense constraint Jacobians where MuJoCo solves sparse ones wrongly.
-
-    MuJoCo takes sparse ones from 60 degrees of freedom on. Newton's solver of MuJoCo 4.0.0 then
-    factorises a wrong Hessian, which 4.0.1 mends (google-deepmind/mujoco#3767).
-
-    Args:
-        model: The model; changed in place.
-    """
     if mujoco.__version__ == _WRONG_SPARSE and mujoco.mj_isSparse(model):
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     return model

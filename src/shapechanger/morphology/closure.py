@@ -35,39 +35,31 @@ class Closure:
     Args:
         model: The model.
         movable: Whether each degree of freedom may move to close them, shape (nv,).
-        places: Indices in qpos of the hinges and slides with limits.
-        lowest: Their lower limits, rad or m.
-        highest: Their upper limits, rad or m.
+        limits: Indices in qpos of the hinges and slides with limits, their lower and their upper
+            limits, rad or m.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
         movable: NDArray[np.bool_],
-        places: NDArray[np.integer[Any]],
-        lowest: _Array,
-        highest: _Array,
+        limits: tuple[NDArray[np.integer[Any]], _Array, _Array],
     ) -> None:
         self._model = model
         self._movable = movable
-        self._places, self._lowest, self._highest = places, lowest, highest
+        self._places, self._lowest, self._highest = limits
         dofs = np.zeros(model.nq, np.intp)
         dofs[model.jnt_qposadr] = model.jnt_dofadr
-        self._dofs = dofs[places]
+        self._dofs = dofs[self._places]
 
     def closed(self, drawn: _Array, start: _Array, data: mujoco.MjData) -> _Array:
         """Return the closed pose next to a drawn one, shape (nq,), inside the limits.
 
-        Where it cannot be closed as well as the start is, a smaller deviation from the start is
-        tried, and at last none. Of a start outside the limits, the pose inside them that is closed
-        best is returned instead.
-
-        Args:
-            drawn: A pose, shape (nq,).
-            start: The pose that it deviates from, shape (nq,).
-            data: Data of the model; its pose and all that depends on it are overwritten.
+        A pose that cannot be closed as well as the start is, is tried at smaller deviations from
+        the start, and at last none. Of a start outside the limits, the pose inside them that is
+        closed best is returned instead. The pose in `data` is overwritten.
         """
-        goal = self.goal(start, data)
+        goal = self._goal(start, data)
         deviation = np.zeros(self._model.nv)
         mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)
         for share in _SHARES:
@@ -91,22 +83,16 @@ class Closure:
                 break
         return best
 
-    def violation(self, pose: _Array, data: mujoco.MjData) -> float:
-        """Return the largest violation of an equality at a pose (nq,), m or rad."""
-        return _largest(self._rows(pose, data)[0])
+    def holds(self, pose: _Array, start: _Array, data: mujoco.MjData) -> bool:
+        """Return whether a pose (nq,) is as closed as a start pose."""
+        return _largest(self._rows(pose, data)[0]) <= self._goal(start, data)
 
-    def goal(self, start: _Array, data: mujoco.MjData) -> float:
+    def _goal(self, start: _Array, data: mujoco.MjData) -> float:
         """Return the largest violation of a pose that is as closed as a start pose, m or rad."""
-        return max(_CLOSED, self.violation(start, data) + _EXACT)
+        return max(_CLOSED, _largest(self._rows(start, data)[0]) + _EXACT)
 
     def still(self, pose: _Array, velocity: _Array, data: mujoco.MjData) -> _Array:
-        """Return the velocity nearest to a drawn one, shape (nv,), that keeps a pose closed.
-
-        Args:
-            pose: A closed pose, shape (nq,).
-            velocity: Shape (nv,).
-            data: As of `closed`.
-        """
+        """Return the velocity (nv,) nearest to a drawn one that keeps a pose (nq,) closed."""
         _, jacobian = self._rows(pose, data)
         return velocity - _least_squares(jacobian, jacobian @ velocity)
 

@@ -109,7 +109,7 @@ class Family:
         return as_body(value)
 
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
-        """Return the body at some values of the family's axes; the others are 1.
+        """Return the body at some values of the family's axes, by their names; the others are 1.
 
         Args:
             values: Value of each axis, by its name.
@@ -175,39 +175,28 @@ class Family:
     def _draw(self, rng: np.random.Generator, split: Split) -> Body:
         """Draw one body."""
         places: list[str] = list(self.parts)
-        count = 0
         if split == "composition":
             count = int(rng.integers(2, len(places) + 1))
-        elif places:
-            count = int(rng.uniform() < _WITH_PART)
+        else:
+            count = int(rng.uniform() < _WITH_PART) if places else 0
         numbers: list[int] = sorted(rng.permutation(len(places))[:count].tolist())
         chosen = [places[i] for i in numbers]
         parts = {place: str(rng.choice(list(self.parts[place]))) for place in chosen}
+        far = split == "extrapolation"
         while True:
-            values = {
-                # Rounded so that the edits can be read.
-                axis.name: round(
-                    math.exp(
-                        rng.uniform(math.log(axis.lowest), math.log(axis.highest))
-                        if split == "extrapolation"
-                        else rng.uniform(math.log(axis.low), math.log(axis.high))
-                    ),
-                    4,
-                )
-                for axis in self.axes
-            }
-            outside = any(not a.low <= values[a.name] <= a.high for a in self.axes)
-            if outside == (split == "extrapolation"):
+            values: dict[str, float] = {}
+            for axis in self.axes:
+                ends = (axis.lowest, axis.highest) if far else (axis.low, axis.high)
+                value = math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))
+                values[axis.name] = round(value, 4)  # So that the edits can be read.
+            if far == any(not a.low <= values[a.name] <= a.high for a in self.axes):
                 return self.body_at(values, parts)
 
 
 def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, ...]:
     """Return an axis for the length of each of these bodies.
 
-    Args:
-        bodies: Names of bodies.
-        low: Smallest ratio in training; the smallest of all is 0.3 below it.
-        high: Largest ratio in training; the largest of all is 0.4 above it.
+    In training it is `low` to `high` times the model's; of all, 0.3 below to 0.4 above these.
     """
     return tuple(
         Axis(f"length of {body}", partial(Stretch, body), low, high, low - 0.3, high + 0.4)
@@ -216,12 +205,7 @@ def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, .
 
 
 def strength_axes(trunk: str, actuators: str = "*") -> tuple[Axis, ...]:
-    """Return axes for the mass of the trunk, the strength of the motors and all friction.
-
-    Args:
-        trunk: Name of the body that carries the limbs.
-        actuators: Glob of the motors.
-    """
+    """Return axes for the mass of the trunk, a body, the strength of motors and all friction."""
     return (
         Axis(f"mass of {trunk}", partial(Mass, trunk), 0.7, 1.5, 0.5, 2.5),
         Axis("strength of the motors", partial(Gear, actuators), 0.8, 1.25, 0.6, 1.6),

@@ -1,4 +1,8 @@
-"""Poses that follow from a body: joints within limits, feet on the floor, standing height."""
+"""The robot in a model and the poses that follow from it: limits, feet on the floor, height.
+
+A file may hold a robot and objects, in any order. Trunk, standing height, mass, start poses and
+limbs are the robot's: of all that its actuators move, directly or by a coupling.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.morphology.certificate.fields import kinds_of
 from shapechanger.morphology.closure import Closure
-from shapechanger.morphology.robot import moved_trees, robot_bodies
 
 _Array = NDArray[np.float64]
 _J = mujoco.mjtJoint
-_GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+"""Types of geoms that a body can stand on."""
 
 # A joint starts at least this share of its range inside its limits, because the spring of a limit
 # pushes at the limit itself.
@@ -24,6 +29,62 @@ _FAR_M: Final = 1000.0
 _LOCKED: Final = 1e5
 # Tolerance of the vertical part of an axis that counts as vertical.
 _VERTICAL: Final = 1e-6
+
+
+def robot_bodies(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Return whether each body is part of the robot, shape (nbody,).
+
+    The robot is every kinematic tree that an actuator moves, through a joint, tendon, site or body;
+    every tree that an active equality couples to one of these, as the second finger of a gripper or
+    a link of a closed loop; and the fixed bodies that carry them. In a model without actuators it
+    is everything. The world is never part of it.
+    """
+    trees, of_tree = moved_trees(model), model.body_treeid
+    roots = model.body_rootid[np.isin(of_tree, trees)]
+    mask = np.isin(of_tree, trees) | ((of_tree < 0) & np.isin(model.body_rootid, roots))
+    mask[0] = False
+    return mask
+
+
+def moved_trees(model: mujoco.MjModel) -> list[int]:
+    """Return the kinematic trees of the robot; the one that most actuators move comes first."""
+    everything = list(range(int(model.ntree)))
+    if len(everything) < 2 or not model.nu:
+        return everything
+    kinds, moved = kinds_of(model), dict[int, int]()
+
+    def trees(kind: str, ends: list[int]) -> set[int]:
+        bodies = [body for end in ends for body in _bodies(model, kinds, kind, end)]
+        return {int(model.body_treeid[body]) for body in bodies} - {-1}
+
+    pulled = zip(kinds["actuator_target_kinds"], model.actuator_trnid.tolist(), strict=True)
+    for kind, ends in pulled:
+        for tree in trees(kind, ends if kind == "sites" else ends[:1]):
+            moved[tree] = moved.get(tree, 0) + 1
+    coupled = [
+        trees(kinds["eq_kinds"][i], [int(model.eq_obj1id[i]), int(model.eq_obj2id[i])])
+        for i in np.flatnonzero(model.eq_active0).tolist()
+    ]
+    size = -1
+    while size < len(moved):  # No actuator counts for what an equality couples.
+        size = len(moved)
+        for tied in coupled:
+            if not tied.isdisjoint(moved):
+                moved |= dict.fromkeys(tied - moved.keys(), 0)
+    return sorted(moved, key=lambda tree: (-moved[tree], tree)) or everything
+
+
+def _bodies(model: mujoco.MjModel, kinds: dict[str, list[str]], kind: str, at: int) -> list[int]:
+    """Return the body that an element is on, or all along a tendon; none for other kinds."""
+    carriers = {"joints": "jnt_bodyid", "sites": "site_bodyid", "geoms": "geom_bodyid"}
+    if at < 0 or kind not in (*carriers, "bodies", "tendons"):
+        return []
+    if kind == "tendons":
+        start = int(model.tendon_adr[at])
+        path = range(start, start + int(model.tendon_num[at]))
+        parts = [(kinds["wrap_kinds"][i], int(model.wrap_objid[i])) for i in path]
+        return [body for part in parts for body in _bodies(model, kinds, *part)]
+    return [at if kind == "bodies" else int(getattr(model, carriers[kind])[at])]
 
 
 class Lift(NamedTuple):
@@ -40,12 +101,7 @@ class Lift(NamedTuple):
     at_zero_m: float
 
     def raise_by(self, pose: _Array, distance_m: float) -> None:
-        """Move the trunk of a pose up, in place.
-
-        Args:
-            pose: Shape (nq,).
-            distance_m: Distance, m.
-        """
+        """Move the trunk of a pose (nq,) up, in place."""
         pose[self.place] += self.up * distance_m
 
     def height(self, pose: _Array) -> float:
@@ -57,24 +113,14 @@ class Lift(NamedTuple):
         return self.up * (height_m - self.at_zero_m)
 
 
-def trunk_joint(model: mujoco.MjModel) -> int | None:
-    """Return the index of the robot's free joint; None for a robot that is fixed to the world.
-
-    Free objects are not the robot, see `robot_bodies`. Of several free robots it is the one that
-    most actuators move.
-    """
-    free = _in_robot(model, model.jnt_type == _J.mjJNT_FREE)
-    return free[0] if free else None
-
-
 def travelling_body(model: mujoco.MjModel) -> int | None:
     """Return the index of the body that can go anywhere; None without one.
 
     It has the robot's free joint or, without one, of its first slide without limits on a
-    body on the world, as of runners in a plane.
+    body on the world, as of runners in a plane. Free objects are not the robot, see `robot_bodies`;
+    of several free robots it is the one that most actuators move.
     """
-    trunk = trunk_joint(model)
-    joints = _unlimited_slides(model) if trunk is None else [trunk]
+    joints = _in_robot(model, model.jnt_type == _J.mjJNT_FREE) or _unlimited_slides(model)
     return int(model.jnt_bodyid[joints[0]]) if joints else None
 
 
@@ -84,9 +130,8 @@ def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     It has the robot's free joint or, without one, of its first vertical slide without limits
     on a body on the world. A slide with limits is a hoist, which does not stand.
     """
-    trunk = trunk_joint(model)
-    if trunk is not None:
-        return Lift(int(model.jnt_qposadr[trunk]) + 2, 1.0, 0.0)
+    for joint in _in_robot(model, model.jnt_type == _J.mjJNT_FREE):
+        return Lift(int(model.jnt_qposadr[joint]) + 2, 1.0, 0.0)
     for joint in _unlimited_slides(model):
         body, axis = model.jnt_bodyid[joint], np.zeros(3)
         mujoco.mju_rotVecQuat(axis, model.jnt_axis[joint], model.body_quat[body])
@@ -126,10 +171,6 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 
     Each joint of the robot is moved inside its limits by at least the share `inside` of its range,
     equalities are satisfied, and a trunk that can be raised stands no lower than its feet need.
-
-    Args:
-        model: The model.
-        inside: Share of each joint's range to keep from its limits.
     """
     rules = StartRules(model)
     pose = rules.keep_within_limits(model.qpos0, inside)
@@ -137,15 +178,11 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 
 
 def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
-    """Return a pose with the trunk lowered or raised until the lowest point touches the floor.
+    """Return a pose (nq,) with the trunk moved up or down until the lowest point is on the floor.
 
-    Args:
-        model: The body.
-        pose: A pose, (nq,). It is returned as it is where nothing raises the trunk or no floor is
-            below it.
+    The pose is returned as it is if nothing raises the trunk or no floor is below it.
     """
-    rules = StartRules(model)
-    pose = pose.copy()
+    rules, pose = StartRules(model), pose.copy()
     if rules.lift is not None and (gap := rules.floor_gap(_posed(model, pose))) < _FAR_M:
         rules.lift.raise_by(pose, -gap)
     return pose
@@ -166,18 +203,14 @@ def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float 
     if rules.lift is None:
         return None
     if pose is None:
-        pose = rules.middle_pose()
+        pose = model.qpos0.copy()
+        pose[rules.limited_places] = 0.5 * (rules.lowest + rules.highest)
     gap = rules.floor_gap(_posed(model, pose))
     return None if gap >= _FAR_M else rules.lift.height(pose) - gap
 
 
 def floor_height(model: mujoco.MjModel, pose: _Array) -> float:
-    """Return the height in the world of the floor that is nearest to the robot, m; 0 for none.
-
-    Args:
-        model: The model.
-        pose: Its pose, shape (nq,).
-    """
+    """Return the height in the world of the floor nearest to a robot in a pose, m; 0 for none."""
     data, ends, nearest = _posed(model, pose), np.zeros(6), (_FAR_M, 0.0)
     for floor, geom in StartRules(model).floor_pairs:
         gap = mujoco.mj_geomDistance(model, data, floor, geom, _FAR_M, ends)
@@ -214,23 +247,22 @@ class StartRules:
         one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
         limited = one_number & (model.jnt_limited != 0)
         # A single tree is the robot; runners read these rules at each reset.
-        self._robot = robot_bodies(model) if model.ntree > 1 else None
-        if self._robot is not None:
-            limited &= self._robot[model.jnt_bodyid]
-        joints = np.flatnonzero(limited)
+        several = model.ntree > 1
+        self._robot = robot_bodies(model) if several else np.arange(model.nbody) > 0
+        joints = np.flatnonzero(limited & self._robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
         self.limited_places = model.jnt_qposadr[joints]
         self.closure: Closure | None = None
         if model.neq:
             limits = self.limited_places, self.lowest, self.highest
-            self.closure = Closure(model, self.robot_dofs, *limits)
+            self.closure = Closure(model, self.robot_dofs, limits)
         self.floor_pairs: list[tuple[int, int]] = []
         of_world = model.body_weldid[model.geom_bodyid] == 0
-        for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)).tolist():
+        for floor in np.flatnonzero(of_world & np.isin(model.geom_type, GROUND)).tolist():
             touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
                 model.geom_conaffinity & model.geom_contype[floor]
             )
-            own = ~of_world if self._robot is None else ~of_world & self._robot[model.geom_bodyid]
+            own = ~of_world & self._robot[model.geom_bodyid]
             geoms = np.flatnonzero(own & (touching != 0)).tolist()
             self.floor_pairs += [(floor, geom) for geom in geoms]
 
@@ -238,8 +270,6 @@ class StartRules:
     def robot_places(self) -> NDArray[np.bool_]:
         """Whether each number of qpos is one of the robot's, shape (nq,)."""
         model = self._model
-        if self._robot is None:
-            return np.ones(model.nq, np.bool_)
         # Each number belongs to the last joint that begins at or before it.
         joints = np.searchsorted(model.jnt_qposadr, np.arange(model.nq), side="right") - 1
         return self._robot[model.jnt_bodyid[joints]]
@@ -247,15 +277,12 @@ class StartRules:
     @property
     def robot_dofs(self) -> NDArray[np.bool_]:
         """Whether each number of qvel is one of the robot's, and not locked, shape (nv,)."""
-        moves = _moving_dofs(self._model)
-        return moves if self._robot is None else moves & self._robot[self._model.dof_bodyid]
+        return _moving_dofs(self._model) & self._robot[self._model.dof_bodyid]
 
     def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
         """Return a pose, shape (nq,), with the robot's hinges and slides moved inside their limits.
 
-        Args:
-            pose: Shape (nq,).
-            inside: Share of each joint's range to keep from its limits.
+        They keep the share `inside` of their range from the limits.
         """
         result = pose.copy()
         low, high = self.lowest, self.highest
@@ -266,20 +293,11 @@ class StartRules:
         result[self.limited_places] = np.minimum(np.maximum(pose[self.limited_places], low), high)
         return result
 
-    def middle_pose(self) -> _Array:
-        """Return the model's own pose, (nq,), with the robot's joints in the middle of theirs."""
-        pose = self._model.qpos0.copy()
-        pose[self.limited_places] = 0.5 * (self.lowest + self.highest)
-        return pose
-
     def floor_gap(self, data: mujoco.MjData) -> float:
         """Return the clearance of the robot's lowest point above the floor, m; negative inside it.
 
         The floor is every plane and height field that is fixed to the world and can touch the
-        robot's geoms; 1000 without one.
-
-        Args:
-            data: Data of the model after `mj_kinematics`.
+        robot's geoms; 1000 without one. `data` are those of the model after `mj_kinematics`.
         """
         gap = _FAR_M
         for floor, geom in self.floor_pairs:
@@ -287,15 +305,11 @@ class StartRules:
         return gap
 
     def feasible(self, drawn: _Array, data: mujoco.MjData, start: _Array | None = None) -> _Array:
-        """Return the feasible pose next to a drawn one, shape (nq,).
+        """Return the feasible pose next to a drawn one, (nq,); the pose in `data` is overwritten.
 
         Joints are moved inside their limits, orientations normalised, equalities satisfied as well
-        as they are at the start, and a trunk whose feet are in the floor is lifted.
-
-        Args:
-            drawn: The drawn pose, shape (nq,).
-            data: Data of the model; its pose and all that depends on it are overwritten.
-            start: The pose that it deviates from, shape (nq,); the model's own by default.
+        as they are at the pose `start` (nq,), by default the model's own, and a trunk whose feet
+        are in the floor is lifted.
         """
         pose = self.keep_within_limits(drawn)
         mujoco.mj_normalizeQuat(self._model, pose)
@@ -306,7 +320,7 @@ class StartRules:
             lifted = pose.copy()
             self._lift(lifted, data)
             # A robot that a weld or a rope holds hangs there, and does not stand.
-            if self.closure.violation(lifted, data) <= self.closure.goal(origin, data):
+            if self.closure.holds(lifted, origin, data):
                 pose = lifted
         return pose
 

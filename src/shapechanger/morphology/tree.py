@@ -14,11 +14,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.morphology.pose import travelling_body
-from shapechanger.morphology.robot import robot_bodies
+from shapechanger.morphology.pose import GROUND, robot_bodies, travelling_body
 
 _Array = NDArray[np.float64]
-_GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 _LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 _MOVES_ONE_WAY: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
@@ -86,12 +84,7 @@ class Tree(msgspec.Struct, frozen=True):
 
 
 def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
-    """Describe the kinematic tree of a body.
-
-    Args:
-        model: The body.
-        pose: Its start pose (nq,).
-    """
+    """Describe the kinematic tree of a body in its start pose (nq,)."""
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
@@ -154,9 +147,10 @@ def _limb_numbers(
     strength = 0.0
     if actuator is not None:
         strength = _moment(model, data, actuator, dof) * _gain(model, actuator)
-    depth = sum(
-        1 for above in _ancestors(model, body) if model.body_jntnum[above] and above != trunk
-    )
+    depth, above = 0, body
+    while above:
+        depth += int(above != trunk and model.body_jntnum[above] > 0)
+        above = int(model.body_parentid[above])
     numbers = (
         *_direction_and_length(into_trunk @ (anchor - data.xpos[trunk])),
         *(into_trunk @ data.xaxis[joint]),
@@ -175,26 +169,17 @@ def _actuators_by_joint(
     model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], owner: dict[int, int | None]
 ) -> dict[int, int]:
     """Return the actuator that moves each joint; see `Limb.actuator`."""
-    found: dict[int, int] = {}
-    others: list[int] = []
-    for actuator in range(model.nactuator):
-        if model.actuator_trntype[actuator] in _TO_JOINT:
-            found[int(model.actuator_trnid[actuator, 0])] = actuator
-        else:
-            others.append(actuator)
-    for actuator in others:
-        moments = {
-            j: _moment(model, data, actuator, int(model.jnt_dofadr[j]))
-            for j in joints
-            if j not in found
-        }
-        most = max(moments.values(), default=0.0)
+    to_joint = np.isin(model.actuator_trntype, _TO_JOINT)
+    targets: list[int] = model.actuator_trnid[:, 0].tolist()
+    found = {targets[actuator]: actuator for actuator in np.flatnonzero(to_joint).tolist()}
+    for actuator in np.flatnonzero(~to_joint).tolist():
+        free = (j for j in joints if j not in found)
+        moments = {j: _moment(model, data, actuator, int(model.jnt_dofadr[j])) for j in free}
+        most, joint = max(moments.values(), default=0.0), None
         if most > _NO_MOMENT:
             joint = next(j for j, moment in moments.items() if moment > (1.0 - _EQUAL) * most)
-        else:  # Adhesion moves its body only in contact.
-            body = int(model.actuator_trnid[actuator, 0])
-            adheres = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_BODY
-            joint = owner[body] if adheres else None
+        elif model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_BODY:
+            joint = owner[targets[actuator]]  # Adhesion moves its body only in contact.
         if joint is not None:
             found.setdefault(joint, actuator)
     return found
@@ -214,22 +199,12 @@ def _moment(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, dof: int)
 
 def _gain(model: mujoco.MjModel, actuator: int) -> float:
     """Return the force of an actuator for a control of 1, N or N·m."""
-    gain = model.actuator_gainprm[actuator]
-    if model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
-        # Its peak force; a negative one is derived from a scale and the inertia that it moves.
-        return float(
-            gain[2] if gain[2] >= 0.0 else gain[3] / max(model.actuator_acc0[actuator], _NO_MOMENT)
-        )
-    return float(abs(gain[0]))
-
-
-def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
-    """Return the bodies that carry a body, and itself, without the world."""
-    found: list[int] = []
-    while body:
-        found.append(body)
-        body = int(model.body_parentid[body])
-    return found
+    gain: list[float] = model.actuator_gainprm[actuator].tolist()
+    if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_MUSCLE:
+        return abs(gain[0])
+    # Its peak force; a negative one is derived from a scale and the inertia that it moves.
+    moved = max(float(model.actuator_acc0[actuator]), _NO_MOMENT)
+    return gain[2] if gain[2] >= 0.0 else gain[3] / moved
 
 
 def _farthest(
@@ -239,7 +214,7 @@ def _farthest(
     way, length = np.zeros(3), 0.0
     for geom in np.flatnonzero(np.isin(model.geom_bodyid, bodies)):
         kind = int(model.geom_type[geom])
-        if kind in _GROUND:
+        if kind in GROUND:
             continue
         # Capsules and cylinders end on their own z axis; others are as long as their bound.
         half = data.geom_xmat[geom].reshape(3, 3)[:, 2] * model.geom_size[geom, 1] * (kind in _LONG)

@@ -15,7 +15,7 @@ from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import Edit, Positive, Vector, part_of_the_way
-from shapechanger.morphology.robot import robot_bodies
+from shapechanger.morphology.pose import robot_bodies
 from shapechanger.morphology.spec.elements import (
     compiled,
     require_free_name,
