@@ -99,15 +99,12 @@ class Rollout(msgspec.Struct, frozen=True):
             )
         for whose, names in (("source", self.only_in_source), ("target", self.only_in_target)):
             if names:
-                sentences.append(
-                    f"Only the {whose} observes {len(names)} more, such as {names[0]}."
-                )
+                sentences += [f"Only the {whose} observes {len(names)} more, such as {names[0]}."]
         if self.reward_difference > 0.0:
             sentences.append(f"Rewards differ by up to {self.reward_difference:.4g} a step.")
         if self.source_ended != self.target_ended:
-            sentences.append(
-                f"Only the {'source' if self.source_ended else 'target'} ended its episode."
-            )
+            ended = "source" if self.source_ended else "target"
+            sentences.append(f"Only the {ended} ended its episode.")
         return " ".join(sentences)
 
 
@@ -156,8 +153,8 @@ class Certificate(msgspec.Struct, frozen=True):
     def verdict(self) -> str:
         """Verdict in one sentence."""
         both, steps = f"{self.source} and {self.target}", f"{self.rollout.steps} steps"
-        same_names = self.source_fingerprint == self.target_fingerprint
-        if self.is_empty and same_names and self.rollout.identical:
+        same_prints = self.source_fingerprint == self.target_fingerprint
+        if self.is_empty and same_prints and self.rollout.identical:
             return (
                 f"{both} behave the same: both models have the fingerprint "
                 f"{self.source_fingerprint}, and {steps} gave the same numbers."
@@ -413,10 +410,10 @@ def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None)
         if mass > 0.0 and (small < 0.0 or (large == 0.0 and model.body_dofnum[i] > 0)):
             found.append(f"{body}: mass {mass:.4g} kg comes with inertia {small:.3g} kg·m².")
         elif mass > 0.0 and small + middle < large * (1.0 - _STALE):
+            moments = f"principal moments {small:.3g}, {middle:.3g}, {large:.3g} kg·m²"
             found.append(
-                f"{body}: mass {mass:.4g} kg comes with principal moments {small:.3g}, "
-                f"{middle:.3g}, {large:.3g} kg·m², of which the largest is more than the other "
-                "two together."
+                f"{body}: mass {mass:.4g} kg comes with {moments}, of which the largest is more "
+                "than the other two together."
             )
         if source is not None and body in before and model.body_inertia[i].any():
             j = before.index(body)

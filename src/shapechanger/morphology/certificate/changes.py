@@ -85,9 +85,8 @@ def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
         groups.setdefault((item.quantity, text), []).append(item)
     merged: list[Change] = []
     for (_, text), members in groups.items():
-        names = ", ".join(member.element for member in members)
-        sentence = f"{names}: {text}"
-        merged.append(msgspec.structs.replace(members[0], element=names, sentence=sentence))
+        name = ", ".join(member.element for member in members)
+        merged.append(msgspec.structs.replace(members[0], element=name, sentence=f"{name}: {text}"))
     return tuple(merged)
 
 
@@ -155,7 +154,7 @@ def compare(
     if not found:
         return tuple(changes)
     if source.nbody != target.nbody:
-        sizes = (float(source.nbody),), (float(target.nbody),)
+        sizes = [(float(model.nbody),) for model in (source, target)]
         changes.append(change("dimensions", "nbody", *sizes, "1"))
     old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
     # The order of the bodies may change the last digit of the sum.
@@ -309,9 +308,8 @@ def _digest_of(numbers: Numbers) -> str:
     for section, elements in numbers.items():
         scales = _scales(elements)
         for element, fields in elements.items():
-            rounded.append(
-                (section, element, {q: _rounded(v, scales[q]) for q, v in fields.items()})
-            )
+            row = {name: _rounded(values, scales[name]) for name, values in fields.items()}
+            rounded.append((section, element, row))
     return hashlib.sha256(msgspec.msgpack.encode(rounded)).hexdigest()[:_HEX_DIGITS]
 
 

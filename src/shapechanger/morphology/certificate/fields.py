@@ -23,7 +23,6 @@ Numbers = dict[str, dict[str, dict[str, Values]]]
 
 _T: Final = mujoco.mjtTrn
 _W: Final = mujoco.mjtWrap
-_E: Final = mujoco.mjtEq
 _ENABLE: Final = mujoco.mjtEnableBit
 
 
@@ -136,8 +135,7 @@ def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
     """Return the kinds of the elements that indices of several kinds are of; "" for none."""
     by_object = {kind.type.value: name for name, kind in TABLE.kinds.items() if kind.object}
     by_object[mujoco.mjtObj.mjOBJ_XBODY.value] = "bodies"
-    pins, named = (_E.mjEQ_CONNECT, _E.mjEQ_WELD), TABLE.kinds_of_indices
-    pairs = zip(m.eq_type.tolist(), m.eq_objtype.tolist(), strict=True)
+    named, ties = TABLE.kinds_of_indices, zip(m.eq_type, m.eq_objtype.tolist(), strict=True)
     ends = zip(m.actuator_trntype.tolist(), m.actuator_trnid[:, 1].tolist(), strict=True)
     return {
         "actuator_target_kinds": [
@@ -147,8 +145,7 @@ def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
         ],
         "wrap_kinds": [named.get(_W(kind).name, "geoms") for kind in m.wrap_type.tolist()],
         "eq_kinds": [
-            by_object.get(on, "bodies") if kind in pins else named.get(_E(kind).name, "flexes")
-            for kind, on in pairs
+            named.get(mujoco.mjtEq(kind).name) or by_object.get(on, "flexes") for kind, on in ties
         ],
         "sensor_object_kinds": [by_object.get(kind, "") for kind in m.sensor_objtype.tolist()],
         "sensor_reference_kinds": [by_object.get(kind, "") for kind in m.sensor_reftype.tolist()],

@@ -82,9 +82,8 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
     """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
-    flat = np.isin(model.geom_type[pairs], _FLAT).all(axis=1)
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
-    return np.logical_and(~flat, np.any(moving, axis=1))
+    return ~np.isin(model.geom_type[pairs], _FLAT).all(axis=1) & moving.any(axis=1)
 
 
 def geoms_of_pairs(model: mujoco.MjModel) -> _Ints:
@@ -129,8 +128,7 @@ def mixed_parameters(model: mujoco.MjModel, pairs: _Ints) -> dict[str, _Floats]:
     """Return the parameters that MuJoCo mixes for pairs of geoms (n, 2), called as in `pair_*`."""
     priority = model.geom_priority[pairs[:, 0]] - model.geom_priority[pairs[:, 1]]
     # The weight of the first geom's solver parameters; half if neither states one.
-    weights = model.geom_solmix[pairs]
-    weights = np.where(weights < mujoco.mjMINVAL, 0.0, weights)
+    weights = np.where(model.geom_solmix < mujoco.mjMINVAL, 0.0, model.geom_solmix)[pairs]
     total = weights.sum(axis=1)
     share = np.where(total, weights[:, 0] / np.where(total, total, 1.0), 0.5)[:, None]
 
@@ -199,9 +197,8 @@ def sensed_numbers(model: mujoco.MjModel, *, drawn: bool) -> Numbers:
     reader = _Reader(model)
     found = {section: reader.section(section) for section in (SENSED if drawn else [*SENSED][:-2])}
     if drawn:
-        found["drawing"] = {
-            name: {"digest": (_digest(getattr(model, name)),)} for name in TABLE.drawn
-        }
+        digests = {name: _digest(getattr(model, name)) for name in TABLE.drawn}
+        found["drawing"] = {name: {"digest": (digest,)} for name, digest in digests.items()}
     return found
 
 
@@ -227,9 +224,10 @@ class _Reader:
         """Return the quantities of each of so many elements."""
         rows: list[dict[str, Values]] = [{} for _ in range(count)]
         for quantity, field in fields.items() if count else ():
-            parts, acts = self._split(field.array, self._values(field)), [True] * count
-            if field.where:
-                acts = self._split(field.where, self.array(field.where))
+            parts = self._split(field.array, self._values(field))
+            acts = (
+                self._split(field.where, self.array(field.where)) if field.where else [True] * count
+            )
             for row, values, acting in zip(rows, parts, acts, strict=True):
                 if np.any(acting):
                     row[quantity] = _plain(values)
