@@ -122,17 +122,3 @@ def test_a_name_belongs_to_one_edit(module: Any, tmp_path: Path) -> None:
             kind(name, (Edit,), parts | {"__qualname__": f"elsewhere.{name}"}, frozen=True)
     with pytest.raises(MorphologyError, match="There is an edit 'cut' already"):
         kind("Cut", (Edit,), parts | {"__qualname__": "Cut"}, frozen=True)
-
-
-def test_the_edits_of_the_package_are_all_known() -> None:
-    """By the snake case of their names."""
-    assert {
-        name for name, kind in EDITS.items() if kind.__module__.startswith("shapechanger.")
-    } == {
-        *("stretch", "radius", "cut", "remove", "split", "add_segment", "add_limb"),
-        *("mass", "density", "gear", "damping", "stiffness", "friction"),
-        *("joint_range", "lock", "gravity", "start_height"),
-        *("place_body", "place_geom", "total_mass"),
-        *("add_motor", "add_free_joint", "add_floor"),
-    }
-    assert all(kind.__struct_config__.tag == name for name, kind in EDITS.items())

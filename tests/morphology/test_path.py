@@ -74,6 +74,8 @@ def test_all_kinds_are_covered() -> None:
     rigging = (AddMotor, AddFreeJoint, AddFloor)  # The leg has motors, freedom and a floor.
     shipped = {kind for kind in EDITS.values() if kind.__module__.startswith("shapechanger.")}
     assert {*(type(edit) for edit in ONE_OF_EACH), *rigging} == shipped
+    assert all(kind.__struct_config__.tag == name for name, kind in EDITS.items())
+    assert {"stretch", "joint_range", "add_free_joint", "total_mass"} <= EDITS.keys()
 
 
 def test_the_ends_are_the_bodies_themselves() -> None:
