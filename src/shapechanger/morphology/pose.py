@@ -297,7 +297,7 @@ class StartRules:
         """Return the clearance of the robot's lowest point above the floor, m; negative inside it.
 
         The floor is every plane and height field that is fixed to the world and can touch the
-        robot's geoms; 1000 without one. `data` are those of the model after `mj_kinematics`.
+        robot's geoms; 1000 without one. The model's `data` have gone through `mj_kinematics`.
         """
         gap = _FAR_M
         for floor, geom in self.floor_pairs:
