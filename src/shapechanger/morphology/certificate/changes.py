@@ -154,8 +154,8 @@ def compare(
     if not found:
         return tuple(changes)
     if source.nbody != target.nbody:
-        sizes = [(float(model.nbody),) for model in (source, target)]
-        changes.append(change("dimensions", "nbody", *sizes, "1"))
+        old, new = float(source.nbody), float(target.nbody)
+        changes.append(change("dimensions", "nbody", (old,), (new,), "1"))
     old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
     # The order of the bodies may change the last digit of the sum.
     if not math.isclose(old, new, rel_tol=ROUNDING):

@@ -83,7 +83,8 @@ def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> NDArray[np.bool_]:
     """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
-    return ~np.isin(model.geom_type[pairs], _FLAT).all(axis=1) & moving.any(axis=1)
+    flat = np.isin(model.geom_type[pairs], _FLAT)
+    return np.logical_and(~np.all(flat, axis=1), np.any(moving, axis=1))
 
 
 def geoms_of_pairs(model: mujoco.MjModel) -> _Ints:
