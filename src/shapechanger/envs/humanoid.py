@@ -7,8 +7,15 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import mujoco
-from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
+import gymnasium as gym
+
+from shapechanger.errors import MissingExtra, translate_errors
+
+with translate_errors(
+    *(ImportError, gym.error.DependencyNotInstalled), to=lambda _: MissingExtra("mujoco", "sim")
+):
+    import mujoco
+    from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
 
 from shapechanger.envs.layouts import (
     contact_features,
