@@ -297,3 +297,19 @@ def test_a_tuple_loses_what_is_removed() -> None:
     assert [model.body(int(i)).name for i in model.tuple_objid] == ["other"]
     assert model.tuple_objprm.tolist() == [2.0]
     assert built(arm(text), Remove("lower"), Remove("other")).ntuple == 0
+
+
+def test_cameras_and_lights_look_at_the_parent_of_a_removed_limb() -> None:
+    """What they were aimed at is gone."""
+    spec = mujoco.MjSpec.from_string(
+        """<mujoco><worldbody>
+        <body name="trunk"><geom size="0.1"/>
+          <body name="leg"><joint/><geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.02"/></body>
+        </body>
+        <camera name="eye" mode="targetbody" target="leg" pos="1 0 0"/>
+        <light mode="targetbody" target="leg" pos="0 0 2"/></worldbody></mujoco>"""
+    )
+    model = built(spec, Remove("leg"))
+    trunk = model.body("trunk").id
+    assert model.cam_targetbodyid.tolist() == [trunk]
+    assert model.light_targetbodyid.tolist() == [trunk]
