@@ -136,7 +136,8 @@ def test_a_wrong_name_shows_the_nearest(robot: RunningRobot) -> None:
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
         "shapechanger.errors.UnknownName: No known robot matches 'lab-cra'. Did you mean "
-        "'lab-car'? There are: lab-car."
+        "'lab-car'? There are: lab-car. `shapechanger robot serve PROFILE --twin` serves a twin "
+        "and makes it known."
     )
 
 
