@@ -8,7 +8,7 @@ import io
 import os
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import takewhile
+from itertools import groupby, takewhile
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -17,9 +17,10 @@ import gymnasium as gym
 import shapechanger
 from scripts.wiring_diagrams import draw_wiring, part_list, pin_table
 from shapechanger.cli.envs import summaries
-from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.catalogue import CATALOGUE, NAMESPACE, ODRL_ENVS, OWN_ROBOT, VEHICLE_ENVS
 from shapechanger.errors import EmptyShift, RenderError
+from shapechanger.layout import Feature, Layout
 from shapechanger.robot.profile import load_profile, shipped_profiles
 
 SRC: Final = Path(shapechanger.__file__).parents[1]
@@ -40,6 +41,7 @@ class SitePage:
 
 _SIZE: Final = 480, 360
 _QUALITY: Final = 80
+_FEWEST: Final = 3  # Features of one kind that become one row.
 
 
 def environment_pages() -> list[SitePage]:
@@ -89,12 +91,17 @@ def environment_page(env_id: str) -> SitePage:
     short, spec = _short(env_id), gym.registry[env_id]
     module, _, name = cast("str", spec.entry_point).partition(":")
     parts = [f"# {short}", f"`{env_id}`: {_summary(env_id)}."]
+    docstring = _docstring(_loaded(f"{module}:{name}"))
+    tables: list[str] = []
     certificate = ""
     pictures: dict[str, bytes] = {}
     notes: list[str] = []
     # The others need a robot or a file.
     if not short.startswith("Remote") and env_id != OWN_ROBOT:
         env = EnvRef(env_id).make()
+        if "| Num" not in docstring:
+            for layout, title in zip(layouts_of(env), ("Observation", "Action"), strict=True):
+                tables += [f"### {title}s by number", layout_table(layout, title)]
         try:
             # Vehicles are compared by what their cameras see, too.
             certificate = _certificate(env_id, env)
@@ -116,9 +123,44 @@ def environment_page(env_id: str) -> SitePage:
         "class": f"[`{module}.{name}`][{module}.{name}]",
     }
     parts.append(_table(("property", "value"), [row for row in facts.items() if row[1]]))
-    parts += [_docstring(_loaded(f"{module}:{name}")), certificate]
+    parts += [docstring, *tables, certificate]
     content = "\n\n".join(part for part in parts if part)
     return SitePage(f"environments/{short}.md", short, content, pictures, tuple(notes))
+
+
+def _kind_of(feature: Feature) -> tuple[str, str, str, str]:
+    """Return the name without the element, the bounds and the unit; the units of a block differ."""
+    _, _, kind = feature.name.partition("/")
+    kind, _, part = kind.partition("/")
+    unit = "" if part else feature.unit
+    return kind or feature.name, f"{feature.low:.4g}", f"{feature.high:.4g}", unit
+
+
+def layout_table(layout: Layout, title: str) -> str:
+    """Return the table of a layout; consecutive observations of one kind share a row.
+
+    Args:
+        layout: The layout.
+        title: "Action" or "Observation".
+    """
+    rows: list[tuple[str, ...]] = [("Num", title, "Min", "Max", "Unit")]
+    first = 0
+    for (kind, low, high, _), group in groupby(layout, _kind_of):
+        features = list(group)
+        is_block = title == "Observation" and len(features) >= _FEWEST
+        for few in [features] if is_block else [[feature] for feature in features]:
+            size = sum(feature.size for feature in few)
+            place = str(first) if size == 1 else f"{first}-{first + size - 1}"
+            suffix = "/*" if few[0].name.count("/") > 1 else ""
+            name = f"`*/{kind}{suffix}`" if is_block else f"`{few[0].name}`"
+            rows.append((place, name, low, high, ", ".join(dict.fromkeys(f.unit for f in few))))
+            first += size
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    rows.insert(1, tuple("-" * width for width in widths))
+    return "\n".join(
+        f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
+        for row in rows
+    )
 
 
 def _short(env_id: str) -> str:

@@ -42,64 +42,64 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     hips' y axes, 200 N·m for the knees, 25 N·m for the arms and 100 N·m for all others. An action
     lasts 0.015 s.
 
-    | Num | Action                | Min  | Max | Unit |
-    | --- | --------------------- | ---- | --- | ---- |
-    | 0   | abdomen_y/motor       | -0.4 | 0.4 | 1    |
-    | 1   | abdomen_z/motor       | -0.4 | 0.4 | 1    |
-    | 2   | abdomen_x/motor       | -0.4 | 0.4 | 1    |
-    | 3   | right_hip_x/motor     | -0.4 | 0.4 | 1    |
-    | 4   | right_hip_z/motor     | -0.4 | 0.4 | 1    |
-    | 5   | right_hip_y/motor     | -0.4 | 0.4 | 1    |
-    | 6   | right_knee/motor      | -0.4 | 0.4 | 1    |
-    | 7   | left_hip_x/motor      | -0.4 | 0.4 | 1    |
-    | 8   | left_hip_z/motor      | -0.4 | 0.4 | 1    |
-    | 9   | left_hip_y/motor      | -0.4 | 0.4 | 1    |
-    | 10  | left_knee/motor       | -0.4 | 0.4 | 1    |
-    | 11  | right_shoulder1/motor | -0.4 | 0.4 | 1    |
-    | 12  | right_shoulder2/motor | -0.4 | 0.4 | 1    |
-    | 13  | right_elbow/motor     | -0.4 | 0.4 | 1    |
-    | 14  | left_shoulder1/motor  | -0.4 | 0.4 | 1    |
-    | 15  | left_shoulder2/motor  | -0.4 | 0.4 | 1    |
-    | 16  | left_elbow/motor      | -0.4 | 0.4 | 1    |
+    | Num | Action                  | Min  | Max | Unit |
+    | --- | ----------------------- | ---- | --- | ---- |
+    | 0   | `abdomen_y/motor`       | -0.4 | 0.4 | 1    |
+    | 1   | `abdomen_z/motor`       | -0.4 | 0.4 | 1    |
+    | 2   | `abdomen_x/motor`       | -0.4 | 0.4 | 1    |
+    | 3   | `right_hip_x/motor`     | -0.4 | 0.4 | 1    |
+    | 4   | `right_hip_z/motor`     | -0.4 | 0.4 | 1    |
+    | 5   | `right_hip_y/motor`     | -0.4 | 0.4 | 1    |
+    | 6   | `right_knee/motor`      | -0.4 | 0.4 | 1    |
+    | 7   | `left_hip_x/motor`      | -0.4 | 0.4 | 1    |
+    | 8   | `left_hip_z/motor`      | -0.4 | 0.4 | 1    |
+    | 9   | `left_hip_y/motor`      | -0.4 | 0.4 | 1    |
+    | 10  | `left_knee/motor`       | -0.4 | 0.4 | 1    |
+    | 11  | `right_shoulder1/motor` | -0.4 | 0.4 | 1    |
+    | 12  | `right_shoulder2/motor` | -0.4 | 0.4 | 1    |
+    | 13  | `right_elbow/motor`     | -0.4 | 0.4 | 1    |
+    | 14  | `left_shoulder1/motor`  | -0.4 | 0.4 | 1    |
+    | 15  | `left_shoulder2/motor`  | -0.4 | 0.4 | 1    |
+    | 16  | `left_elbow/motor`      | -0.4 | 0.4 | 1    |
 
     ## Observation space
     `Box(-inf, inf, (348,), float64)`, for the unedited body:
 
-    | Num     | Observation           | Min     | Max      | Unit            |
-    | ------- | --------------------- | ------- | -------- | --------------- |
-    | 0       | torso/z               | -inf    | inf      | m               |
-    | 1       | torso/qw              | -1      | 1        | 1               |
-    | 2       | torso/qx              | -1      | 1        | 1               |
-    | 3       | torso/qy              | -1      | 1        | 1               |
-    | 4       | torso/qz              | -1      | 1        | 1               |
-    | 5       | abdomen_z/angle       | -0.7854 | 0.7854   | rad             |
-    | 6       | abdomen_y/angle       | -1.309  | 0.5236   | rad             |
-    | 7       | abdomen_x/angle       | -0.6109 | 0.6109   | rad             |
-    | 8       | right_hip_x/angle     | -0.4363 | 0.08727  | rad             |
-    | 9       | right_hip_z/angle     | -1.047  | 0.6109   | rad             |
-    | 10      | right_hip_y/angle     | -1.92   | 0.3491   | rad             |
-    | 11      | right_knee/angle      | -2.793  | -0.03491 | rad             |
-    | 12      | left_hip_x/angle      | -0.4363 | 0.08727  | rad             |
-    | 13      | left_hip_z/angle      | -1.047  | 0.6109   | rad             |
-    | 14      | left_hip_y/angle      | -1.92   | 0.3491   | rad             |
-    | 15      | left_knee/angle       | -2.793  | -0.03491 | rad             |
-    | 16      | right_shoulder1/angle | -1.484  | 1.047    | rad             |
-    | 17      | right_shoulder2/angle | -1.484  | 1.047    | rad             |
-    | 18      | right_elbow/angle     | -1.571  | 0.8727   | rad             |
-    | 19      | left_shoulder1/angle  | -1.047  | 1.484    | rad             |
-    | 20      | left_shoulder2/angle  | -1.047  | 1.484    | rad             |
-    | 21      | left_elbow/angle      | -1.571  | 0.8727   | rad             |
-    | 22      | torso/vx              | -inf    | inf      | m/s             |
-    | 23      | torso/vy              | -inf    | inf      | m/s             |
-    | 24      | torso/vz              | -inf    | inf      | m/s             |
-    | 25      | torso/wx              | -inf    | inf      | rad/s           |
-    | 26      | torso/wy              | -inf    | inf      | rad/s           |
-    | 27      | torso/wz              | -inf    | inf      | rad/s           |
-    | 28-44   | */velocity            | -inf    | inf      | rad/s           |
-    | 45-174  | */inertia/*           | -inf    | inf      | kg·m², kg·m, kg |
-    | 175-252 | */twist/*             | -inf    | inf      | rad/s, m/s      |
-    | 253-269 | */drive               | -inf    | inf      | N·m             |
-    | 270-347 | */contact/*           | -inf    | inf      | N·m, N          |
+    | Num     | Observation             | Min     | Max      | Unit            |
+    | ------- | ----------------------- | ------- | -------- | --------------- |
+    | 0       | `torso/z`               | -inf    | inf      | m               |
+    | 1       | `torso/qw`              | -1      | 1        | 1               |
+    | 2       | `torso/qx`              | -1      | 1        | 1               |
+    | 3       | `torso/qy`              | -1      | 1        | 1               |
+    | 4       | `torso/qz`              | -1      | 1        | 1               |
+    | 5       | `abdomen_z/angle`       | -0.7854 | 0.7854   | rad             |
+    | 6       | `abdomen_y/angle`       | -1.309  | 0.5236   | rad             |
+    | 7       | `abdomen_x/angle`       | -0.6109 | 0.6109   | rad             |
+    | 8       | `right_hip_x/angle`     | -0.4363 | 0.08727  | rad             |
+    | 9       | `right_hip_z/angle`     | -1.047  | 0.6109   | rad             |
+    | 10      | `right_hip_y/angle`     | -1.92   | 0.3491   | rad             |
+    | 11      | `right_knee/angle`      | -2.793  | -0.03491 | rad             |
+    | 12      | `left_hip_x/angle`      | -0.4363 | 0.08727  | rad             |
+    | 13      | `left_hip_z/angle`      | -1.047  | 0.6109   | rad             |
+    | 14      | `left_hip_y/angle`      | -1.92   | 0.3491   | rad             |
+    | 15      | `left_knee/angle`       | -2.793  | -0.03491 | rad             |
+    | 16      | `right_shoulder1/angle` | -1.484  | 1.047    | rad             |
+    | 17      | `right_shoulder2/angle` | -1.484  | 1.047    | rad             |
+    | 18      | `right_elbow/angle`     | -1.571  | 0.8727   | rad             |
+    | 19      | `left_shoulder1/angle`  | -1.047  | 1.484    | rad             |
+    | 20      | `left_shoulder2/angle`  | -1.047  | 1.484    | rad             |
+    | 21      | `left_elbow/angle`      | -1.571  | 0.8727   | rad             |
+    | 22      | `torso/vx`              | -inf    | inf      | m/s             |
+    | 23      | `torso/vy`              | -inf    | inf      | m/s             |
+    | 24      | `torso/vz`              | -inf    | inf      | m/s             |
+    | 25      | `torso/wx`              | -inf    | inf      | rad/s           |
+    | 26      | `torso/wy`              | -inf    | inf      | rad/s           |
+    | 27      | `torso/wz`              | -inf    | inf      | rad/s           |
+    | 28-44   | `*/velocity`            | -inf    | inf      | rad/s           |
+    | 45-174  | `*/inertia/*`           | -inf    | inf      | kg·m², kg·m, kg |
+    | 175-252 | `*/twist/*`             | -inf    | inf      | rad/s, m/s      |
+    | 253-269 | `*/drive`               | -inf    | inf      | N·m             |
+    | 270-347 | `*/contact/*`           | -inf    | inf      | N·m, N          |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost - contact_cost`: 5 while healthy, plus 1.25 times

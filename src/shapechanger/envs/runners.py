@@ -190,31 +190,31 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gears of 120, 90, 60, 120,
     60 and 30 N·m. An action lasts 0.05 s.
 
-    | Num | Action       | Min | Max | Unit |
-    | --- | ------------ | --- | --- | ---- |
-    | 0   | bthigh/motor | -1  | 1   | 1    |
-    | 1   | bshin/motor  | -1  | 1   | 1    |
-    | 2   | bfoot/motor  | -1  | 1   | 1    |
-    | 3   | fthigh/motor | -1  | 1   | 1    |
-    | 4   | fshin/motor  | -1  | 1   | 1    |
-    | 5   | ffoot/motor  | -1  | 1   | 1    |
+    | Num | Action         | Min | Max | Unit |
+    | --- | -------------- | --- | --- | ---- |
+    | 0   | `bthigh/motor` | -1  | 1   | 1    |
+    | 1   | `bshin/motor`  | -1  | 1   | 1    |
+    | 2   | `bfoot/motor`  | -1  | 1   | 1    |
+    | 3   | `fthigh/motor` | -1  | 1   | 1    |
+    | 4   | `fshin/motor`  | -1  | 1   | 1    |
+    | 5   | `ffoot/motor`  | -1  | 1   | 1    |
 
     ## Observation space
     `Box(-inf, inf, (17,), float64)`, for the unedited body:
 
-    | Num   | Observation    | Min    | Max   | Unit  |
-    | ----- | -------------- | ------ | ----- | ----- |
-    | 0     | rootz/position | -inf   | inf   | m     |
-    | 1     | rooty/angle    | -inf   | inf   | rad   |
-    | 2     | bthigh/angle   | -0.52  | 1.05  | rad   |
-    | 3     | bshin/angle    | -0.785 | 0.785 | rad   |
-    | 4     | bfoot/angle    | -0.4   | 0.785 | rad   |
-    | 5     | fthigh/angle   | -1     | 0.7   | rad   |
-    | 6     | fshin/angle    | -1.2   | 0.87  | rad   |
-    | 7     | ffoot/angle    | -0.5   | 0.5   | rad   |
-    | 8     | rootx/velocity | -inf   | inf   | m/s   |
-    | 9     | rootz/velocity | -inf   | inf   | m/s   |
-    | 10-16 | */velocity     | -inf   | inf   | rad/s |
+    | Num   | Observation      | Min    | Max   | Unit  |
+    | ----- | ---------------- | ------ | ----- | ----- |
+    | 0     | `rootz/position` | -inf   | inf   | m     |
+    | 1     | `rooty/angle`    | -inf   | inf   | rad   |
+    | 2     | `bthigh/angle`   | -0.52  | 1.05  | rad   |
+    | 3     | `bshin/angle`    | -0.785 | 0.785 | rad   |
+    | 4     | `bfoot/angle`    | -0.4   | 0.785 | rad   |
+    | 5     | `fthigh/angle`   | -1     | 0.7   | rad   |
+    | 6     | `fshin/angle`    | -1.2   | 0.87  | rad   |
+    | 7     | `ffoot/angle`    | -0.5   | 0.5   | rad   |
+    | 8     | `rootx/velocity` | -inf   | inf   | m/s   |
+    | 9     | `rootz/velocity` | -inf   | inf   | m/s   |
+    | 10-16 | `*/velocity`     | -inf   | inf   | rad/s |
 
     ## Reward
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.1 sum(action^2)`.
@@ -261,25 +261,25 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `Box(-1, 1, (3,), float32)`: torques of the motors divided by their gear of 200 N·m. An action
     lasts 0.008 s.
 
-    | Num | Action            | Min | Max | Unit |
-    | --- | ----------------- | --- | --- | ---- |
-    | 0   | thigh_joint/motor | -1  | 1   | 1    |
-    | 1   | leg_joint/motor   | -1  | 1   | 1    |
-    | 2   | foot_joint/motor  | -1  | 1   | 1    |
+    | Num | Action              | Min | Max | Unit |
+    | --- | ------------------- | --- | --- | ---- |
+    | 0   | `thigh_joint/motor` | -1  | 1   | 1    |
+    | 1   | `leg_joint/motor`   | -1  | 1   | 1    |
+    | 2   | `foot_joint/motor`  | -1  | 1   | 1    |
 
     ## Observation space
     `Box(-inf, inf, (11,), float64)`, for the unedited body:
 
-    | Num  | Observation       | Min     | Max    | Unit  |
-    | ---- | ----------------- | ------- | ------ | ----- |
-    | 0    | rootz/position    | -inf    | inf    | m     |
-    | 1    | rooty/angle       | -inf    | inf    | rad   |
-    | 2    | thigh_joint/angle | -2.618  | 0      | rad   |
-    | 3    | leg_joint/angle   | -2.618  | 0      | rad   |
-    | 4    | foot_joint/angle  | -0.7854 | 0.7854 | rad   |
-    | 5    | rootx/velocity    | -10     | 10     | m/s   |
-    | 6    | rootz/velocity    | -10     | 10     | m/s   |
-    | 7-10 | */velocity        | -10     | 10     | rad/s |
+    | Num  | Observation         | Min     | Max    | Unit  |
+    | ---- | ------------------- | ------- | ------ | ----- |
+    | 0    | `rootz/position`    | -inf    | inf    | m     |
+    | 1    | `rooty/angle`       | -inf    | inf    | rad   |
+    | 2    | `thigh_joint/angle` | -2.618  | 0      | rad   |
+    | 3    | `leg_joint/angle`   | -2.618  | 0      | rad   |
+    | 4    | `foot_joint/angle`  | -0.7854 | 0.7854 | rad   |
+    | 5    | `rootx/velocity`    | -10     | 10     | m/s   |
+    | 6    | `rootz/velocity`    | -10     | 10     | m/s   |
+    | 7-10 | `*/velocity`        | -10     | 10     | rad/s |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
@@ -324,31 +324,31 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gear of 100 N·m. An action
     lasts 0.008 s.
 
-    | Num | Action                 | Min | Max | Unit |
-    | --- | ---------------------- | --- | --- | ---- |
-    | 0   | thigh_joint/motor      | -1  | 1   | 1    |
-    | 1   | leg_joint/motor        | -1  | 1   | 1    |
-    | 2   | foot_joint/motor       | -1  | 1   | 1    |
-    | 3   | thigh_left_joint/motor | -1  | 1   | 1    |
-    | 4   | leg_left_joint/motor   | -1  | 1   | 1    |
-    | 5   | foot_left_joint/motor  | -1  | 1   | 1    |
+    | Num | Action                   | Min | Max | Unit |
+    | --- | ------------------------ | --- | --- | ---- |
+    | 0   | `thigh_joint/motor`      | -1  | 1   | 1    |
+    | 1   | `leg_joint/motor`        | -1  | 1   | 1    |
+    | 2   | `foot_joint/motor`       | -1  | 1   | 1    |
+    | 3   | `thigh_left_joint/motor` | -1  | 1   | 1    |
+    | 4   | `leg_left_joint/motor`   | -1  | 1   | 1    |
+    | 5   | `foot_left_joint/motor`  | -1  | 1   | 1    |
 
     ## Observation space
     `Box(-inf, inf, (17,), float64)`, for the unedited body:
 
-    | Num   | Observation            | Min     | Max    | Unit  |
-    | ----- | ---------------------- | ------- | ------ | ----- |
-    | 0     | rootz/position         | -inf    | inf    | m     |
-    | 1     | rooty/angle            | -inf    | inf    | rad   |
-    | 2     | thigh_joint/angle      | -2.618  | 0      | rad   |
-    | 3     | leg_joint/angle        | -2.618  | 0      | rad   |
-    | 4     | foot_joint/angle       | -0.7854 | 0.7854 | rad   |
-    | 5     | thigh_left_joint/angle | -2.618  | 0      | rad   |
-    | 6     | leg_left_joint/angle   | -2.618  | 0      | rad   |
-    | 7     | foot_left_joint/angle  | -0.7854 | 0.7854 | rad   |
-    | 8     | rootx/velocity         | -10     | 10     | m/s   |
-    | 9     | rootz/velocity         | -10     | 10     | m/s   |
-    | 10-16 | */velocity             | -10     | 10     | rad/s |
+    | Num   | Observation              | Min     | Max    | Unit  |
+    | ----- | ------------------------ | ------- | ------ | ----- |
+    | 0     | `rootz/position`         | -inf    | inf    | m     |
+    | 1     | `rooty/angle`            | -inf    | inf    | rad   |
+    | 2     | `thigh_joint/angle`      | -2.618  | 0      | rad   |
+    | 3     | `leg_joint/angle`        | -2.618  | 0      | rad   |
+    | 4     | `foot_joint/angle`       | -0.7854 | 0.7854 | rad   |
+    | 5     | `thigh_left_joint/angle` | -2.618  | 0      | rad   |
+    | 6     | `leg_left_joint/angle`   | -2.618  | 0      | rad   |
+    | 7     | `foot_left_joint/angle`  | -0.7854 | 0.7854 | rad   |
+    | 8     | `rootx/velocity`         | -10     | 10     | m/s   |
+    | 9     | `rootz/velocity`         | -10     | 10     | m/s   |
+    | 10-16 | `*/velocity`             | -10     | 10     | rad/s |
 
     ## Reward
     `healthy_reward + forward_reward - ctrl_cost`: 1 while healthy, plus the velocity along x, m/s,
@@ -392,22 +392,22 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     `Box(-1, 1, (2,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
     lasts 0.04 s.
 
-    | Num | Action           | Min | Max | Unit |
-    | --- | ---------------- | --- | --- | ---- |
-    | 0   | motor1_rot/motor | -1  | 1   | 1    |
-    | 1   | motor2_rot/motor | -1  | 1   | 1    |
+    | Num | Action             | Min | Max | Unit |
+    | --- | ------------------ | --- | --- | ---- |
+    | 0   | `motor1_rot/motor` | -1  | 1   | 1    |
+    | 1   | `motor2_rot/motor` | -1  | 1   | 1    |
 
     ## Observation space
     `Box(-inf, inf, (8,), float64)`, for the unedited body:
 
-    | Num | Observation         | Min    | Max   | Unit  |
-    | --- | ------------------- | ------ | ----- | ----- |
-    | 0   | free_body_rot/angle | -inf   | inf   | rad   |
-    | 1   | motor1_rot/angle    | -1.745 | 1.745 | rad   |
-    | 2   | motor2_rot/angle    | -1.745 | 1.745 | rad   |
-    | 3   | slider1/velocity    | -inf   | inf   | m/s   |
-    | 4   | slider2/velocity    | -inf   | inf   | m/s   |
-    | 5-7 | */velocity          | -inf   | inf   | rad/s |
+    | Num | Observation           | Min    | Max   | Unit  |
+    | --- | --------------------- | ------ | ----- | ----- |
+    | 0   | `free_body_rot/angle` | -inf   | inf   | rad   |
+    | 1   | `motor1_rot/angle`    | -1.745 | 1.745 | rad   |
+    | 2   | `motor2_rot/angle`    | -1.745 | 1.745 | rad   |
+    | 3   | `slider1/velocity`    | -inf   | inf   | m/s   |
+    | 4   | `slider2/velocity`    | -inf   | inf   | m/s   |
+    | 5-7 | `*/velocity`          | -inf   | inf   | rad/s |
 
     ## Reward
     `forward_reward - ctrl_cost`: the velocity along x, m/s, minus `0.0001 sum(action^2)`.

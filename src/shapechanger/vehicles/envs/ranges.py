@@ -130,29 +130,29 @@ class RangesEnv(DriveEnv):
     of the profile, 1/20 s. Where the vehicle stands, a throttle other than 0 acts with a size of at
     least 0.25, which moves it.
 
-    | Num | Action   | Min | Max | Unit |
-    | --- | -------- | --- | --- | ---- |
-    | 0   | steering | -1  | 1   | 1    |
-    | 1   | throttle | -1  | 1   | 1    |
+    | Num | Action     | Min | Max | Unit |
+    | --- | ---------- | --- | --- | ---- |
+    | 0   | `steering` | -1  | 1   | 1    |
+    | 1   | `throttle` | -1  | 1   | 1    |
 
     ## Observation space
     `Box((11,), float32)`: distances from the middle of the front bumper to walls and obstacles, by
     their bearings, positive to the left; speed along the heading; and rate of turn,
     counter-clockwise.
 
-    | Num | Observation  | Min | Max | Unit  |
-    | --- | ------------ | --- | --- | ----- |
-    | 0   | range/-90deg | 0   | 6   | m     |
-    | 1   | range/-60deg | 0   | 6   | m     |
-    | 2   | range/-35deg | 0   | 6   | m     |
-    | 3   | range/-15deg | 0   | 6   | m     |
-    | 4   | range/+0deg  | 0   | 6   | m     |
-    | 5   | range/+15deg | 0   | 6   | m     |
-    | 6   | range/+35deg | 0   | 6   | m     |
-    | 7   | range/+60deg | 0   | 6   | m     |
-    | 8   | range/+90deg | 0   | 6   | m     |
-    | 9   | speed        | -5  | 5   | m/s   |
-    | 10  | yaw_rate     | -15 | 15  | rad/s |
+    | Num | Observation    | Min | Max | Unit  |
+    | --- | -------------- | --- | --- | ----- |
+    | 0   | `range/-90deg` | 0   | 6   | m     |
+    | 1   | `range/-60deg` | 0   | 6   | m     |
+    | 2   | `range/-35deg` | 0   | 6   | m     |
+    | 3   | `range/-15deg` | 0   | 6   | m     |
+    | 4   | `range/+0deg`  | 0   | 6   | m     |
+    | 5   | `range/+15deg` | 0   | 6   | m     |
+    | 6   | `range/+35deg` | 0   | 6   | m     |
+    | 7   | `range/+60deg` | 0   | 6   | m     |
+    | 8   | `range/+90deg` | 0   | 6   | m     |
+    | 9   | `speed`        | -5  | 5   | m/s   |
+    | 10  | `yaw_rate`     | -15 | 15  | rad/s |
 
     ## Reward
     `DriveReward` with a metre of progress along the course for a metre forward, minus 3 for each

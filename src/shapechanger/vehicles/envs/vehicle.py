@@ -46,10 +46,10 @@ class VehicleEnv(DriveEnv):
     `Box(-1, 1, (2,), float32)`; -1 steers left, +1 drives forward. It acts for one control period
     of the profile, 1/20 s.
 
-    | Num | Action   | Min | Max | Unit |
-    | --- | -------- | --- | --- | ---- |
-    | 0   | steering | -1  | 1   | 1    |
-    | 1   | throttle | -1  | 1   | 1    |
+    | Num | Action     | Min | Max | Unit |
+    | --- | ---------- | --- | --- | ---- |
+    | 0   | `steering` | -1  | 1   | 1    |
+    | 1   | `throttle` | -1  | 1   | 1    |
 
     ## Observation space
     The camera's frame, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
@@ -249,10 +249,10 @@ class WaypointEnv(WaypointView, DriveEnv):
     `Box(-1, 1, (2,), float32)`: bearing of the free way 0.8 m ahead, where 1 is 1 rad to the right;
     and the speed, -1 for standing and 1 for full throttle. It acts for one control period, 1/20 s.
 
-    | Num | Action           | Min | Max | Unit |
-    | --- | ---------------- | --- | --- | ---- |
-    | 0   | waypoint/bearing | -1  | 1   | 1    |
-    | 1   | waypoint/speed   | -1  | 1   | 1    |
+    | Num | Action             | Min | Max | Unit |
+    | --- | ------------------ | --- | --- | ---- |
+    | 0   | `waypoint/bearing` | -1  | 1   | 1    |
+    | 1   | `waypoint/speed`   | -1  | 1   | 1    |
 
     ## Observation space
     The rectified frame, RGB, `uint8`, shape (48, 80, 3).
