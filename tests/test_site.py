@@ -188,11 +188,20 @@ def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None
         "The page of shapechanger/BigAnt-v1 has no picture: Nothing renders here.",
     )
     assert page.pictures == {}
-    for part in ("all shanks twice as long", "| hip_4/motor ", "length 0.5657 m -> 1.131 m"):
+    for part in ("all shanks twice as long", "| `hip_4/motor` ", "length 0.5657 m -> 1.131 m"):
         assert part in page.content
     monkeypatch.setenv("CI", "true")
     with pytest.raises(RenderError):
         environment_page("shapechanger/BigAnt-v1")
+
+
+def test_numbers_that_a_docstring_lacks_are_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    _require("griffe")
+    monkeypatch.setattr("scripts.site_pages._picture", lambda _: b"")
+    page = environment_page("shapechanger/Finger-v1").content
+    for row in ("| 8     | `FDP/tension`         | 0        | 25     | N     |", "`PI/command`"):
+        assert row in page
+    assert environment_page("shapechanger/Ant-v1").content.count("| Num ") == 2
 
 
 @contextmanager
