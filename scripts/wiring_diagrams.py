@@ -6,11 +6,15 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, cast
+
+import schemdraw
+from schemdraw import elements as elm
 
 from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, I2C_PINS
@@ -36,7 +40,6 @@ class Terminal:
     source: int | str  # The BCM pin that a wire leads to, or the flag of a net.
     pull: str = ""  # Net that a resistor of 10 kOhm leads to; "" for none.
     divider: bool = False  # Whether 1 kOhm lies in the wire, and 2 kOhm between pin and ground.
-    bus: bool = False  # Whether other devices share the wire.
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,7 @@ class Load:
     """What the terminals `label` of a device drive."""
 
     label: str
-    name: str
-    kind: str = "box"  # "motor", "box", "net", or "chain" for a box that hangs on the one above.
+    name: str  # Or a net.
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def devices_of(profile: Profile) -> list[Device]:
         )
         measured = any(one.driver == "ina219" for one in sensors)
         plus = BATTERY if measured else MOTORS
-        supply = (Load("+, fuse, switch", plus, "net"), Load("-", GROUND, "net"))
+        supply = (Load("+, fuse, switch", plus), Load("-", GROUND))
         found.append(Device("Battery", "with a fuse and a switch", loads=supply, parts=parts))
     return found
 
@@ -127,7 +129,7 @@ def _bridge(outputs: list[OutputPlan], profile: Profile) -> Device:
             pins[f"PH{channel}"] = settings["phase"]
         pins[f"EN{channel}"] = settings.get("enable", _NO_PIN)
         wired = wired or pins[f"EN{channel}"] != _NO_PIN
-        loads.append(Load(f"OUT {channel}", output.name, "motor"))
+        loads.append(Load(f"OUT {channel}", f"motor ({output.name})"))
     if not wired:
         pins["enable"] = LOGIC if profile.enable_pin is None else ENABLE
     wires = _wires({**pins, "VM": MOTORS, "GND": GROUND}, pull=GROUND)
@@ -152,7 +154,7 @@ def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
         (f"resistor {resistor} kOhm", 1, f"its time: {hold_ms} ms"),
         ("film or ceramic capacitor 1 uF", 1, "its time"),
     )
-    load = Load("2Q", ENABLE if for_bridges else "MOSFET in the motors' supply", "net")
+    load = Load("2Q", ENABLE if for_bridges else "MOSFET in the motors' supply")
     return Device("One-shot 74HC123", f"drops after {hold_ms} ms", wires, (load,), parts)
 
 
@@ -167,7 +169,7 @@ def _direct(output: OutputPlan) -> Device:
     signal = Terminal("signal", source, pull=GROUND)
     if output.driver == "esc":
         wires = (signal, *_wires({"battery +": MOTORS, "GND": GROUND}))
-        loads = (Load("motor wires", output.name, "motor"),)
+        loads = (Load("motor wires", f"motor ({output.name})"),)
         parts = ((_ESC, 1, output.name),)
         return Device(f"ESC ({output.name})", "BEC powers the servos", wires, loads, parts)
     wires = (signal, *_wires({"V+": "5 to 6 V", "GND": GROUND}))
@@ -198,11 +200,10 @@ def _servo_board(outputs: list[OutputPlan]) -> Device:
 
 def _i2c(bus: int) -> tuple[Terminal, ...]:
     """Return the terminals of a board on an I2C bus."""
-    words = f"I2C bus {bus}"
-    pins = I2C_PINS.get(bus, (words, words))
+    pins = I2C_PINS.get(bus, (f"I2C bus {bus}",) * 2)
     lines = zip(("SDA", "SCL"), pins, strict=True)
     return (
-        *(Terminal(label, pin, bus=pin != words) for label, pin in lines),
+        *(Terminal(label, pin) for label, pin in lines),
         *_wires({"VCC": LOGIC, "GND": GROUND}),
     )
 
@@ -210,8 +211,7 @@ def _i2c(bus: int) -> tuple[Terminal, ...]:
 def _servo_bus(servos: list[OutputPlan]) -> Device:
     model, device = servos[0].settings["model"], servos[0].settings["device"]
     loads = tuple(
-        Load("", f"{one.name}: {one.settings['model']}, id {one.settings['id']}", "chain")
-        for one in servos
+        Load("", f"{one.name}: {one.settings['model']}, id {one.settings['id']}") for one in servos
     )
     wires = _wires({"USB": device, "supply": "servo supply", "GND": GROUND})
     parts = (
@@ -282,7 +282,7 @@ _SENSORS: Final[dict[str, Callable[[SensorPlan], Device]]] = {
     "switch": _switch,
     "hcsr04": _hcsr04,
     "mpu6050": _board("MPU-6050"),
-    "ina219": _board("INA219", Load("Vin+", BATTERY, "net"), Load("Vin-", MOTORS, "net")),
+    "ina219": _board("INA219", Load("Vin+", BATTERY), Load("Vin-", MOTORS)),
     "as5600": _as5600,
 }
 
@@ -296,12 +296,12 @@ def pin_table(profile: Profile) -> str:
     for device in devices_of(profile):
         for wire in device.terminals:
             if isinstance(wire.source, int):
-                words = f"{device.title} {wire.label}"
+                text = f"{device.title} {wire.label}"
                 if wire.pull:
-                    words += f", 10 kOhm to {'ground' if wire.pull == GROUND else wire.pull}"
+                    text += f", 10 kOhm to {'ground' if wire.pull == GROUND else wire.pull}"
                 if wire.divider:
-                    words += ", through 1 kOhm, and 2 kOhm from the pin to ground"
-                used.setdefault(wire.source, []).append(words)
+                    text += ", through 1 kOhm, and 2 kOhm from the pin to ground"
+                used.setdefault(wire.source, []).append(text)
     if not used:
         return "None: everything is on a bus or a cable."
     rows = [f"| GPIO{pin} | {_POSITIONS[pin]} | {'; '.join(used[pin])} |" for pin in sorted(used)]
@@ -332,209 +332,103 @@ def part_list(profile: Profile) -> str:
     return "\n".join(["| part | number | for |", "|---|---|---|", *rows])
 
 
-# Drawing. Lengths are pixels.
+# Drawing. Lengths are schemdraw's units, of 36 pixels.
 
-_WIDTH: Final = 940
-_HEADER_X: Final = 40
-_HEADER_PITCH: Final = 17
-_PI_X: Final = 130
-_PI_WIDTH: Final = 130
-_PI_EDGE: Final = _PI_X + _PI_WIDTH
-_BUS_X: Final = 330  # Of the first wire that several devices share.
-_BUS_PITCH: Final = 14
-_PULL_X: Final = 385
-_FLAG_X: Final = 470  # Where flags of nets end.
-_BOX_X: Final = 500
-_BOX_WIDTH: Final = 190
-_BOX_EDGE: Final = _BOX_X + _BOX_WIDTH
-_LOAD_X: Final = 740
-_LOAD_WIDTH: Final = 190
-_ROW: Final = 26
-_PULLED_ROW: Final = 46
-_LOAD_ROW: Final = 34
-_TITLE: Final = 52
-_GAP: Final = 26
-_TOP: Final = 40
+_BOX_X: Final = 12.0
+_BOX_WIDTH: Final = 5.4
+_ROW: Final = 0.8
+_PULLED_ROW: Final = 1.3
+_TITLE: Final = 1.4
+_GAP: Final = 0.8
+_WIRE: Final = 2.6
+_INK: Final = "black"  # The page's colour takes its place.
 _COLOURS: Final = (
     *("#d1495b", "#2e7dd1", "#2a9d4a", "#8e5cc9", "#b8740b", "#0d8f9c", "#c2408f", "#6b7f1e"),
     *("#9c6b4f", "#5b6fb5", "#e0562b", "#4f8f7a"),
 )
-
-
-@dataclass
-class _Drawing:
-    """Elements of an image, the colours of pins, and the places of wires that devices share."""
-
-    elements: list[str] = field(default_factory=list[str])
-    colours: dict[int, str] = field(default_factory=dict[int, str])
-    shared: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
-
-    def add(self, tag: str, content: str = "", **attributes: float | str) -> None:
-        given = {"fill": "none", "stroke": "currentColor", "stroke-width": 1.5}
-        if tag == "text":
-            given = {}
-        given |= {name.replace("_", "-"): value for name, value in attributes.items()}
-        texts = (
-            f'{name}="{value if isinstance(value, str) else f"{value:g}"}"'
-            for name, value in given.items()
-        )
-        self.elements.append(f"<{tag} {' '.join(texts)}>{escape(content)}</{tag}>")
-
-    def colour(self, pin: int) -> str:
-        """Return the colour of a pin's wire."""
-        return self.colours.setdefault(pin, _COLOURS[len(self.colours) % len(_COLOURS)])
-
-    def line(self, *points: tuple[float, float], colour: str = "currentColor") -> None:
-        path = " ".join(f"{x:g},{y:g}" for x, y in points)
-        self.add("polyline", points=path, stroke=colour, stroke_width=2)
-
-    def text(
-        self, x: float, y: float, words: str, anchor: str = "start", bold: bool = False
-    ) -> None:
-        weight = "bold" if bold else "normal"
-        self.add("text", words, x=x, y=y + 4, text_anchor=anchor, font_weight=weight)
-
-    def dot(self, x: float, y: float, colour: str) -> None:
-        self.add("circle", cx=x, cy=y, r=3.5, fill=colour, stroke="none")
-
-    def box(self, x: float, y: float, width: float, height: float, fill: str = "none") -> None:
-        self.add("rect", x=x, y=y, width=width, height=height, rx=4, fill=fill)
-
-    def resistor(self, x: float, y: float, net: str, words: str) -> None:
-        """Draw a resistor down from a wire to ground, or to the flag of a net."""
-        self.line((x, y), (x, y + 6))
-        self.box(x - 4, y + 6, 8, 16)
-        self.line((x, y + 22), (x, y + 27))
-        self.text(x + 9, y + 14, words)
-        if net == GROUND:
-            self.ground(x, y + 27)
-        else:
-            self.line((x - 8, y + 27), (x + 8, y + 27))
-            self.text(x + 11, y + 29, net)
-
-    def ground(self, x: float, y: float) -> None:
-        for half, down in ((8, 0), (5, 4), (2, 8)):
-            self.line((x - half, y + down), (x + half, y + down))
-
-    def bus_x(self, pin: int) -> float:
-        return _BUS_X + _BUS_PITCH * list(self.shared).index(pin)
+_NETS_OF_HEADER: Final = {1: LOGIC, 17: LOGIC, 2: FIVE, 4: FIVE} | dict.fromkeys(_GROUNDS, "GND")
 
 
 def draw_wiring(profile: Profile, name: str) -> str:
     """Return the wiring of a robot as an SVG element.
 
-    Wires have the colours of their positions on the header; text and boxes have the page's.
+    A wire carries the pin that it leads to, in the pin's colour; text and boxes have the page's.
 
     Args:
         profile: The profile.
         name: What the image is called.
     """
-    drawing = _Drawing()
+    schemdraw.use("svg")
     devices = devices_of(profile)
-    y = float(_TOP)
-    for device in devices:
-        y = _draw_device(drawing, device, y) + _GAP
-    # Wires that several devices share lead from the first to the last one.
-    for pin, places in drawing.shared.items():
-        if len(places) > 1:
-            x, colour = drawing.bus_x(pin), drawing.colour(pin)
-            drawing.line((x, places[0]), (x, places[-1]), colour=colour)
-            for place in places[:-1]:
-                drawing.dot(x, place, colour)
-    if any(isinstance(one.source, int) for device in devices for one in device.terminals):
-        y = max(y, _TOP + 24.0 * _HEADER_PITCH)
-        _draw_header(drawing)
-        drawing.box(_PI_X, _TOP - 26, _PI_WIDTH, y - _GAP - _TOP + 40)
-        drawing.text(_PI_X + _PI_WIDTH / 2, _TOP - 10, "Raspberry Pi", "middle", bold=True)
-    what = ", ".join(device.title for device in devices)
-    title = escape(f"Wiring of {name}: a Raspberry Pi with {what}")
-    body = "\n".join(drawing.elements)
-    return (
-        f'<svg class="wiring" xmlns="http://www.w3.org/2000/svg" role="img" '
-        f'viewBox="0 0 {_WIDTH} {y:g}" font-family="sans-serif" font-size="13" '
-        f'fill="currentColor" aria-label="{title}">\n<title>{title}</title>\n{body}\n</svg>'
+    wires = (wire for device in devices for wire in device.terminals)
+    pins = list(dict.fromkeys(wire.source for wire in wires if isinstance(wire.source, int)))
+    colours = {pin: _COLOURS[at % len(_COLOURS)] for at, pin in enumerate(pins)}
+    drawing = schemdraw.Drawing(
+        show=False, fontsize=10, font="sans-serif", color=_INK, lw=1.3, margin=1.0
     )
+    top = 0.0
+    for device in devices:
+        top = _draw_device(drawing, device, top, colours) - _GAP
+    if pins:
+        named = _NETS_OF_HEADER | {_POSITIONS[pin]: f"GPIO{pin}" for pin in pins}
+        left = [f"{named.get(at, '')}  {at}" for at in range(1, 41, 2)]
+        right = [f"{at}  {named.get(at, '')}" for at in range(2, 41, 2)]
+        header = elm.Header(rows=20, cols=2, pinsleft=left, pinsright=right, shownumber=False)
+        drawing += header.at((2.5, -12.6)).label("Raspberry Pi", "top")
+    title = escape(f"Wiring of {name}: a Raspberry Pi with {', '.join(d.title for d in devices)}")
+    drawn = drawing.get_imagedata("svg").decode().replace(_INK, "currentColor")
+    _, attributes, body = re.split(r"(?<=<svg )([^>]*)>", drawn, maxsplit=1)
+    size = re.findall(r'viewBox="[^"]*"', attributes)
+    head = f'class="wiring" role="img" xmlns="http://www.w3.org/2000/svg" {size[0]}'
+    return f'<svg {head} aria-label="{title}">\n<title>{title}</title>\n{body}'
 
 
-def _draw_device(drawing: _Drawing, device: Device, top: float) -> float:
+def _draw_device(
+    drawing: schemdraw.Drawing, device: Device, top: float, colours: Mapping[int, str]
+) -> float:
     """Draw a device, and return its lower end."""
-    first = top + _TITLE if device.note else top + _TITLE - 18
-    y = first
+    y = first = top - (_TITLE if device.note else _TITLE - 0.4)
     for wire in device.terminals:
-        _draw_wire(drawing, wire, y)
-        y += _PULLED_ROW if wire.pull or wire.divider else _ROW
-    loads = first
+        _draw_wire(drawing, wire, y, colours)
+        y -= _PULLED_ROW if wire.pull or wire.divider else _ROW
+    loads, edge = first, _BOX_X + _BOX_WIDTH
     for load in device.loads:
-        hangs = load.kind == "chain" and loads > first
-        _draw_load(drawing, load, loads, _LOAD_ROW if hangs else 0)
-        loads += _LOAD_ROW
-    bottom = max(y, loads, first + _ROW) - _ROW / 2
-    drawing.box(_BOX_X, top, _BOX_WIDTH, bottom - top)
-    middle = _BOX_X + _BOX_WIDTH / 2
-    drawing.text(middle, top + 12, device.title, "middle", bold=True)
-    drawing.text(middle, top + 28, device.note, "middle")
+        drawing += elm.Line().at((edge, loads)).to((edge + 0.6, loads))
+        _write(drawing, edge - 0.15, loads, load.label, "right")
+        _write(drawing, edge + 0.75, loads, load.name, "left")
+        loads -= _ROW
+    bottom = min(y, loads, first - _ROW) + _ROW / 2
+    drawing += elm.Rect((0.0, bottom - top), (_BOX_WIDTH, 0.0)).at((_BOX_X, top)).theta(0)
+    _write(drawing, _BOX_X + _BOX_WIDTH / 2, top - 0.4, device.title, "center")
+    _write(drawing, _BOX_X + _BOX_WIDTH / 2, top - 0.85, device.note, "center")
     return bottom
 
 
-def _draw_wire(drawing: _Drawing, wire: Terminal, y: float) -> None:
-    drawing.text(_BOX_X + 8, y, wire.label)
-    colour = "currentColor"
-    if isinstance(wire.source, str):
-        start = _PULL_X - 10 if wire.pull else _FLAG_X + 8
-        if wire.source == GROUND:
-            drawing.line((_FLAG_X + 8, y), (_FLAG_X + 8, y + 4))
-            drawing.ground(_FLAG_X + 8, y + 4)
-        else:
-            drawing.text(start - 6, y, wire.source, "end")
-    else:
-        pin, colour = wire.source, drawing.colour(wire.source)
-        start = drawing.bus_x(pin) if pin in drawing.shared else _PI_EDGE
-        if wire.bus:
-            drawing.shared.setdefault(pin, []).append(y)
-        if start == _PI_EDGE:
-            drawing.text(_PI_EDGE - 8, y, f"GPIO{pin}  ({_POSITIONS[pin]})", "end")
-    drawing.line((start, y), (_BOX_X, y), colour=colour)
+def _draw_wire(
+    drawing: schemdraw.Drawing, wire: Terminal, y: float, colours: Mapping[int, str]
+) -> None:
+    pin, colour, text = wire.source, _INK, str(wire.source)
+    if isinstance(pin, int):
+        colour, text = colours[pin], f"GPIO{pin} ({_POSITIONS[pin]})"
+    end, middle = _BOX_X - _WIRE, (_BOX_X - _WIRE / 2, y)
+    drawing += elm.Line().at((_BOX_X, y)).to((end, y)).color(colour)
+    _write(drawing, _BOX_X + 0.15, y, wire.label, "left")
+    _write(drawing, end - 0.15, y, text, "right", colour)
     if wire.pull or wire.divider:
-        drawing.dot(_PULL_X, y, colour)
-        drawing.resistor(_PULL_X, y, wire.pull or GROUND, "10 kΩ" if wire.pull else "2 kΩ")
+        drawing += elm.Dot(radius=0.06).at(middle).color(colour)
+        drawing += elm.RBox().at(middle).down().length(0.8).scale(0.4)
+        resistor = f"{'10 kΩ' if wire.pull else '2 kΩ'} to {wire.pull or GROUND}"
+        _write(drawing, middle[0] - 0.2, y - 0.5, resistor, "right")
     if wire.divider:
-        drawing.box(430, y - 4, 22, 8, fill="var(--md-default-bg-color, white)")
-        drawing.text(441, y - 12, "1 kΩ", "middle")
+        drawing += elm.RBox().at((_BOX_X, y)).left().length(_WIRE / 2).scale(0.4).color(colour)
+        _write(drawing, _BOX_X - 0.15, y - 0.4, "1 kΩ", "right")
 
 
-def _draw_load(drawing: _Drawing, load: Load, y: float, hangs: float) -> None:
-    """Draw a load, at the device or below another load that is `hangs` higher."""
-    drawing.text(_BOX_EDGE - 8, y, load.label, "end")
-    if load.kind == "net":
-        drawing.line((_BOX_EDGE, y), (_BOX_EDGE + 22, y))
-        drawing.text(_BOX_EDGE + 28, y, load.name)
-    elif load.kind == "motor":
-        for offset in (-5, 5):
-            drawing.line((_BOX_EDGE, y + offset), (_LOAD_X + 2, y + offset))
-        drawing.add("circle", cx=_LOAD_X + 13, cy=y, r=12)
-        drawing.text(_LOAD_X + 13, y, "M", "middle")
-        drawing.text(_LOAD_X + 32, y, load.name)
-    else:
-        if hangs:
-            drawing.line((_LOAD_X + 20, y - hangs + 12), (_LOAD_X + 20, y - 12))
-        else:
-            drawing.line((_BOX_EDGE, y), (_LOAD_X, y))
-        drawing.box(_LOAD_X, y - 12, _LOAD_WIDTH, 24)
-        drawing.text(_LOAD_X + 8, y, load.name)
-
-
-def _draw_header(drawing: _Drawing) -> None:
-    """Draw the header's 40 positions, with the used ones in the colours of their wires."""
-    drawing.text(_HEADER_X + 8, _TOP - 10, "Header", "middle", bold=True)
-    for position in range(1, 41):
-        row, right = divmod(position - 1, 2)
-        x, y = _HEADER_X + 17 * right, _TOP + _HEADER_PITCH * (row + 0.6)
-        used = drawing.colours.get(BCM_OF_BOARD.get(position, _NO_PIN), "none")
-        colour = "currentColor" if position in _GROUNDS else used
-        drawing.add("circle", cx=x, cy=y, r=6, fill=colour, stroke_width=1)
-        drawing.text(x + (12 if right else -12), y, str(position), "start" if right else "end")
-    for number, words in enumerate(("filled: GND", "1, 17: 3.3 V", "2, 4: 5 V")):
-        drawing.text(_HEADER_X + 8, _TOP + _HEADER_PITCH * (21 + number), words, "middle")
+def _write(
+    drawing: schemdraw.Drawing, x: float, y: float, text: str, align: str, colour: str = _INK
+) -> None:
+    label = elm.Label().at((x, y)).theta(0).color(colour)
+    drawing += label.label(text, ofst=0, halign=cast("Any", align), valign="center")
 
 
 def main() -> None:
