@@ -59,6 +59,17 @@ def test_a_closed_socket_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.s
     assert channel.lost
 
 
+def test_a_daemon_that_leaves_states_unread_is_lost(
+    ends: tuple[DaemonChannel, socket.socket],
+) -> None:
+    """The connection is reset, which is no order."""
+    channel, daemon = ends
+    channel.send(NO_STATE)
+    daemon.close()
+    assert channel.orders() == ([], [])
+    assert channel.lost
+
+
 def test_a_closed_life_pipe_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.socket]) -> None:
     channel, daemon = ends
     watched, held = os.pipe()
@@ -105,15 +116,17 @@ def test_a_heart_beats_once_a_period_until_the_supervisor_is_gone(
 ) -> None:
     ours, supervisor = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
     with supervisor, socket.socket(fileno=ours.detach()) as kept:
-        heart = Heartbeat(kept.fileno(), period_s=0.5)
-        beats: list[bytes] = []
+        heart = Heartbeat(kept.fileno(), period_s=2.0)
+        assert heart.lost is False
+        assert not os.get_inheritable(heart.fileno())
+        beats: dict[int, bytes] = {}
         supervisor.setblocking(False)
-        for at_ns in (1_000_000_000, 1_499_999_999, 1_500_000_000, 1_500_000_001):
+        for at_ns in (2_000_000_000, 3_999_999_999, 4_000_000_000, 4_000_000_001):
             monkeypatch.setattr("time.monotonic_ns", lambda at_ns=at_ns: at_ns)
             heart.beat()
             with contextlib.suppress(BlockingIOError):
-                beats.append(supervisor.recv(8))
-        assert beats == [b".", b"."]
+                beats[at_ns] = supervisor.recv(8)
+        assert beats == {2_000_000_000: b".", 4_000_000_000: b"."}
         supervisor.close()
         heart.beat()
         assert heart.lost

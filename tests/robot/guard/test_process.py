@@ -3,6 +3,7 @@
 import itertools
 import logging
 import os
+import signal
 import socket
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
@@ -15,7 +16,7 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.contract.plan import GuardPlan, LimitPlan, SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard import sensors
+from shapechanger.robot.guard import process, sensors
 from shapechanger.robot.guard.channel import (
     DaemonChannel,
     GuardState,
@@ -25,6 +26,7 @@ from shapechanger.robot.guard.channel import (
     encode,
 )
 from shapechanger.robot.guard.process import Guard, main
+from shapechanger.robot.guard.running import AFTER_FAILURE, GUARD, ServePlan, plan_fd
 from tests.robot.guard.plans import MS, arm, command, quick_car
 
 _T0 = 1_000 * MS
@@ -36,6 +38,8 @@ class _Clock:
     def __init__(self) -> None:
         self.time_ns = _T0
         self.events: list[tuple[int, Callable[[], object]]] = []
+        self.waits: list[tuple[Sequence[int], float]] = []
+        self.beat: Callable[[], object] | None = None
 
     def at(self, ms: int, event: Callable[[], object]) -> None:
         """Schedule an event, in milliseconds after the start."""
@@ -46,9 +50,10 @@ class _Clock:
         return self.time_ns
 
     def keep_alive(self, beat: Callable[[], object]) -> None:
-        pass
+        self.beat = beat
 
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        self.waits.append((readable, at_most_s))
         if self.events and self.events[0][0] <= until_ns:
             self.time_ns, event = self.events.pop(0)
             event()
@@ -159,12 +164,61 @@ def test_states_are_sent_on_change_and_at_50_hz(make: _Make) -> None:
     assert max(gaps) <= 20 * MS
 
 
+def test_states_without_news_are_sent_at_every_second_tick(make: _Make) -> None:
+    bench = make(_plan())
+    bench.clock.at(25, lambda: bench.send(command(7, _T0)))
+    bench.run(95)
+    at_ms = [(state.at_ns - _T0) / MS for state in bench.states]
+    assert at_ms == [0.0, 20.0, 25.0, 40.0, 60.0, 80.0, 95.0]  # It ends at 95 ms.
+    assert {(s.applied_session, s.applied_seq, s.applied_ns) for s in bench.states} == {
+        (0, None, None)
+    }
+
+
+def test_each_output_is_written_once_a_tick(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make(_plan())
+    drive = bench.guard._outputs._drivers[0][1]
+    written: list[int] = []
+    monkeypatch.setattr(drive, "write", lambda value, now_ns: written.append(now_ns) or value)
+    bench.run(45)
+    assert written == [_T0 + ms * MS for ms in (0, 10, 20, 30, 40, 45)]
+
+
+def test_the_guard_waits_for_the_supervisor_and_a_living_daemon(make: _Make) -> None:
+    bench = make(_plan())
+    heart, daemon = bench.heartbeat.fileno(), bench._channel.filenos()
+    bench.clock.at(15, bench.daemon.close)
+    bench.clock.at(50, lambda: setattr(bench.guard, "ended", "the test is over"))
+    bench.guard.run(bench.heartbeat)
+    assert bench.clock.waits[0] == ([heart, *daemon], 0.01)
+    assert bench.clock.waits[-1] == ([heart], 0.01)
+    assert bench.clock.beat == bench.heartbeat.beat
+    assert bench.guard._rules.disarmed == "Disarmed: the daemon is gone."
+
+
 def test_a_refusal_is_sent_once(make: _Make) -> None:
     bench = make(_plan())
     bench.clock.at(5, lambda: bench.send(command(7, _T0)))
     bench.run(50)
     refused = [(s.refused, s.refused_seq) for s in bench.states if s.refused]
     assert refused == [("Command 7 is refused. Not armed.", 7)]
+
+
+def test_reasons_of_a_state_fit_into_a_datagram(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sensor = _Sensor()
+    bench = _with(make, monkeypatch, {"bumper": sensor}, "bump")
+    bench.clock.at(5, lambda: bench.send(Order("disarm", reason="x" * 200), command(7, _T0)))
+    bench.clock.at(35, lambda: bench.send(arm(_T0 + 35 * MS)))
+    bench.clock.at(36, lambda: setattr(sensor, "reading", RobotError("y" * 900)))
+    bench.clock.at(56, lambda: setattr(sensor, "reading", RobotError("z" * 1100)))
+    state = bench.run(80)
+    refused = [s.refused for s in bench.states if s.refused]
+    assert refused == [f"Command 7 is refused. Disarmed: {'x' * 200}"]
+    assert any(s.stop_reason.endswith("y" * 900) for s in bench.states)
+    assert state.stop_reason.endswith("z...")
+    assert len(state.stop_reason) == 1003
 
 
 def test_a_full_socket_drops_states_and_does_not_stop_the_guard(make: _Make) -> None:
@@ -192,7 +246,8 @@ def test_the_button_is_an_emergency_stop(make: _Make) -> None:
     bench.clock.at(60, lambda: bench.send(arm(_T0, 1)))
     state = bench.run(80)
     assert (state.armed, state.emergency, state.emergencies) == (False, True, 1)
-    assert any("button is pressed" in s.refused for s in bench.states)
+    refused = [(s.refused, s.refused_seq) for s in bench.states if "button" in s.refused]
+    assert refused == [("Not armed: the emergency button is pressed.", None)]
     assert bench.duty(22) == 0.0
 
 
@@ -215,6 +270,80 @@ def test_a_lost_supervisor_ends_the_guard(make: _Make) -> None:
     bench.clock.at(15, bench.supervisor.close)
     bench.guard.run(bench.heartbeat)
     assert bench.guard.ended == "the supervisor is gone"
+
+
+def test_an_order_or_a_signal_ends_the_guard(make: _Make) -> None:
+    bench = make(_plan())
+    assert bench.guard.ended == ""
+    bench.clock.at(15, lambda: bench.send(Order("end")))
+    bench.guard.run(bench.heartbeat)
+    assert bench.guard.ended == "the daemon ended it"
+    assert bench.read()[-1].stop_reason == "Disarmed: the guard ends."
+    bench.guard.ended = ""
+    bench.guard.end(signal.SIGTERM, None)
+    bench.guard.end(signal.SIGINT, None)
+    assert bench.guard.ended == "ended by SIGTERM"
+    bench.guard.close()
+    assert bench.guard.is_safe is True
+
+
+def test_the_log_has_a_line_for_each_event(
+    make: _Make, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    sensor = _Sensor()
+    bench = _with(make, monkeypatch, {"bumper": sensor}, "bump")
+    _drives(bench)
+    for ms, order in ((15, b"{"), (16, b"{"), (17, b"x" * 300)):
+        bench.clock.at(ms, lambda order=order: bench.daemon.send(order))
+    bench.clock.at(25, lambda: setattr(sensor, "reading", RobotError("No answer.")))
+    bench.clock.at(45, lambda: setattr(sensor, "reading", {"bump": 0.0}))
+    bench.clock.at(65, lambda: bench.send(Order("disarm", reason="lunch.")))
+    bench.run(80)
+
+    def fail() -> None:
+        raise RobotError("No power.")
+
+    monkeypatch.setattr(bench.guard._outputs._drivers[1][1], "close", fail)
+    bench.guard.close()
+    assert bench.guard.is_safe is False
+    malformed = "datagrams were no orders: Invalid order: "
+    said = [record.getMessage() for record in caplog.records]
+    assert said[:2] == ["Not armed.", "Armed."]
+    assert [line.partition("Invalid order: ")[0] for line in said[2:5]] == [
+        f"{number} {malformed.removesuffix('Invalid order: ')}" for number in (1, 2, 3)
+    ]
+    assert said[5:] == [
+        "Sensor bumper fails: No answer.",
+        "Sensor bumper responds again.",
+        "Disarmed: lunch.",
+        "Output steer: No power.",
+    ]
+
+
+def test_outputs_that_are_not_ready_are_not_armed(
+    make: _Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Meanwhile the guard stays alive, and later orders of the same round count."""
+    bench = make(_plan(enable_pin=5))
+    pin = bench.factory.pin(5)
+
+    def ready(stay_alive: Callable[[], None]) -> str:
+        pin.clear_states()
+        beats.append(len(bench.supervisor.recv(1 << 16)))
+        stay_alive()
+        beats.append(len(bench.supervisor.recv(1 << 16)))
+        assert len(pin.states) == 2
+        return "servo 3 is hot."
+
+    beats: list[int] = []
+    monkeypatch.setattr(bench.guard._outputs, "ready", ready)
+    bench.clock.at(15, lambda: bench.send(arm(_T0), Order("emergency", reason="fire.")))
+    state = bench.run(30)
+    refused = [(s.refused, s.refused_seq) for s in bench.states if s.refused]
+    assert refused == [("Not armed: servo 3 is hot.", None)]
+    assert beats[1] == 1
+    assert state.stop_reason == "Emergency stop: fire."
 
 
 def test_a_failed_output_stops_all_until_rearmed(
@@ -244,8 +373,34 @@ def test_a_failed_output_stops_all_until_rearmed(
     assert "NOT at rest: Output drive: Output drive does not answer." in stopped[0].stop_reason
     assert "NOT at rest" not in stopped[-1].stop_reason
     assert stopped[-1].emergencies == 2  # Arming before the output recovered failed again.
+    assert stopped[-1].stop_reason == (
+        "Emergency stop: Output drive: Output drive does not answer."
+    )
+    assert {(s.applied_session, s.applied_ns) for s in stopped} == {(0, None)}
     assert state.applied_seq == 2
     assert steer.write(0.0, 0) == 0.0
+
+
+def test_all_failures_of_outputs_are_reported(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also an error without a text; drivers get the time of the round."""
+    bench = make(_plan())
+    _drives(bench)
+    times: list[int] = []
+
+    def fail(value: float, now_ns: int) -> float:
+        times.append(now_ns)
+        raise ValueError
+
+    for _, driver in bench.guard._outputs._drivers:
+        bench.clock.at(31, lambda driver=driver: monkeypatch.setattr(driver, "write", fail))
+    state = bench.run(50)
+    failures = "Output drive: ValueError Output steer: ValueError"
+    assert state.stop_reason == f"NOT at rest: {failures} Emergency stop: ValueError"
+    assert times[0] == _T0 + 31 * MS
+    assert set(times) == {_T0 + ms * MS for ms in (31, 40, 50)}
+    monkeypatch.undo()
+    bench.guard.close()
+    assert bench.guard.is_safe is True
 
 
 def test_outputs_are_released_once_per_stop(make: _Make) -> None:
@@ -310,8 +465,10 @@ class _Sensor:
 
     def __init__(self) -> None:
         self.reading: dict[str, float] | Exception = {"bump": 0.0}
+        self.asked: list[tuple[int, float]] = []
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        self.asked.append((now_ns, direction))
         if isinstance(self.reading, Exception):
             raise self.reading
         return self.reading
@@ -356,6 +513,7 @@ def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
     ]
     assert bench.states[-1].bumps == 1
     assert bench.states[-1].sources["collision"] == "bumper"
+    assert sensor.asked[:3] == [(_T0, 0.0), (_T0 + 10 * MS, 1.0), (_T0 + 20 * MS, 1.0)]
 
 
 class _SlowSensor(_Sensor):
@@ -465,8 +623,97 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
     OutputDevice(22, pin_factory=hardware.factory).close()  # The pin is free.
 
 
+class _Program:
+    """The program of the guard, in this process, on a fake clock."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.clock = _Clock()
+        self.factory = MockFactory(pin_class=MockPWMPin)
+        self.hardware = SimpleNamespace(
+            clock=self.clock,
+            pin_factory=lambda: self.factory,
+            close=lambda: self.did.append("closed"),
+        )
+        self.did: list[object] = []
+        monkeypatch.setattr(process, "connect", self._connect)
+        monkeypatch.setattr(process, "run_promptly", self.did.append)
+        self.daemon, guards = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.supervisor, heart = socket.socketpair()
+        plan = ServePlan(guard=_plan(), daemon={}, hardware=("machine", "argument"))
+        self.fds = plan_fd(plan), guards.detach(), heart.detach()
+
+    def _connect(self, *given: str) -> SimpleNamespace:
+        self.did += [given, {signal.SIGTERM, signal.SIGINT} <= _blocked()]
+        return self.hardware
+
+    def run(self, *first: str) -> list[GuardState]:
+        names = ("--plan-fd", "--daemon-fd", "--heartbeat-fd")
+        pairs = [text for name, fd in zip(names, self.fds, strict=True) for text in (name, str(fd))]
+        try:
+            main([*first, *pairs])
+        finally:
+            found: list[GuardState] = []
+            while data := self.daemon.recv(1 << 16):
+                found.append(decode_state(data))
+            for fd in (self.fds[0], self.fds[2]):  # The supervisor must not see the guard die.
+                os.close(fd)
+            self.daemon.close()
+            self.supervisor.close()
+        return found
+
+
+def _blocked() -> set[int]:
+    return {int(number) for number in signal.pthread_sigmask(signal.SIG_BLOCK, ())}
+
+
+@pytest.fixture
+def program(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Program]:
+    """A program, after which signals are handled as before."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    yield _Program(monkeypatch)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    assert not {signal.SIGTERM, signal.SIGINT} & _blocked()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_program_guards_until_a_signal(
+    program: _Program, capfd: pytest.CaptureFixture[str], number: signal.Signals
+) -> None:
+    program.clock.at(20, lambda: os.kill(os.getpid(), number))
+    states = program.run()
+    assert program.did == [("machine", "argument"), True, GUARD, "closed"]
+    assert states[0].emergencies == 0
+    assert capfd.readouterr().err.splitlines() == [
+        "guard: guards test car with 2 outputs.",
+        "guard: Not armed.",
+        f"guard: ends: ended by {number.name}.",
+    ]
+
+
+def test_the_program_after_a_failure_starts_in_emergency_stop(program: _Program) -> None:
+    program.clock.at(20, lambda: program.daemon.send(encode(Order("end"))))
+    assert program.run(AFTER_FAILURE)[0].emergencies == 1
+
+
+def test_the_program_exits_with_an_error_if_an_output_is_stuck(
+    program: _Program, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def stick(_: float) -> None:
+        raise OSError("stuck")
+
+    program.clock.at(19, lambda: setattr(program.factory.pin(22), "_set_state", stick))
+    program.clock.at(19, lambda: program.daemon.send(encode(Order("end"))))
+    with pytest.raises(SystemExit) as ended:
+        program.run()
+    assert ended.value.code == 1
+    lines = capfd.readouterr().err.splitlines()
+    assert lines[-1] == "guard: ends, for RobotError: not all outputs are at rest"
+
+
 def test_wrong_arguments_exit_with_one_line(capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["--plan-fd", "3"])
     assert ended.value.code == 1
-    assert capfd.readouterr().err.count("\n") == 1
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("guard: ends, for ValueError: This takes --plan-fd N")

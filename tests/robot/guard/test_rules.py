@@ -8,7 +8,7 @@ import pytest
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, SensorPlan, StopPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import Order
-from shapechanger.robot.guard.rules import Rules
+from shapechanger.robot.guard.rules import RobotHealth, Rules, Stopping
 from shapechanger.robot.guard.sensors import Sensing
 from tests.robot.guard.plans import MS, arm, car, command, quick_car
 
@@ -30,8 +30,11 @@ def _driving(plan: GuardPlan, values: tuple[float, ...] = (0.5, 0.5)) -> Rules:
 
 def test_a_new_guard_is_not_armed() -> None:
     rules = Rules(quick_car(), _T0)
+    assert rules.senses == Sensing()
+    assert RobotHealth(quick_car()).reason == ""
     assert "Not armed" in rules.offer(command(1, _T0), _T0)
     decision = rules.tick(_T0)
+    assert decision.session == 0
     assert decision.actions == (0.0, 0.0)
     assert decision.seq is None
     assert decision.stop_reason == "Not armed."
@@ -45,6 +48,7 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
     assert rules.next_wake_ns(end - 1) == end
     last = rules.tick(end - 1)
     assert (last.actions, last.seq, last.session, last.stop_reason) == ((0.5, 0.5), 1, 1, "")
+    assert last.release is False
     assert rules.tick(end).actions == (0.0, 0.0)
     assert rules.tick(end).stop_reason == "No fresh command."
 
@@ -416,7 +420,9 @@ def test_a_hot_computer_rests_until_it_has_cooled() -> None:
         ("meter", LimitPlan(), False),
         ("meter", LimitPlan(low_battery_v=6.0), True),
         ("chip", LimitPlan(), False),
+        ("meter", LimitPlan(low_battery_v=0.5), True),
         ("chip", LimitPlan(high_temperature_c=80.0), True),
+        ("chip", LimitPlan(high_temperature_c=0.5), True),
     ],
 )
 def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
@@ -477,14 +483,76 @@ def test_the_direction_is_that_of_the_propulsion() -> None:
     assert turning.tick(_T0).actions == (0.0,)
 
 
+@pytest.mark.parametrize("measures", ["tendons", "joints"])
 @pytest.mark.parametrize(("slow", "armed"), [(False, False), (True, True)])
-def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool) -> None:
-    plan = replace(quick_car(), sensors=(SensorPlan("spools", "bus_servo", "tendons"),))
+def test_servos_that_fail_disarm_and_slow_ones_only_stop(
+    slow: bool, armed: bool, measures: str
+) -> None:
+    plan = replace(quick_car(), sensors=(SensorPlan("spools", "bus_servo", measures),))
     rules = _driving(plan)
     late = {"spools"} if slow else set[str]()
     rules.sense(Sensing(failures={"spools": "Overload."}, slow=late), _T0)
     assert rules.armed is armed
+    assert rules.disarmed == ("" if armed else "Disarmed: Overload.")
     assert rules.tick(_T0).actions == (0.0, 0.0)
     rules.offer(arm(_T0), _T0)
     rules.offer(command(2, _T0), _T0)
     assert rules.tick(_T0).stop_reason.endswith(": Overload.")
+
+
+def test_a_stall_is_a_collision_even_where_no_bumper_touches() -> None:
+    sensing = Sensing({"bump": 0.0, "speed": 0.0}, {"bump": "bumper", "speed": "wheel"})
+    sensing.conclude(speed=None, stalled=True)
+    assert (sensing.quantities["collision"], sensing.sources["collision"]) == (1.0, "estimated")
+
+
+def test_a_limit_of_0_is_none_and_small_ones_count() -> None:
+    """Half a second later; a temperature that nothing measures is no high one."""
+    for limits, quantities, reason in (
+        (LimitPlan(), {"battery": -1.0, "temperature": 90.0}, ""),
+        (LimitPlan(high_temperature_c=80.0), {}, ""),
+        (
+            LimitPlan(low_battery_v=0.8),
+            {"battery": 0.5},
+            "The battery has 0.50 V, less than 0.8 V.",
+        ),
+        (
+            LimitPlan(high_temperature_c=0.8),
+            {"temperature": 2.0},
+            "The computer has 2 C, more than 0.8 C.",
+        ),
+    ):
+        health = RobotHealth(quick_car(limits))
+        for now_ns in (_T0, _T0 + 500 * MS):
+            health.sense(Sensing(quantities), now_ns)
+        assert health.reason == reason
+
+
+def test_refusals_to_arm_say_why() -> None:
+    rules = Rules(quick_car(), _T0)
+    assert rules.offer(arm(_T0 - 1_500 * MS), _T0) == ("Not armed: the order to arm is 1.5 s old.")
+    rules.press(True)
+    assert rules.offer(arm(_T0, 1), _T0) == "Not armed: the emergency button is pressed."
+
+
+def test_the_end_of_the_guard_disarms() -> None:
+    rules = _driving(quick_car())
+    assert rules.offer(Order("end"), _T0) == ""
+    assert rules.disarmed == "Disarmed: the guard ends."
+
+
+def test_an_action_may_rest_at_its_cap_and_moves_by_its_slew() -> None:
+    """At 2 a second, 0.02 in 10 ms, exactly."""
+    plan = car()
+    one = replace(plan.actions[1], low=-0.5, high=0.0)
+    rules = _armed(replace(plan, actions=(plan.actions[0], one)))
+    rules.tick(_T0)
+    rules.offer(command(1, _T0, (0.0, -0.4)), _T0)
+    assert rules.tick(_T0 + 10 * MS).actions == (0.0, -0.02)
+
+
+def test_a_stop_without_a_ramp_holds_until_its_end() -> None:
+    plan = StopPlan(hold_ms=10, ramp_ms=0)
+    stop = Stopping(plan, [ActionPlan("steering")], [0.5], _T0)
+    end = _T0 + 10 * MS
+    assert [stop.values(at_ns) for at_ns in (end - 1, end)] == [(0.5,), (0.0,)]

@@ -86,7 +86,7 @@ def estimated(
     applied: list[float] = []
     for action, decided in zip(plan.actions, actions, strict=True):
         outputs = zip(plan.outputs, has, rest, strict=True)
-        moved = [one for one in outputs if one[0].mix.get(action.name, 0.0)]
+        moved = [one for one in outputs if one[0].mix.get(action.name)]
         if all(output not in deviating for output, _, _ in moved):
             applied.append(decided)
         elif all(abs(value - at_rest) <= _STEP for _, value, at_rest in moved):

@@ -194,7 +194,6 @@ class Guard:
                     reason = f"{reason} {words}".strip()
                 decision = replace(decision, actions=actions, stop_reason=reason)
         except Exception as error:  # Whatever a driver raises, the other outputs must rest.
-            self._healthy = False
             self._rules.fail(str(error) or type(error).__name__, now_ns)
             return self._recover(decision, now_ns)
         if self._applied != (decision.session, decision.seq):

@@ -41,7 +41,7 @@ class RobotHealth:
             "battery": limits.low_battery_v > 0.0,
             "temperature": limits.high_temperature_c > 0.0,
         }
-        self._protecting = tuple(s.name for s in plan.sensors if needed.get(s.measures, False))
+        self._protecting = tuple(s.name for s in plan.sensors if needed.get(s.measures))
         self._low = Persistence(_BELIEVED_AFTER_S)
         self._hot = Persistence(_BELIEVED_AFTER_S)
         self._is_low = False
