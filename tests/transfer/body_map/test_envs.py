@@ -11,7 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.errors import LayoutError, SpaceMismatch
 from shapechanger.layout import Layout
-from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv, body_map
+from shapechanger.transfer.body_map import BodyMap, Copy, Learn, MappedEnv, body_map
 from tests.transfer.body_map.bodies import ant_action, ant_observation
 
 
@@ -56,6 +56,7 @@ def test_envs_are_mapped_by_their_layouts() -> None:
     built = body_map(Recorder(), gym.wrappers.TimeLimit(Recorder(feet=True), 5), otherwise="learn")
     assert built.source_action == ant_action()
     assert built.target_action == ant_action(feet=True)
+    assert built.action[-1].rule == Learn()
 
 
 def test_an_env_without_layouts_is_refused() -> None:
@@ -70,6 +71,7 @@ def test_a_mapped_env_adapts_observations_and_actions() -> None:
     env = MappedEnv(target, built)
     observation, info = env.reset(seed=3, options={"a": 1})
     assert info == {"options": {"a": 1}}
+    assert target.np_random_seed == 3
     np.testing.assert_array_equal(observation, built.adapt_observation(target.sensed()))
     assert observation.dtype == np.float64
     action = np.linspace(-1.0, 1.0, 8).astype(np.float32)
@@ -95,6 +97,19 @@ def test_a_mapped_env_has_the_source_spaces() -> None:
     )
     assert env.observation_space is source.observation_space
     assert env.action_space is source.action_space
+    assert env._saved_kwargs == {
+        "body_map": built.to_json(),
+        "observation_space": source.observation_space,
+        "action_space": source.action_space,
+    }
+
+
+def test_observations_become_doubles() -> None:
+    """As in the layout, also where the target senses in single precision."""
+    source, target = Recorder(), Recorder(feet=True)
+    env = MappedEnv(target, body_map(source, target))
+    target.sensed = lambda: np.zeros(target.observation_layout.size, np.float32)
+    assert env.reset()[0].dtype == np.float64
 
 
 def test_a_mapped_env_publishes_the_source_layouts() -> None:
@@ -107,10 +122,16 @@ def test_a_mapped_env_publishes_the_source_layouts() -> None:
 def test_a_space_of_the_wrong_size_is_refused() -> None:
     """A map for other bodies is refused when the env is built."""
     built = body_map(Recorder(), Recorder(feet=True))
+    target, wrong = Recorder(feet=True), gym.spaces.Box(-1.0, 1.0, (7,))
     with pytest.raises(SpaceMismatch, match=r"target observation has 59 numbers"):
         MappedEnv(Recorder(), built)
     with pytest.raises(SpaceMismatch, match="source action has 8"):
-        MappedEnv(Recorder(feet=True), built, action_space=gym.spaces.Box(-1.0, 1.0, (7,)))
+        MappedEnv(target, built, action_space=wrong)
+    with pytest.raises(SpaceMismatch, match="source observation has 51"):
+        MappedEnv(target, built, observation_space=wrong)
+    target.action_space = wrong
+    with pytest.raises(SpaceMismatch, match="The layout of the target action has 12"):
+        MappedEnv(target, built)
 
 
 def test_a_mapped_env_is_rebuilt_from_its_spec() -> None:

@@ -55,3 +55,26 @@ def test_a_mirror_prefers_exact_names_to_globs() -> None:
         Copy("leg?/angle", -1.0),
         Copy("arms/angle"),
     ]
+
+
+def test_brackets_without_characters_are_no_wildcard() -> None:
+    """As in `fnmatch`: `[]` and `[!]` stand for themselves, `[]]` and `[!a]` for a character."""
+    source = _layout("a[]_1", "b[!]_2", "c]_3", "d]_4", "same")
+    built = BodyMap.between(
+        source,
+        _layout("x1", "x2", "y]3", "y]4", "same"),
+        MOTOR,
+        MOTOR,
+        rules={
+            "a[]_*": "copy x*",
+            "b[!]_*": "copy x*",
+            "c[]]_*": "copy y**",
+            "d[!a]_*": "copy y**",
+        },
+    )
+    assert [entry.rule for entry in built.observation[:-1]] == [
+        Copy("x1"),
+        Copy("x2"),
+        Copy("y]3"),
+        Copy("y]4"),
+    ]

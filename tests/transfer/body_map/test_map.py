@@ -13,6 +13,7 @@ from shapechanger.errors import MapError, SpaceMismatch, UnknownName
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, MapEntry, MapRow, Zero
 from tests.transfer.body_map.bodies import (
+    grown,
     motor,
     pendulum_action,
 )
@@ -153,3 +154,20 @@ def test_a_map_can_be_pickled() -> None:
 def test_invalid_json_is_refused(text: str) -> None:
     with pytest.raises(MapError, match="This is not a body map"):
         BodyMap.from_json(text)
+
+
+def test_actions_are_clipped_at_both_ends() -> None:
+    built = grown(rules={"foot_*/motor": Copy("ankle_1/motor", 3.0)})
+    for end in (-1.0, 1.0):
+        moved = built.adapt_action(np.full(8, 9.0 * end, np.float32))
+        np.testing.assert_array_equal(moved, np.full(12, end, np.float32))
+
+
+def test_a_map_counts_its_rules() -> None:
+    nothing = Layout(())
+    assert repr(BodyMap.identity(nothing, nothing)) == "BodyMap(observation: none; action: none)"
+
+
+def test_an_inverse_keeps_the_origin_of_its_rules() -> None:
+    back = grown(rules={"foot_1/motor": Copy("ankle_1/motor")}).inverse()
+    assert {row.why for row in back.table()} == {"same name", "default"}

@@ -215,3 +215,25 @@ def test_unknown_gains_are_not_scaled() -> None:
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.between(*sides, silent, silent, units="torque")
     assert built.action[0].rule == Copy("slide/motor")
+
+
+def test_a_rule_without_a_feature_is_explained() -> None:
+    with pytest.raises(UnknownName) as caught:
+        grown(rules={"tail/*": "zero", "hip_1/motor": "zero"})
+    kinds = "source observation feature or target action feature"
+    assert str(caught.value).startswith(f"No {kinds} matches 'tail/*'")
+    with pytest.raises(MapError, match=r"must have a star for each wildcard of 'foot_1/motor'"):
+        grown(action_rules={"foot_1/motor": "copy ankle_*/motor"})
+
+
+@pytest.mark.parametrize(("others", "listed"), [(0, ""), (1, " and 1 more"), (2, " and 2 more")])
+def test_features_of_spaces_without_a_common_name_are_listed(others: int, listed: str) -> None:
+    names = [f"a{number}" for number in range(8 + others)]
+    ours, theirs = (Layout(tuple(Feature(f"{side}{name}", "1") for name in names)) for side in "xy")
+    motors = Layout((motor("slide"),))
+    with pytest.raises(MapError) as caught:
+        BodyMap.between(ours, theirs, motors, motors)
+    first = ", ".join(f"x{name}" for name in names[:8])
+    assert f"features are {first}{listed}; the" in str(caught.value)
+    with pytest.raises(MapError, match=r"the target observation features are none\."):
+        BodyMap.between(ours, Layout(()), motors, motors)

@@ -136,3 +136,37 @@ def test_blocks_have_no_mirror() -> None:
     seeing = Layout((Feature("eye", "1", shape=(2, 2)),))
     with pytest.raises(MapError, match="'eye' is a block of numbers"):
         BodyMap.mirror(seeing, pendulum_action())
+
+
+def test_paths_of_several_parts_are_kept() -> None:
+    """The element is before the first "/", and the component after the last."""
+    layout = Layout(tuple(Feature(f"leg_{n}/foot/force/fy", "N", -1.0, 1.0) for n in (1, 2)))
+    motors = Layout((Feature("hip/motor", "1", -1.0, 1.0), Feature("hip/spare", "1", -1.0, 1.0)))
+    found = BodyMap.mirror(layout, motors, swap={"leg_1": "leg_2"})
+    assert [entry.rule for entry in found.observation] == [
+        Copy("leg_2/foot/force/fy", -1.0),
+        Copy("leg_1/foot/force/fy", -1.0),
+    ]
+    assert [entry.why for entry in (*found.observation, *found.action)] == [
+        *("symmetry", "symmetry"),
+        *("same name", "same name"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "fits"),
+    [
+        (1.0, 1.0 + 5e-10, True),
+        (1.0, 1.0 + 1e-8, False),
+        (0.0, 5e-13, True),
+        (0.0, 1e-11, False),
+    ],
+)
+def test_ranges_of_a_pair_agree_up_to_rounding(left: float, right: float, fits: bool) -> None:
+    layout = Layout((Feature("l/x", "m", -2.0, left), Feature("r/x", "m", -2.0, right)))
+    motor = Layout((Feature("motor", "1", -1.0, 1.0),))
+    if fits:
+        BodyMap.mirror(layout, motor, swap={"l": "r"})
+    else:
+        with pytest.raises(MapError, match="no such symmetry"):
+            BodyMap.mirror(layout, motor, swap={"l": "r"})

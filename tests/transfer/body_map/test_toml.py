@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from shapechanger.errors import MapError, UnknownName
+from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap, Copy, Hold, Learn, Zero
 from tests.transfer.body_map.bodies import (
     ANT_FLIP,
@@ -92,8 +93,8 @@ def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -
     [
         ("units = ", "This is not TOML"),
         ("unit = 'same'", "No key matches 'unit'. Did you mean 'units'?"),
-        ("units = 'torq'", "No word matches 'torq'. Did you mean 'torque'?"),
-        ("units = 3", "wrong: Expected `str`, got `int` - at `$.units`"),
+        ("\ufeffunits = 'torq'", "units: No word matches 'torq'. Did you mean 'torque'?"),
+        ("units = 3", "'map' is wrong: Expected `str`, got `int` - at `$.units`"),
         ("otherwise = 'copy hip_1/motor'", "'zero', 'hold' or 'learn', not 'copy"),
         ("otherwise = 'lern'", "otherwise: No word matches 'lern'. Did you mean 'learn'?"),
         ("action = 3", "at `$.action`"),
@@ -101,9 +102,14 @@ def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -
         ("[action]\n'foot_1/motor' = { tak = 'x' }", "No key of 'foot_1/motor' matches 'tak'"),
         ("[action]\n'foot_1/motor' = { scale = 2 }", "not a table of scale"),
         ("[action]\n'foot_1/motor' = {}", "not a table of nothing"),
-        ("[action]\n'foot_1/motor' = { hold = true }", "Expected `float`, got `bool`"),
+        ("[action]\n'foot_1/motor' = { hold = true }", "'foot_1/motor' is wrong: Expected `float`"),
+        ("[action]\n'foot_1/motor' = { take = 1 }", "'foot_1/motor' is wrong: Expected `str`"),
+        (
+            "[action]\n'foot_1/motor' = { take = 'x', scale = 'y' }",
+            "'foot_1/motor' is wrong: Expected `float`",
+        ),
         ("[action]\n'foot_1/motor' = { take = 'ankle_1/motor', scale = 0 }", "not zero"),
-        ("[symmetry]\nof = 'both'", "No word matches 'both'"),
+        ("[symmetry]\nof = 'both'", "of: No word matches 'both'"),
         ("[symmetry]\nflop = []", "No key of 'symmetry' matches 'flop'. Did you mean 'flip'?"),
         ("[symmetry]\nswap = ['hip_1']", "at `$.symmetry.swap`"),
     ],
@@ -113,6 +119,34 @@ def test_wrong_text_is_explained(text: str, message: str) -> None:
     with pytest.raises(MapError) as caught:
         BodyMap.from_toml(text, *GROWN)
     assert message in str(caught.value)
+
+
+def test_a_copy_needs_no_scale() -> None:
+    built = BodyMap.from_toml('[action]\n"foot_1/motor" = { take = "ankle_1/motor" }', *GROWN)
+    assert Copy("ankle_1/motor") in [entry.rule for entry in built.action]
+
+
+def test_names_are_written_as_they_are() -> None:
+    """TOML has no raw control characters."""
+    bodies = (Layout((Feature("fuß\x7f/angle", "rad"), Feature("x", "m"))),) * 2
+    actions = (Layout((Feature("x", "1", -1.0, 1.0),)),) * 2
+    built = BodyMap.between(*bodies, *actions, rules={"fuß\x7f/angle": "zero"})
+    text = built.to_toml()
+    assert text.splitlines()[-1] == '"fuß\\u007f/angle" = "zero"'
+    assert BodyMap.from_toml(text, *bodies, *actions) == built
+
+
+def test_a_copy_between_units_is_written_as_exact() -> None:
+    """A conversion by a factor of 1 would be refused under "same"."""
+    sides = pendulum_observation(), pendulum_observation()
+    first, second = (
+        Layout((Feature("slide/motor", unit, -1.0, 1.0, gain=100.0, gain_unit="N"),))
+        for unit in ("1", "A")
+    )
+    built = BodyMap.between(*sides, first, second, units="torque")
+    assert built.action[0].rule == Copy("slide/motor")
+    assert built.to_toml().splitlines()[0] == 'units = "exact"'
+    assert BodyMap.from_toml(built.to_toml(), *sides, first, second) == built
 
 
 def test_unknown_names_are_refused() -> None:

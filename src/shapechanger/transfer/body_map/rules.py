@@ -103,7 +103,7 @@ def compose_rules(outer: Copy, inner: Rule) -> Rule:
             return inner
 
 
-_TOKEN: Final = re.compile(r"\[!?\]?[^\]]*\]|.", re.DOTALL)
+_TOKEN: Final = re.compile(r"\[!?+\]?+[^\]]*\]|.", re.DOTALL)
 
 
 def expand_template(template: str, pattern: str, name: str) -> str:
