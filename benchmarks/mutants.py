@@ -124,8 +124,10 @@ def _plain(mangled: str) -> str:
 
 def _changed(original: ast.FunctionDef, mutant: ast.FunctionDef) -> str:
     """Return the first line of a mutant that differs from the original's."""
-    before = ast.unparse(original).splitlines()[1:]
-    after = ast.unparse(mutant).splitlines()[1:]
+    before, after = (
+        "\n".join(ast.unparse(one) for one in function.body).splitlines()
+        for function in (original, mutant)
+    )
     lines = (new.strip() for old, new in zip(before, after, strict=False) if old != new)
     return next(lines, "")
 

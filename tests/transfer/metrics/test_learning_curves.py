@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -62,17 +63,23 @@ def test_curves_are_copies() -> None:
 
 
 @pytest.mark.parametrize(
-    "copied",
+    "copied_from",
     [
-        RISING,
-        copy.deepcopy(RISING),
-        pickle.loads(pickle.dumps(RISING)),
-        in_total_steps(RISING, 1, 0.0),
+        lambda curves: curves,
+        copy.deepcopy,
+        lambda curves: pickle.loads(pickle.dumps(curves)),
+        lambda curves: in_total_steps(curves, 1, 0.5),
     ],
     ids=["built", "copied", "pickled", "counted"],
 )
-def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
+def test_curves_cannot_be_written_to(
+    copied_from: Callable[[LearningCurves], LearningCurves],
+) -> None:
     """Fields and arrays are read-only, also in copies and pickles."""
+    built = in_total_steps(RISING, 1, 0.5)
+    again = copy.deepcopy(built)
+    assert (again.source_steps, again.floor) == (1.0, 0.5)
+    copied = copied_from(RISING)
     with pytest.raises(ValueError, match="read-only"):
         copied.returns[0, 0] = 1.0
     with pytest.raises(ValueError, match="read-only"):

@@ -13,6 +13,7 @@ from shapechanger.transfer.metrics import (
     Measures,
     Reference,
     Summary,
+    forward_transfer,
     summarise,
 )
 
@@ -105,6 +106,20 @@ def test_arms_that_did_not_learn_leave_values() -> None:
     assert len(measured.times_to_threshold) == len(DEFAULT_THRESHOLDS)
     # In total steps, the floor is the return without skill: (400 · 10 + 200 · 10) / 20 - 100.
     assert result.in_total_steps.total_reward_gain.value == pytest.approx(200.0)
+
+
+def test_both_ways_of_counting_use_the_same_resamples() -> None:
+    """Those of each measure begin with one draw of the generator."""
+    result = summary(source_steps=0)
+    assert result.in_target_steps == result.in_total_steps
+    draw = int(np.random.default_rng(0).integers(2**63))
+    curves = REFERENCE.scores(ARM, clip=True), REFERENCE.scores(SCRATCH, clip=True)
+    rng = np.random.default_rng(draw)
+    transfer = forward_transfer(*curves, rng=rng, n_resamples=500)
+    assert result.in_target_steps.forward_transfer == transfer
+    undefined = summary(reference=Reference(zero=400.0, one=300.0)).in_target_steps
+    assert [time.threshold for time in undefined.times_to_threshold] == [0.25, 0.5, 0.75, 0.9]
+    assert all(time.arm is time.scratch is None for time in undefined.times_to_threshold)
 
 
 def test_zero_shot_is_summarised_without_error() -> None:

@@ -39,6 +39,18 @@ def test_improvement_matches_mann_whitney() -> None:
     assert both.value == pytest.approx((u / 35 + 0.5) / 2)
 
 
+def test_intervals_are_quantiles_of_the_resamples() -> None:
+    """From 2.5 to 97.5 %, of means over studies."""
+    rng = np.random.default_rng(1)
+    arm, scratch = ([rng.normal(level, 1.0, 4) for level in (0.4, 0.0)] for _ in range(2))
+    found = probability_of_improvement(arm, scratch, rng=_rng(), n_resamples=50)
+    again, means = _rng(), np.zeros(50)
+    for x, y in zip(arm, scratch, strict=True):
+        xs, ys = (g[again.integers(g.size, size=(50, g.size))] for g in (x, y))
+        means += [(a[:, None] > b).mean() / 2 for a, b in zip(xs, ys, strict=True)]
+    assert (found.low, found.high) == pytest.approx(tuple(np.quantile(means, [0.025, 0.975])))
+
+
 def test_runs_are_drawn_within_their_study() -> None:
     """Different levels of studies do not widen the interval."""
     steady = [np.full(5, level) for level in (0.0, 1.0, 2.0)]

@@ -440,6 +440,7 @@ def test_statistics_go_with_their_names() -> None:
                 Feature("free", "m"),
                 Feature("z", "m"),
                 Feature("stuck", "m", 2.0, 2.0),
+                Feature("narrow", "m", 0.0, 0.6),
             )
         ),
         pendulum_action(),
@@ -450,8 +451,8 @@ def test_statistics_go_with_their_names() -> None:
     source.mean, source.var = np.array([5.0, 1.0, 8.0]), np.array([9.0, 4.0, 16.0])
     source.count = 1000.0
     carried = transplant_normalisation(source, body_map)
-    np.testing.assert_array_equal(carried.mean, [1.0, -4.0, 0.0, 1.0, 2.0])
-    np.testing.assert_allclose(carried.var, [16.0 / 12.0, 4.0, 1.0, 4.0, 1.0])
+    np.testing.assert_array_equal(carried.mean, [1.0, -4.0, 0.0, 1.0, 2.0, 0.3])
+    np.testing.assert_allclose(carried.var, [16.0 / 12.0, 4.0, 1.0, 4.0, 1.0, 0.03])
     assert carried.count == 1000.0
     assert source.mean.tolist() == [5.0, 1.0, 8.0]
 
