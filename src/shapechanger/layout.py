@@ -161,7 +161,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     @property
     def slices(self) -> dict[str, slice]:
-        """Indices in the flat vector by name."""
+        """Indices in the flat vector, keyed by name."""
         places: dict[str, slice] = {}
         start = 0
         for feature in self.features:

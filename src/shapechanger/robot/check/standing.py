@@ -242,7 +242,7 @@ def _latency_timers(robot: StandingRobot) -> Results:
         )
 
 
-# Remedies for device files that do not exist, by their group.
+# Remedies for device files that do not exist, keyed by the group of the file.
 _WITHOUT_DEVICE: Final = {
     "gpio": "only a computer with GPIO pins, such as a Raspberry Pi, drives this robot",
     "i2c": "switch the bus on with `sudo raspi-config` (Interface Options), and restart",

@@ -105,7 +105,7 @@ class As5600(I2cDevice):
     """Encoders of several joints, behind the multiplexer; see `SensorDriver`.
 
     Attributes:
-        joints: Keys of each joint, by name.
+        joints: Keys of each joint, keyed by name.
     """
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:

@@ -315,7 +315,7 @@ class OutputChip:
 
 @dataclass(frozen=True, slots=True)
 class PulseSource:
-    """A source of the pulses of servos and controllers, named by their key `over`.
+    """A source of the pulses of servos and controllers, which their key `over` names.
 
     Attributes:
         keys: Its keys in a profile.

@@ -51,7 +51,7 @@ class ResetKeys(Keys, frozen=True, kw_only=True):
 
     values: Annotated[
         dict[str, Annotated[float, Meta(ge=-1, le=1)]],
-        Meta(description="a table of numbers from -1 to 1 by name of action"),
+        Meta(description="a table of numbers from -1 to 1, keyed by action"),
     ]
     seconds: Annotated[float, Meta(gt=0, le=60)]
 

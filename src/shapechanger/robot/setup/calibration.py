@@ -146,7 +146,7 @@ def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
         cycle: Sends what its servos are requested to pull, runs a cycle, and returns its time, ns.
 
     Returns:
-        Position of each servo at the zero of its tendon, in counts, by name.
+        Position of each servo at the zero of its tendon, in counts, keyed by name.
 
     Raises:
         RobotError: If a servo fails, or winds in too far or for too long.

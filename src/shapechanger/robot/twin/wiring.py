@@ -65,7 +65,7 @@ class TwinWiring:
         return ends_ns is None or now_ns < ends_ns
 
     def read(self, levels: Levels, now_ns: int) -> dict[str, WiredOutput]:
-        """Return the state of each output, by name.
+        """Return the state of each output, keyed by name.
 
         Args:
             levels: Levels of all pins.

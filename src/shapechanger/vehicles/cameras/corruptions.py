@@ -81,7 +81,7 @@ def dirt(picture: Picture, seed: int) -> Picture:
 CORRUPTIONS: Final[Mapping[str, Corruption]] = MappingProxyType(
     {"night": night, "glare": glare, "blur": blur, "dirt": dirt}
 )
-"""Camera faults by name."""
+"""Camera faults, keyed by name."""
 
 
 def find_corruption(name: str) -> Corruption:

@@ -176,7 +176,7 @@ class RangesEnv(DriveEnv):
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the vehicle's
             usual place.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
-        reward: Weights by name that replace the default ones; see `DriveReward`.
+        reward: Weights that replace the default ones, keyed by name; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
         randomise: Whether `reset` samples light, textures and the camera's pose too.

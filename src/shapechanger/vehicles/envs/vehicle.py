@@ -87,7 +87,7 @@ class VehicleEnv(DriveEnv):
         size: Width and height of frames in pixels; None for the profile's.
         image: Whether observations include the frame.
         state: Whether observations include the state next to the frame.
-        reward: Weights by name that replace those of the profile.
+        reward: Weights that replace the profile's, keyed by name.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
         randomise: Whether `reset` samples light, textures and the camera's pose too.
         put_back: Whether to put the vehicle back on the lane after a collision, as a person next to

@@ -376,7 +376,7 @@ class Rig:
         return self._names[tendon]
 
     def tensions(self) -> dict[str, float]:
-        """Return the tension of each tendon, N, by name."""
+        """Return the tension of each tendon, N, keyed by name."""
         return {name: servo.motor.tension for name, servo in self._names.items()}
 
     def settle(self) -> None:
