@@ -77,7 +77,7 @@ def _keys(
             else:
                 names = (options or {}).get(name)
                 one = inspect.LiteralType(tuple(names)) if names else field.type
-                values = permitted(one).replace(Pin.words, "a pin").replace("'", '"')
+                values = permitted(one).replace(Pin.description, "a pin").replace("'", '"')
                 meaning = _NONE.sub("", meaning)
             rows.append(f"| `{name}` | {values} | {_default(name, field)} | {meaning} |")
     if rows:

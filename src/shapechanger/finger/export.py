@@ -133,7 +133,7 @@ def _custom(parameters: FingerParameters) -> ElementTree.Element:
 
 def _limits(parameters: FingerParameters) -> str:
     """List the effects that the file does not simulate, for the comment at its top."""
-    words = [
+    comments = [
         "A finger of Shapechanger. Controls are -1 to 1 in the order of the actuators.",
         f"Not simulated by this file: noise of the joints ({parameters.joint_noise:g} rad) and of "
         f"the tensions ({parameters.tension_noise:g} N).",
@@ -141,12 +141,12 @@ def _limits(parameters: FingerParameters) -> str:
     path = parameters.path
     if path is not None:
         slews = [f"{v:g}" if v else "unlimited" for v in (path.slew_per_s, path.slew_down_per_s)]
-        words.append(
+        comments.append(
             f"Nor the path of a command: tensions are computed at {path.control_hz:g} Hz, sent at "
             f"{path.tick_hz:g} Hz, with a slew of {slews[0]} up and {slews[1]} down, in ranges per "
             f"second, and steps of {path.tension_step:g} N. The controls are tensions from the "
             "least to the most."
         )
     delay = f"{1e3 * parameters.command_delay:g} ms"
-    words.append(f"The delay of the commands, {delay}, is the actuators' (MuJoCo 4).")
-    return " " + "\n  ".join(words) + " "
+    comments.append(f"The delay of the commands, {delay}, is the actuators' (MuJoCo 4).")
+    return " " + "\n  ".join(comments) + " "

@@ -79,8 +79,8 @@ def finger_html(found: IdentifiedFinger, name: str) -> str:
 def label(estimate: ParameterEstimate) -> str:
     """Name of a parameter with its unit, such as `moment arm FDP, MCP_flexion [mm]`."""
     name, *of = estimate.name.split("/")
-    words = {"moment_arms": "moment arm"}.get(name, name.replace("_", " "))
-    return f"{words} {', '.join(of)}".strip() + f" [{_SHOWN[estimate.unit][0]}]"
+    text = {"moment_arms": "moment arm"}.get(name, name.replace("_", " "))
+    return f"{text} {', '.join(of)}".strip() + f" [{_SHOWN[estimate.unit][0]}]"
 
 
 def number(estimate: ParameterEstimate, value: float) -> str:

@@ -69,5 +69,5 @@ def require_same_env(
     card: Mapping[str, Identity], ref: EnvRef, made: Identity, policy: object, remedy: str
 ) -> None:
     """Refuse a policy whose env has changed since its training."""
-    if words := card.get(ENV, NOTHING).changes_to(made):
-        raise ForeignStudy(f"{ref} has changed since {policy} was trained in it: {words}. {remedy}")
+    if text := card.get(ENV, NOTHING).changes_to(made):
+        raise ForeignStudy(f"{ref} has changed since {policy} was trained in it: {text}. {remedy}")

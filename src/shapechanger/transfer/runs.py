@@ -69,9 +69,9 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
     complete = bool(steps) and steps[0] == 0 and steps[-1] == plan.last_step_of(run.kind)
     if result.run != run or result.seed != plan.seed_of(run) or not complete:
         raise CorruptStudy(f"{path} does not hold the result of {run.name}: {remedy}.")
-    if words := differences(plan, result.identity, parts_of(plan, run)):
+    if text := differences(plan, result.identity, parts_of(plan, run)):
         raise ForeignStudy(
-            f"{path} is the result of another version than the one planned. {words}. Give another "
+            f"{path} is the result of another version than the one planned. {text}. Give another "
             f"--out, or {remedy}."
         )
     return result

@@ -402,9 +402,9 @@ def claim_folder(plan: Plan, out: Path) -> None:
         found = _plan_in(out)
         if plan.extends(found):
             write_json(path, plan)
-        elif words := changes_between(found, plan, out):
+        elif text := changes_between(found, plan, out):
             raise ForeignStudy(
-                f"{out} holds runs with other versions of what this study names. {words}. Runs of "
+                f"{out} holds runs with other versions of what this study names. {text}. Runs of "
                 "both would be averaged: give another --out, or delete that folder to start again; "
                 "nothing was changed."
             )

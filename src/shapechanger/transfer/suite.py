@@ -73,10 +73,10 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
     identity = {part: each for plan in reversed(plans) for part, each in plan.identity.items()}
     whole = msgspec.structs.replace(plans[0], arms=arms, seeds=seeds, identity=identity)
     for plan, folder in zip(plans, folders, strict=True):
-        if words := changes_between(whole, plan, folders[0], folder):
+        if text := changes_between(whole, plan, folders[0], folder):
             raise ForeignStudy(
                 f"{folders[0]} and {folder} hold runs with other versions of what they name. "
-                f"{words}. Merge only folders of one version; nothing was changed."
+                f"{text}. Merge only folders of one version; nothing was changed."
             )
         if whole != plan and not whole.extends(plan):
             raise ForeignStudy(
@@ -105,9 +105,9 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
     other = read_plan(sibling, remedy)
-    if words := changes_between(other, plan, sibling, folder):
+    if text := changes_between(other, plan, sibling, folder):
         raise ForeignStudy(
-            f"{sibling} was run with another version of what this study names. {words}. A suite "
+            f"{sibling} was run with another version of what this study names. {text}. A suite "
             f"has one version of each: give another --out, or delete {sibling} to repeat it."
         )
     same = msgspec.structs.replace(

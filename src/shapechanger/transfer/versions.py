@@ -69,7 +69,7 @@ def changes_between(old: Plan, new: Plan, *folders: Path) -> str:
         before, after = old.identity.get(other, NOTHING), new.identity.get(part, NOTHING)
         if before != after:
             found[title] = before.changes_to(after, _numbers(before, after, new, folders))
-    return "; ".join(f"{title}: {words}" for title, words in found.items())
+    return "; ".join(f"{title}: {text}" for title, text in found.items())
 
 
 def _numbers(
@@ -108,8 +108,8 @@ def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
 
 def require_versions(wanted: Plan, parts: Identities, found: Identities, remedy: str) -> None:
     """Refuse parts that differ from a plan's."""
-    if words := differences(wanted, parts, found):
-        raise ForeignStudy(f"What this study was planned with has changed. {words}. {remedy}")
+    if text := differences(wanted, parts, found):
+        raise ForeignStudy(f"What this study was planned with has changed. {text}. {remedy}")
 
 
 def differences(plan: Plan, old: Identities, new: Identities) -> str:
@@ -119,7 +119,7 @@ def differences(plan: Plan, old: Identities, new: Identities) -> str:
         titles.get(part, f"the {part}"): old.get(part, NOTHING).changes_to(new.get(part, NOTHING))
         for part in sorted({*old, *new})
     }
-    return "; ".join(f"{title}: {words}" for title, words in changed.items() if words)
+    return "; ".join(f"{title}: {text}" for title, text in changed.items() if text)
 
 
 def require_planned(plan: Plan, run: Run) -> None:

@@ -180,8 +180,8 @@ def _start_of_another(jpeg: bytes) -> int:
 
 def with_capture_time(jpeg: bytes, captured_ns: int) -> bytes:
     """Add the capture time, ns, to a JPEG, as a comment segment; see `captured_ns_of`."""
-    words = b"captured_ns=%d" % captured_ns
-    return _START + bytes((0xFF, _COMMENT)) + (len(words) + 2).to_bytes(2) + words + jpeg[2:]
+    comment = b"captured_ns=%d" % captured_ns
+    return _START + bytes((0xFF, _COMMENT)) + (len(comment) + 2).to_bytes(2) + comment + jpeg[2:]
 
 
 def captured_ns_of(jpeg: bytes) -> int | None:

@@ -98,8 +98,8 @@ class Pipe(Camera):
         self._fd, its_end = os.pipe()
         os.set_blocking(self._fd, False)
         with os.fdopen(its_end, "wb") as output:
-            words = shlex.split(self._path[1:])
-            self._program = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=output)
+            arguments = shlex.split(self._path[1:])
+            self._program = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stdout=output)
 
     def _waiting(self) -> bytes | None:
         """Return data that waits in the stream, b"" at its end; None without data."""

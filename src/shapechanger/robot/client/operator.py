@@ -139,8 +139,8 @@ class Preparation:
             if self.on_waiting:
                 self.on_waiting(sentence)
             else:
-                words = f"{sentence} {hint}".rstrip()
-                _log.warning("%s (Waiting for up to %.0f s more.)", words, max(0.0, self._left_s))
+                text = f"{sentence} {hint}".rstrip()
+                _log.warning("%s (Waiting for up to %.0f s more.)", text, max(0.0, self._left_s))
         if self._left_s < 0.0:
             raise failure from None
         time.sleep(_POLL_S)

@@ -58,11 +58,11 @@ FilePath = Annotated[str, _printable(4096)]
 class KeyMistake(ValueError):
     """A value of a key that the other keys of its table do not allow.
 
-    `words` are the reason, as the end of a sentence that begins with the key and its table.
+    `text` is the reason, as the end of a sentence that begins with the key and its table.
     """
 
-    def __init__(self, key: str, words: str) -> None:
-        super().__init__(words)
+    def __init__(self, key: str, text: str) -> None:
+        super().__init__(text)
         self.key = key
 
 

@@ -44,8 +44,8 @@ class CpuTemperature:
     def _measure(self) -> float:
         with device_errors(self._name):
             written = self._path.read_text()
-        words = f"{self._name} read {written!r} at {self._path}, which is no temperature."
-        with translate_errors(ValueError, to=lambda _: RobotError(words)):
+        text = f"{self._name} read {written!r} at {self._path}, which is no temperature."
+        with translate_errors(ValueError, to=lambda _: RobotError(text)):
             # Millidegrees: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
             return int(written) / 1000.0
 

@@ -125,8 +125,8 @@ class SimulatedMpu6050(SimulatedChip):
         x, y = (a / _STANDARD_GRAVITY * per_g for a in (seen.acceleration_x, seen.acceleration_y))
         yaw = math.degrees(seen.yaw_rate) * per_rate
         values = (x, y, per_g, 0.0, 0.0, 0.0, yaw)
-        words = [max(-32768, min(32767, round(value))) for value in values]
-        _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *words)
+        raw = [max(-32768, min(32767, round(value))) for value in values]
+        _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *raw)
 
 
 MPU6050: Final = SensorChip(

@@ -30,13 +30,13 @@ _WRITTEN: Final = re.compile(r"(GPIO|BOARD)([0-9]{1,3})")
 class Pin(int):
     """BCM number of a pin, 0 to 27; a profile writes 22, "GPIO22" or "BOARD15"."""
 
-    words = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
+    description = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
 
 
 class OptionalPin(Pin):
     """A `Pin`, or -1 for none."""
 
-    words = f"{Pin.words}, or -1 for none"
+    description = f"{Pin.description}, or -1 for none"
 
 
 NO_PIN: Final = OptionalPin(-1)

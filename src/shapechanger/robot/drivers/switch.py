@@ -24,7 +24,9 @@ class SwitchKeys(Keys, frozen=True, kw_only=True):
         pull: "up" for switches to ground, "down" for switches to 3.3 V.
     """
 
-    pins: Annotated[list[Pin], Meta(min_length=1, description=f"a list of pins, each {Pin.words}")]
+    pins: Annotated[
+        list[Pin], Meta(min_length=1, description=f"a list of pins, each {Pin.description}")
+    ]
     pull: Literal["up", "down"] = "up"
 
 

@@ -197,8 +197,8 @@ def errors_noted(failures: list[str], what: str = "") -> Generator[None]:
     try:
         yield
     except Exception as error:
-        words = str(error) or type(error).__name__
-        failures.append(f"{what}: {words}" if what else words)
+        text = str(error) or type(error).__name__
+        failures.append(f"{what}: {text}" if what else text)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:

@@ -164,8 +164,8 @@ class Guard:
             self._rules.halt()  # Its sender has superseded the previous command.
             self._malformed += len(malformed)
             self._refused = (malformed[-1], None)
-            words = shortened(malformed[-1])
-            self._log.warning("%d datagrams were no orders: %s", self._malformed, words)
+            text = shortened(malformed[-1])
+            self._log.warning("%d datagrams were no orders: %s", self._malformed, text)
         if self._daemon.lost:
             self._rules.disarm("the daemon is gone.")
 
@@ -187,11 +187,11 @@ class Guard:
             if decision.release:
                 self._outputs.release()
             else:
-                actions, words = self._outputs.write(decision.actions, now_ns)
+                actions, text = self._outputs.write(decision.actions, now_ns)
                 self._rules.learn(actions)
                 reason = decision.stop_reason
                 if decision.seq is not None:  # A robot at rest obeys, if slightly later.
-                    reason = f"{reason} {words}".strip()
+                    reason = f"{reason} {text}".strip()
                 decision = replace(decision, actions=actions, stop_reason=reason)
         except Exception as error:  # Whatever a driver raises, the other outputs must rest.
             self._rules.fail(str(error) or type(error).__name__, now_ns)
@@ -212,8 +212,8 @@ class Guard:
             decision = self._rules.tick(now_ns)
         if not failures:
             return decision
-        words = shortened(" ".join(failures))
-        return replace(decision, stop_reason=f"NOT at rest: {words} {decision.stop_reason}")
+        text = shortened(" ".join(failures))
+        return replace(decision, stop_reason=f"NOT at rest: {text} {decision.stop_reason}")
 
     def _report(self, decision: OutputDecision, now_ns: int) -> None:
         rules = self._rules

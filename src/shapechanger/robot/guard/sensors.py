@@ -108,8 +108,8 @@ class Sensors:
             ended_ns = self._clock.now_ns()
             if ended_ns - began_ns > _MOST_READ_NS:
                 sensing.slow.add(name)
-                words = f"It took more than {_MOST_READ_NS // 1_000_000} ms to answer."
-                sensing.failures[name] = f"{sensing.failures.get(name, '')} {words}".lstrip()
+                text = f"It took more than {_MOST_READ_NS // 1_000_000} ms to answer."
+                sensing.failures[name] = f"{sensing.failures.get(name, '')} {text}".lstrip()
             if not all(map(math.isfinite, measured.values())):
                 sensing.failures.setdefault(name, "It returned a value that is not finite.")
                 continue

@@ -78,8 +78,8 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise ProfileError(f"{path}, line {line}: this is not UTF-8 text.") from error
     except (OSError, ValueError) as error:  # ValueError: NUL in the path.
-        words = getattr(error, "strerror", None) or error
-        raise ProfileError(f"{path} cannot be read: {words}.") from error
+        message = getattr(error, "strerror", None) or error
+        raise ProfileError(f"{path} cannot be read: {message}.") from error
     if len(data) > _LARGEST:
         raise ProfileError(f"{path} is longer than a profile can be, 1 MiB.")
     return text

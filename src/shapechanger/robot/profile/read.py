@@ -165,20 +165,20 @@ def _toml(text: str, path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         at = _AT.fullmatch(str(error))
         line = int(at[2]) if at else text.count("\n") + 1
-        words = f"{at[1]} at column {at[3]}" if at else str(error)
-        words = f"this is not valid TOML: {words[:1].lower()}{words[1:]}"
-        raise ProfileError(f"{path}, line {line}: {words}.") from None
+        message = f"{at[1]} at column {at[3]}" if at else str(error)
+        message = f"this is not valid TOML: {message[:1].lower()}{message[1:]}"
+        raise ProfileError(f"{path}, line {line}: {message}.") from None
     except (RecursionError, ValueError):  # Python refuses integers with thousands of digits.
-        words = "it is nested too deeply, or a number has too many digits"
-        raise ProfileError(f"{path} is not a profile: {words}.") from None
+        message = "it is nested too deeply, or a number has too many digits"
+        raise ProfileError(f"{path} is not a profile: {message}.") from None
 
 
 def _read_action(table: Table) -> ActionPlan:
     (action,) = table.decode(ActionPlan, given={"name": table.place[-1]})
     if "low" not in table.keys and action.one_sided:
         action = replace(action, low=0.0)
-    for key, words in action.mistakes():
-        raise table.refused(key, words)
+    for key, text in action.mistakes():
+        raise table.refused(key, text)
     return action
 
 
@@ -224,7 +224,7 @@ def _reset(root: Table, actions: Sequence[ActionPlan]) -> Iterator[ResetStep]:
                 raise table.refused("values", f"names no action: {choice(name, named)}", name)
             low, high = named[name].low, named[name].high
             if not low <= value <= high:
-                words = f"must have {low:g} to {high:g} for {name}, its own caps"
-                raise table.refused("values", words, name)
+                text = f"must have {low:g} to {high:g} for {name}, its own caps"
+                raise table.refused("values", text, name)
         filled = tuple(step.values.get(action.name, action.rest) for action in actions)
         yield ResetStep(filled, step.seconds)

@@ -49,9 +49,9 @@ def share_boards(root: Table, profile: Profile) -> Profile:
             if before == NO_PIN:
                 shared[name] = value
             elif value not in (before, NO_PIN):
-                words = f"the PCA9685 at {board[1]:#x} of I2C bus {board[0]} has one {name} for "
-                words += f"all its channels, {before} or {value}"
-                raise root.error(words, "output", output.name, name)
+                text = f"the PCA9685 at {board[1]:#x} of I2C bus {board[0]} has one {name} for "
+                text += f"all its channels, {before} or {value}"
+                raise root.error(text, "output", output.name, name)
     outputs = tuple(
         replace(output, settings=output.settings | boards.get(_board(output), {}))
         for output in profile.outputs
@@ -74,20 +74,20 @@ def check_mix(root: Table, profile: Profile) -> Profile:
     for output in profile.outputs:
         table = root.table("output", output.name)
         if not output.mix:
-            words = f"is empty, so nothing moves it; there are: {', '.join(rests)}"
-            raise table.refused("mix", words)
+            text = f"is empty, so nothing moves it; there are: {', '.join(rests)}"
+            raise table.refused("mix", text)
         for name, weight in output.mix.items():
             if name not in rests:
                 raise table.refused("mix", f"names no action: {choice(name, rests)}", name)
             if weight == 0.0:
                 raise table.refused("mix", f"has the weight 0 for {name!r}: leave it out", name)
         if output.part in get_args(DrivingPart) and not _propelling(profile) & output.mix.keys():
-            words = f"must name an action with propels = true, because it moves the {output.part}"
-            raise table.refused("mix", words)
+            text = f"must name an action with propels = true, because it moves the {output.part}"
+            raise table.refused("mix", text)
         rest = output.offset + sum(weight * rests[name] for name, weight in output.mix.items())
         if _drives(profile, output) and abs(rest) > _NEARLY_ZERO:
-            words = "and must be at 0 then, because it propels the robot"
-            raise table.error(f"{table} is at {rest:g} when its actions rest, {words}", "offset")
+            text = "and must be at 0 then, because it propels the robot"
+            raise table.error(f"{table} is at {rest:g} when its actions rest, {text}", "offset")
     for name in rests:
         if not any(name in output.mix for output in profile.outputs):
             raise root.table("action", name).refused("", "moves nothing: no mix names it")
@@ -99,9 +99,9 @@ def check_stop(root: Table, profile: Profile) -> Profile:
     held = [key for key in ("hold_ms", "ramp_ms") if getattr(profile.stop, key)]
     for output in (one for one in profile.outputs if held and _drives(profile, one)):
         for name in output.mix.keys() - _propelling(profile):
-            words = f"would keep [output.{output.name}] driving after a stop, because {name!r} "
-            words += "moves it and does not propel"
-            raise root.table("stop").refused(held[0], words)
+            text = f"would keep [output.{output.name}] driving after a stop, because {name!r} "
+            text += "moves it and does not propel"
+            raise root.table("stop").refused(held[0], text)
     return profile
 
 
@@ -128,15 +128,15 @@ def check_limits(root: Table, profile: Profile) -> Profile:
     """Refuse limits that need something that is missing or too slow."""
     table, limits, camera = root.table("limits"), profile.limits, profile.camera
     if limits.deadline_ms * profile.control_hz < 1000:
-        words = f"must be at least {1000 / profile.control_hz:.0f} ms, the time from one command "
-        words += f"to the next at control_hz = {profile.control_hz:g}"
-        raise table.refused("deadline_ms", words)
+        text = f"must be at least {1000 / profile.control_hz:.0f} ms, the time from one command "
+        text += f"to the next at control_hz = {profile.control_hz:g}"
+        raise table.refused("deadline_ms", text)
     measured = {sensor.measures for sensor in profile.sensors}
     for name, quantity in limits.measured.items():
         if table.keys.get(name) and quantity not in measured:
             drivers = " or ".join(d for d, chip in SENSORS.items() if chip.measures == quantity)
-            words = f"needs a sensor that measures {quantity}, such as one with the driver "
-            raise table.refused(name, words + drivers)
+            text = f"needs a sensor that measures {quantity}, such as one with the driver "
+            raise table.refused(name, text + drivers)
     key = "camera_stale_ms"
     if camera is None:
         if key in table.keys:
@@ -145,8 +145,8 @@ def check_limits(root: Table, profile: Profile) -> Profile:
     stale_ms = limits.camera_stale_ms if key in table.keys else _CAMERA_STALE_MS
     needed_ms = max(2000 / camera.fps, _LEAST_STALE_MS)  # One frame may be lost.
     if stale_ms < needed_ms:
-        words = f"must be at least {needed_ms:.0f} ms: one of two images may be lost at fps = "
-        raise table.refused(key, f"{words}{camera.fps:g}")
+        text = f"must be at least {needed_ms:.0f} ms: one of two images may be lost at fps = "
+        raise table.refused(key, f"{text}{camera.fps:g}")
     return replace(profile, limits=replace(limits, camera_stale_ms=stale_ms))
 
 
@@ -167,20 +167,20 @@ def join_servo_bus(root: Table, profile: Profile) -> Profile:
     if "servo_bus" not in root.keys:
         raise root.table("output", servos[0].name).refused("", "is on a bus: add [servo_bus]")
     if len(sensing) != 1:
-        words = f"servos need one sensor with the driver {DRIVER}, such as [sensor.tendons], which "
+        text = f"servos need one sensor with the driver {DRIVER}, such as [sensor.tendons], which "
         second = (sensor.name for sensor in sensing[1:2])
-        raise root.error(f"{words}reports their failures", "sensor", *second)
+        raise root.error(f"{text}reports their failures", "sensor", *second)
     if profile.stop.then != "release":
-        words = 'must be "release", so that no servo pulls while nobody commands'
-        raise root.table("stop").refused("then", words)
+        text = 'must be "release", so that no servo pulls while nobody commands'
+        raise root.table("stop").refused("then", text)
     (bus,) = on_bus.decode(ServoBusKeys)
     settings = bus.settings()
     for output in servos:
         if not stops_itself(output):
             if profile.enable_pin is None:
-                words = f"is an {output.settings['model']}, which does not stop when its bus is "
-                words += "silent: add [enable] with the pin that keeps its power on"
-                raise root.table("output", output.name).refused("", words)
+                text = f"is an {output.settings['model']}, which does not stop when its bus is "
+                text += "silent: add [enable] with the pin that keeps its power on"
+                raise root.table("output", output.name).refused("", text)
             settings |= {"cut_ms": 2 * profile.enable_hold_ms, "arm_s": _START_S}
     wired = {one.name: replace(one, settings=one.settings | settings) for one in servos}
     with translate_errors(KeyMistake, to=lambda error: on_bus.refused(error.key, str(error))):

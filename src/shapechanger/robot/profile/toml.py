@@ -108,7 +108,7 @@ def permitted(kind: inspect.Type) -> str:
         case inspect.UnionType():
             return permitted(kind.types[0])
         case inspect.CustomType():
-            return cast("type[Pin]", kind.cls).words
+            return cast("type[Pin]", kind.cls).description
         case _:
             return f"a {type(kind).__name__.removesuffix('Type').lower()}"
 
@@ -157,14 +157,14 @@ class Table:
         line = line_of(self.text, (*self.place, *keys))
         return ProfileError(f"{self.path}, line {line}: {message}.")
 
-    def refused(self, key: str, words: str, *within: str) -> ProfileError:
+    def refused(self, key: str, text: str, *within: str) -> ProfileError:
         """Return an error about a key, or an entry within it; "" for the table itself.
 
-        `words` are the end of a sentence that begins with the key and its table.
+        `text` is the end of a sentence that begins with the key and its table.
         """
         if not key:
-            return self.error(f"{self} {words}")
-        return self.error(f"{key} of {self} {words}", key, *within)
+            return self.error(f"{self} {text}")
+        return self.error(f"{key} of {self} {text}", key, *within)
 
     def table(self, *names: str) -> Table:
         """Return a nested table, which is empty if the file does not have it."""
@@ -176,12 +176,12 @@ class Table:
     def named(self) -> dict[str, Table]:
         """Return the nested tables keyed by name; refuse names that no part may have."""
         if len(self.keys) > _MOST_NAMED:
-            words = f"must have at most {_MOST_NAMED} tables, not {len(self.keys)}"
-            raise self.refused("", words)
+            text = f"must have at most {_MOST_NAMED} tables, not {len(self.keys)}"
+            raise self.refused("", text)
         for name in self.keys:
             if _NAME.fullmatch(name) is None:
-                words = "must begin with a letter and have at most 32 letters, digits, '_' and '-'"
-                raise self.error(f"the name {name!r} {words}", name)
+                text = "must begin with a letter and have at most 32 letters, digits, '_' and '-'"
+                raise self.error(f"the name {name!r} {text}", name)
         return {name: self.table(name) for name in self.keys}
 
     def chosen(self, key: str, names: Iterable[str]) -> str:
@@ -211,8 +211,8 @@ class Table:
             for key, chips in (drivers or {}).items():
                 having = [repr(one) for one in chips if name in fields_of(chips[one].keys)]
                 if having:
-                    words = f"{name!r} belongs to {key} = {' or '.join(having)}, not to {self}"
-                    raise self.error(words, name)
+                    text = f"{name!r} belongs to {key} = {' or '.join(having)}, not to {self}"
+                    raise self.error(text, name)
             raise self.error(f"{self} has no key {choice(name, known)}", name)
         for name, one in known.items():
             if one.required and name not in self.keys:

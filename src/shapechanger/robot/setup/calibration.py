@@ -131,7 +131,7 @@ def require_homing(settings: BusSettings) -> None:
         pull, friction = servo.homing_n, servo.known.friction_nm / servo.spool_radius_m
         if servo.known.is_measured and pull <= friction:
             raise RobotError(
-                f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
+                f"{servo.label} cannot find its zero with {pull:g} N: its gears hold against "
                 f"about {friction:.1f} N. Set homing_n, to {1.5 * friction:.1f} N for example."
             )
 
@@ -169,7 +169,7 @@ def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
             wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
             if wound_m > _TRAVEL_M:
                 reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
-                raise RobotError(f"{servo.words} has no zero: {reason}. Its tendon has come off.")
+                raise RobotError(f"{servo.label} has no zero: {reason}. Its tendon has come off.")
             was_at, _ = moved.setdefault(name, (at, now_ns))
             if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
                 moved[name] = at, now_ns

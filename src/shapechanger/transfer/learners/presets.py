@@ -72,8 +72,8 @@ def tuning_text(learner: str, env: str) -> str:
     name = env.rpartition("/")[2].removesuffix("-v1")
     *first, last = names
     tuned = f"{', '.join(first)} and {last}" if first else last
-    words = f"The settings were tuned on {tuned}"
-    return f"{words}." if name in names else f"{words}, not on {name}."
+    text = f"The settings were tuned on {tuned}"
+    return f"{text}." if name in names else f"{text}, not on {name}."
 
 
 def learner_settings(name: str) -> LearnerSettings:

@@ -188,9 +188,9 @@ class Method:
         Raises:
             StudyError: With the reason.
         """
-        for takes, words in self.needs:
+        for takes, text in self.needs:
             if takes not in settings.takes:
-                raise self._lacks(words)
+                raise self._lacks(text)
         if self.one_family and not (source.family and source.family == target.family):
             raise self._lacks("two bodies of one family, such as two ants")
 

@@ -87,9 +87,9 @@ def test_encoded_values_decode_to_themselves(family: ServoFamily, value: int) ->
 
 def test_each_hardware_error_has_a_description() -> None:
     """Bit 1 is unused by Dynamixel; Feetech has six."""
-    assert DYNAMIXEL.error_words(0x24) == "it is overheated, it is overloaded"
-    assert DYNAMIXEL.error_words(0x02) == "it gives the unknown code 2"
-    assert FEETECH.error_words(0x12) == "its encoder fails, its angle is out of range"
+    assert DYNAMIXEL.errors_as_text(0x24) == "it is overheated, it is overloaded"
+    assert DYNAMIXEL.errors_as_text(0x02) == "it gives the unknown code 2"
+    assert FEETECH.errors_as_text(0x12) == "its encoder fails, its angle is out of range"
 
 
 @st.composite

@@ -137,8 +137,8 @@ class ServoBus:
         if self.mode == "held":
             for one in self.servos.values():
                 if one.length is not None and one.zero is None:
-                    words = one.settings.words
-                    raise RobotError(f"{words} cannot go to a length: it has no zero.")
+                    text = one.settings.label
+                    raise RobotError(f"{text} cannot go to a length: it has no zero.")
             with self._loss_noted():
                 self._send({id_: one.tension for id_, one in self.servos.items()})
 
@@ -171,10 +171,10 @@ class ServoBus:
         numbers: dict[str, int | None] = {}
         for one in self.servos.values():
             alive()
-            words = f"{one.settings.name} (id {one.settings.id})"
-            numbers[words] = one.find("model_number")
-        if missing := [words for words, number in numbers.items() if number is None]:
-            there = ", ".join(words for words in numbers if words not in missing)
+            text = f"{one.settings.name} (id {one.settings.id})"
+            numbers[text] = one.find("model_number")
+        if missing := [text for text, number in numbers.items() if number is None]:
+            there = ", ".join(text for text in numbers if text not in missing)
             bus = self._settings
             raise RobotError(
                 f"At {bus.device}, with {bus.baud} baud, no servo answers as {', '.join(missing)}; "

@@ -128,7 +128,7 @@ class TendonServo:
         """
         servo = self.settings
         if not math.isfinite(tension) or not math.isfinite(length or 0.0):
-            raise RobotError(f"{servo.words} cannot pull {tension} N to a length of {length} m.")
+            raise RobotError(f"{servo.label} cannot pull {tension} N to a length of {length} m.")
         self.tension = min(max(tension, servo.pretension_n), servo.most_tension_n)
         self.length = length
 
@@ -175,7 +175,7 @@ class TendonServo:
     def read(self, name: str) -> int:
         """Read a register; raise RobotError if the servo does not answer or refuses."""
         if (value := self.find(name)) is None:
-            raise RobotError(f"{self.settings.words} does not answer.")
+            raise RobotError(f"{self.settings.label} does not answer.")
         return value
 
     def write(self, name: str, value: int) -> None:
@@ -183,26 +183,26 @@ class TendonServo:
         one = self._family[name]
         ask = partial(self.port.write, {self.settings.id: one.encode(value)}, one.address)
         if self._ask(ask, f"set its {one.name} to {value}") is None:
-            raise RobotError(f"{self.settings.words} does not answer.")
+            raise RobotError(f"{self.settings.label} does not answer.")
 
     def _ask(self, ask: Callable[[], Mapping[int, ServoReply]], doing: str) -> bytes | None:
         for _ in range(_TRIES):
             if reply := ask().get(self.settings.id):
                 if number := reply.error & self._family.refused:
                     why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
-                    raise RobotError(f"{self.settings.words} refuses to {doing}: {why}.")
+                    raise RobotError(f"{self.settings.label} refuses to {doing}: {why}.")
                 return reply.data
         return None
 
     def check_model(self, number: int | None) -> None:
         """Check the model number and the version of the firmware."""
-        words, known = self.settings.words, self._model
+        text, known = self.settings.label, self._model
         if number != known.number:
             wrong = f"its model number is {number}, not {known.number}"
-            raise RobotError(f"{words} is not an {known.name}: {wrong}.")
+            raise RobotError(f"{text} is not an {known.name}: {wrong}.")
         if (firmware := self.read("firmware")) < known.least_firmware:
             needed = f"its own watchdog needs {known.least_firmware} or newer"
-            raise RobotError(f"{words} has firmware {firmware}; {needed}.")
+            raise RobotError(f"{text} has firmware {firmware}; {needed}.")
 
     def prepare(self) -> None:
         """Set up the mode, the limit of the goal, no goal and no torque."""
@@ -211,7 +211,7 @@ class TendonServo:
         self.write("mark", 0)  # A tripped watchdog blocks all goals.
         if error := self.read("hardware_error"):
             raise RobotError(
-                f"{servo.words} has switched itself off: {family.error_words(error)}. Only a "
+                f"{servo.label} has switched itself off: {family.errors_as_text(error)}. Only a "
                 "reboot gives it torque again, after which its zero must be found again."
             )
         values = {name: one.value for name, one in family.registers.items()}
@@ -226,7 +226,7 @@ class TendonServo:
             if (wanted := found & one.kept_bits | value) != found:
                 self.write(name, wanted)
                 if self.read(name) != wanted:  # Not every family refuses.
-                    raise RobotError(f"{servo.words} does not keep {wanted} as {one.name}.")
+                    raise RobotError(f"{servo.label} does not keep {wanted} as {one.name}.")
         if "lock" in values:
             self.write("lock", 1)
         self._set_mark()
@@ -292,7 +292,7 @@ class TendonServo:
     def audit(self, name: str, value: int, *, pulls: bool) -> None:
         """Evaluate a register that shows whether a servo, which should pull or not, obeys."""
         if name == "hardware_error" and value:
-            error = self._family.error_words(value)
+            error = self._family.errors_as_text(value)
             self._fail(f"has switched itself off: {error}. Only a reboot gives it torque again")
         elif name == "mark" and self._family.has_watchdog and value == TRIPPED:
             silence = f"it received nothing for {self._bus.watchdog_ms} ms"
@@ -325,4 +325,4 @@ class TendonServo:
         return self._wrong[sign] >= count
 
     def _fail(self, reason: str) -> None:
-        self.fault = self.fault or f"{self.settings.words} {reason}."
+        self.fault = self.fault or f"{self.settings.label} {reason}."

@@ -129,10 +129,10 @@ class ServoFamily(msgspec.Struct, frozen=True):
         """Unit of the speed, rad/s."""
         return self.speed_rpm * _RAD_PER_S_PER_RPM
 
-    def error_words(self, bits: int) -> str:
+    def errors_as_text(self, bits: int) -> str:
         """Describe the bits of the hardware error status."""
-        words = (words for bit, words in sorted(self.errors.items()) if bits >> bit & 1)
-        return ", ".join(words) or f"it gives the unknown code {bits}"
+        texts = (text for bit, text in sorted(self.errors.items()) if bits >> bit & 1)
+        return ", ".join(texts) or f"it gives the unknown code {bits}"
 
 
 class ServoModel(msgspec.Struct, frozen=True, array_like=True):
@@ -260,13 +260,13 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
             why = f"a {family.name} servo has no control of its current"
             raise KeyMistake("control", f"must be 'length', not 'tension', because {why}")
         if self.control == "length" and not self.shortest_m < self.longest_m:
-            words = f"must be below longest_m, not {self.shortest_m:g} and {self.longest_m:g} m"
-            raise KeyMistake("shortest_m", f"{words}, for control of the length")
+            text = f"must be below longest_m, not {self.shortest_m:g} and {self.longest_m:g} m"
+            raise KeyMistake("shortest_m", f"{text}, for control of the length")
         half = math.pi * self.spool_radius_m
         if not family.has_watchdog and max(-self.shortest_m, self.longest_m) >= half:
             far = "longest_m" if self.longest_m >= half else "shortest_m"
-            words = f"must be within {half:.4f} m of the zero, half a turn of the spool"
-            raise KeyMistake(far, f"{words}, because the servo forgets its turns with its power")
+            text = f"must be within {half:.4f} m of the zero, half a turn of the spool"
+            raise KeyMistake(far, f"{text}, because the servo forgets its turns with its power")
         least, most = self.newton_per_goal, self.known.most_counts * self.newton_per_goal
         end = f"{most:.0f} N with this spool"
         for key in ("most_tension_n", "pretension_n", "homing_n"):
@@ -285,7 +285,7 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         return MODELS[self.model]
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         """Name and id for messages."""
         return f"Servo {self.name} (id {self.id})"
 
@@ -347,8 +347,8 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
         if len(names) > 1:
             raise KeyMistake("device", f"cannot have {' and '.join(names)} servos together")
         if self.servos and self.baud not in (rates := self.family.baud_rates):
-            words = ", ".join(map(str, rates))
-            raise KeyMistake("baud", f"must be one that the servos have, {words}, not {self.baud}")
+            text = ", ".join(map(str, rates))
+            raise KeyMistake("baud", f"must be one that the servos have, {text}, not {self.baud}")
 
     @property
     def family(self) -> ServoFamily:
