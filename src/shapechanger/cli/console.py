@@ -34,9 +34,9 @@ def print_table(table: Table, file_width: int | None = None) -> None:
     plain_console(width=None if sys.stdout.isatty() else file_width).print(table)
 
 
-def counted(number: int, what: str) -> str:
+def counted(number: int, noun: str) -> str:
     """Format a count, such as "1 step" or "2 steps"."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def command_line() -> str:

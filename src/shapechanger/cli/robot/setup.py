@@ -228,14 +228,14 @@ def _first_sentence(profile: Path) -> str:
     return " ".join(line.lstrip("# ") for line in lines).partition(". ")[0].rstrip(".")
 
 
-def _one_of(options: Iterable[str], what: str) -> Callable[[str], str]:
+def _one_of(options: Iterable[str], kind: str) -> Callable[[str], str]:
     """Return a check that takes one of some words, in any case, or the start of one."""
 
     def check(answer: str) -> str:
         word = answer.lower()
         starts = [option for option in options if option.startswith(word)]
         if word not in options and len(starts) != 1:
-            raise UnknownName(what, answer, options)
+            raise UnknownName(kind, answer, options)
         return word if word in options else starts[0]
 
     return check

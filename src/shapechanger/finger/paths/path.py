@@ -23,23 +23,23 @@ Vector = tuple[float, float, float]
 """x, y and z."""
 
 
-def number(what: str, value: Any, *, above_zero: bool = False) -> float:
+def number(name: str, value: Any, *, above_zero: bool = False) -> float:
     """Return a finite number; raise PathError, with its name, for anything else."""
     found = float(value) if isinstance(value, Real) and value is not True else math.nan
     if value is False or not math.isfinite(found) or (above_zero and not found > 0.0):
         above = " above 0" if above_zero else ""
-        raise PathError(f"{what} must be a finite number{above}, got {value!r}.")
+        raise PathError(f"{name} must be a finite number{above}, got {value!r}.")
     return found
 
 
 positive: Final = partial(number, above_zero=True)
 
 
-def vector(what: str, value: Any) -> Vector:
+def vector(name: str, value: Any) -> Vector:
     """Return three finite numbers, of an array too; raise PathError, with their name, otherwise."""
     numbers = as_numbers(value)
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
-        raise PathError(f"{what} must be three finite numbers (x, y, z), got {value!r}.")
+        raise PathError(f"{name} must be three finite numbers (x, y, z), got {value!r}.")
     x, y, z = numbers.tolist()
     return x, y, z
 
@@ -310,19 +310,19 @@ def _axes(normal: Vector) -> _Axes:
 
 
 def _closed(
-    what: str,
+    kind: str,
     hz: float,
     phase: float,
     centre: Vector,
     cosines: list[NDArray[np.float64]],
     sines: list[NDArray[np.float64]],
 ) -> FingertipPath:
-    """Return a closed path as `Harmonics`; `what` names the shape in messages."""
-    hz = positive(f"The hz of a {what}", hz)
+    """Return a closed path as `Harmonics`; `kind` names the shape in messages."""
+    hz = positive(f"The hz of a {kind}", hz)
     motion = Harmonics(
         hz=hz,
-        phase=number(f"The phase of a {what}", phase),
-        centre=vector(f"The centre of a {what}", centre),
+        phase=number(f"The phase of a {kind}", phase),
+        centre=vector(f"The centre of a {kind}", centre),
         cosines=tuple(map(_vector, cosines)),
         sines=tuple(map(_vector, sines)),
     )
@@ -332,7 +332,7 @@ def _closed(
         fastest = np.hypot(np.hypot(around[:, 0], around[:, 1]), around[:, 2]).max()
     if not fastest <= FASTEST_MPS:
         raise PathError(
-            f"This {what} is as fast as {fastest:.3g} m/s, and no fingertip is faster than "
+            f"This {kind} is as fast as {fastest:.3g} m/s, and no fingertip is faster than "
             f"{FASTEST_MPS:g} m/s: make it smaller, or hz lower."
         )
     return path

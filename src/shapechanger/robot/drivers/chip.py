@@ -71,13 +71,13 @@ class Claim(NamedTuple):
 
     Attributes:
         key: Name of the key that claims it.
-        what: A pin, a channel or an address.
+        resource: A pin, a channel or an address.
         group: Users of one group may share it; "" for exclusive use.
         use: What it is used for, as the end of a sentence; may be empty.
     """
 
     key: str
-    what: str
+    resource: str
     group: str = ""
     use: str = ""
 

@@ -192,13 +192,13 @@ class OutputBank:
 
 
 @contextlib.contextmanager
-def errors_noted(failures: list[str], what: str = "") -> Generator[None]:
+def errors_noted(failures: list[str], source: str = "") -> Generator[None]:
     """Note an error instead of raising it: whatever it is, the next output must rest too."""
     try:
         yield
     except Exception as error:
         text = str(error) or type(error).__name__
-        failures.append(f"{what}: {text}" if what else text)
+        failures.append(f"{source}: {text}" if source else text)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:

@@ -27,13 +27,13 @@ def check_claims(root: Table, profile: Profile) -> Profile:
     """Refuse a pin, a channel or an address that two keys claim."""
     users: dict[str, tuple[Table, Claim]] = {}
     for table, claim in ((table, one) for table, keys in root.decoded for one in keys.claims()):
-        before, earlier = users.setdefault(claim.what, (table, claim))
+        before, earlier = users.setdefault(claim.resource, (table, claim))
         if earlier is claim or (claim.group and claim.group == earlier.group):
             continue
         line = line_of(before.text, (*before.place, earlier.key))
         raise table.error(
-            f"{claim.what}{claim.use} is used twice: by {earlier.key} of {before} (line {line}) "
-            f"and by {claim.key} of {table}",
+            f"{claim.resource}{claim.use} is used twice: by {earlier.key} of {before} (line "
+            f"{line}) and by {claim.key} of {table}",
             claim.key,
         )
     return profile

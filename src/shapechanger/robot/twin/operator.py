@@ -131,52 +131,52 @@ class Operator:
         if self._board.camera is None:
             raise RobotError("This twin has no camera.")
         self._board.camera.break_down(fault)
-        self._board.record("fault", what=f"camera {fault or 'well'}")
+        self._board.record("fault", detail=f"camera {fault or 'well'}")
 
     @_at_board
     def press_bumper(self, down: bool = True) -> None:
         """Press or release all bumpers."""
         for bumper in self._board.of_kind(SimulatedSwitch):
             bumper.held = down
-        self._board.record("fault", what=f"bumper {'down' if down else 'up'}")
+        self._board.record("fault", detail=f"bumper {'down' if down else 'up'}")
 
     @_at_board
     def press_stop(self, down: bool = True) -> None:
         """Press or release the emergency stop button."""
         self._board.stop_held = down
-        self._board.record("fault", what=f"stop {'down' if down else 'up'}")
+        self._board.record("fault", detail=f"stop {'down' if down else 'up'}")
 
     @_at_board
     def set_battery(self, volts: float | None) -> None:
         """Set the battery's voltage without load, V; None for a full one."""
         self._board.world.resting_v = RESTING_V if volts is None else volts
-        self._board.record("fault", what=f"battery {volts}")
+        self._board.record("fault", detail=f"battery {volts}")
 
     @_at_board
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
         """Let distance sensors measure so much, None for the truth, or not answer if `dead`."""
         for sensor in self._board.of_kind(SimulatedHcsr04):
             sensor.override_m, sensor.dead = metres, dead
-        self._board.record("fault", what=f"distance {'dead' if dead else metres}")
+        self._board.record("fault", detail=f"distance {'dead' if dead else metres}")
 
     @_at_board
     def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
         """Make the I2C chip at an address of a bus stop answering, or answer again."""
         chips = self._board.dead_chips
         (chips.add if dead else chips.discard)((bus, address))
-        self._board.record("fault", what=f"chip {bus} {address} {'dead' if dead else 'well'}")
+        self._board.record("fault", detail=f"chip {bus} {address} {'dead' if dead else 'well'}")
 
     @_at_board
     def break_servo(self, tendon: str, fault: ServoFault) -> None:
         """Make the servo of a tendon fail; "" repairs what can be repaired."""
         self._board.require_rig().break_servo(tendon, fault)
-        self._board.record("fault", what=f"servo {tendon} {fault or 'well'}")
+        self._board.record("fault", detail=f"servo {tendon} {fault or 'well'}")
 
     @_at_board
     def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
         """Change the magnet of a joint's encoder; "" repairs it."""
         self._board.encoder(joint).set_magnet(state)
-        self._board.record("fault", what=f"magnet {joint} {state or 'well'}")
+        self._board.record("fault", detail=f"magnet {joint} {state or 'well'}")
 
     @_at_board
     def tensions(self) -> dict[str, float]:

@@ -15,7 +15,7 @@ input   pin, level               an edge of a sensor
 place   seed                     the operator placed the vehicle at a start
 put_back                         the operator put the vehicle back after a collision
 course  seed                     the operator replaced the surroundings
-fault   what                     the operator broke or pressed something
+fault   detail                   the operator broke or pressed something
 ```
 
 Each line is written at once, so that a crash leaves at most one broken line, the last.
@@ -56,7 +56,7 @@ class Transition:
     level: int | None = None
     released: bool = False
     seed: int | None = None
-    what: str | None = None
+    detail: str | None = None
 
 
 def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:

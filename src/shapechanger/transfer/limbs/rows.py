@@ -131,7 +131,7 @@ class LimbRows:
         for i, name in enumerate(names):
             own = _filled(self.columns, trunk=i == 0)
             element = Element("joint", name) if 0 < i <= len(self.limbs) else None
-            features += [Feature(f"{name}: {what}", "1", element=element) for what in own]
+            features += [Feature(f"{name}: {kind}", "1", element=element) for kind in own]
         actions = [Feature(f"{name}: action", "1", -1.0, 1.0) for name in names[1:]]
         return Layout(tuple(features)), Layout(tuple(actions))
 
@@ -169,9 +169,9 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     width = columns.width
     selection = np.zeros((observation.size, (room + 1) * width))
     scale, offset = np.ones(observation.size), np.zeros(observation.size)
-    for i, (row, what) in enumerate(found):
+    for i, (row, kind) in enumerate(found):
         senses = columns.limb if row else columns.trunk
-        selection[i, row * width + DESCRIBED + senses.index(what)] = 1.0
+        selection[i, row * width + DESCRIBED + senses.index(kind)] = 1.0
         scale[i], offset[i] = _scaling(observation.features[i])
     constant = np.zeros((room + 1, width))
     constant[0, 0] = 1.0
@@ -212,8 +212,8 @@ def _meanings(layout: Layout) -> tuple[str, ...]:
     """Return the features of a trunk and of a limb."""
     rows: dict[str, list[str]] = {}
     for name in layout.names:
-        row, _, what = name.partition(": ")
-        rows.setdefault(row, []).append(what)
+        row, _, kind = name.partition(": ")
+        rows.setdefault(row, []).append(kind)
     _, limb, *_ = rows.values()
     return (*rows["trunk"], *limb)
 
