@@ -58,7 +58,7 @@ def test_every_suite_is_a_function_of_its_module() -> None:
 
 
 def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It ends in one sentence, before anything is measured."""
+    """The run ends with one sentence before anything is measured."""
     monkeypatch.setattr(sys, "argv", ["run", "vehicles-clone"])
     monkeypatch.setenv("ONLY", "baot")
     with pytest.raises(SystemExit, match=r"^No vehicle matches 'baot'\. Did you mean 'boat'\?"):

@@ -52,7 +52,7 @@ def test_an_example_runs(example: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("example", _EXAMPLES, ids=lambda example: example.stem)
 def test_an_example_is_short(example: Path) -> None:
-    """It says in its first sentence what it shows, in less than 100 lines."""
+    """The first sentence describes the example, which has less than 100 lines."""
     text = example.read_text()
     assert text.count("\n") < 100
     assert '\n"""' in text

@@ -57,7 +57,7 @@ def test_the_package_uses_ours() -> None:
 
 
 def test_lerobot_finds_the_package() -> None:
-    """It imports the module that has the distribution's name, if that begins like this."""
+    """LeRobot imports modules whose distribution has this prefix."""
     project = _project(LEROBOT)
     assert project["name"].startswith("lerobot_robot_")
     assert (LEROBOT / project["name"] / "__init__.py").is_file()

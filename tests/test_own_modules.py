@@ -50,7 +50,7 @@ def test_modules_count_with_all_that_they_import(folder: Path) -> None:
 
 
 def test_installed_modules_and_ours_do_not_count() -> None:
-    """Their versions stand in the plan."""
+    """The plan lists versions of installed modules."""
     assert own_modules(["numpy", "json", "shapechanger.layout", "no_such_module", ""]) == {}
 
 

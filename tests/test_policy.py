@@ -110,14 +110,14 @@ FILES: dict[str, Callable[[bytes], bytes]] = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_damaged_file_is_refused(path: Path, name: str) -> None:
-    """Its header is never parsed beyond a bound, and its kind is unknown or the old one."""
+    """The header is never parsed beyond a bound, and the kind is unknown or the old one."""
     path.write_bytes(FILES[name](path.read_bytes()))
     _refused(path)
     assert kind_of(path) in {"", "test"}
 
 
 def test_a_large_file_is_not_read(path: Path) -> None:
-    """It claims 8 GiB, and has no bytes on the disk."""
+    """The file claims 8 GiB, and has no bytes on the disk."""
     with path.open("wb") as file:
         file.truncate(8 * _GIB)
     assert "larger than 256 MiB" in _refused(path)

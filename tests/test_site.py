@@ -94,7 +94,7 @@ def test_pulled_pins_are_those_that_move_something(profile: Profile) -> None:
 
 
 def test_the_one_shot_has_the_time_of_the_profile() -> None:
-    """Its resistor equals docs/hardware.md's for 100 ms, and half of it for 50 ms."""
+    """The resistor equals docs/hardware.md's for 100 ms, and half of it for 50 ms."""
     assert "220 kΩ to 3.3 V" in draw_wiring(load_profile(shipped_profiles()["car"]), "car")
     assert "R = 220 kOhm" in (ROOT / "docs" / "hardware.md").read_text()
     assert "110 kΩ to 3.3 V" in draw_wiring(read_profile(EVERYTHING, Path("rover.toml")), "rover")

@@ -52,7 +52,7 @@ def _controller(env: str, mode: str, **arguments: Any) -> FingerController:
 
 
 def test_the_shipped_policy_reaches() -> None:
-    """It reaches nine of ten targets, and its card names the env."""
+    """The policy reaches nine of ten targets, and its card names the env."""
     policy = load_policy(POLICIES["reach"])
     assert policy.card.env.id == FINGER
     infos = _ends(_Policy(policy), FINGER, 10)
@@ -60,7 +60,7 @@ def test_the_shipped_policy_reaches() -> None:
 
 
 def test_the_shipped_policy_follows() -> None:
-    """Its RMS error on a circle at 0.5 Hz is at most twice the controller's."""
+    """The policy's RMS error on a circle at 0.5 Hz is at most twice the controller's."""
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
     infos = _ends(_Policy(policy), TRACK, 1, path=_CIRCLE)

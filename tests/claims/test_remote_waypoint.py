@@ -46,7 +46,7 @@ def _lab_car() -> Profile:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve, tmp_path: Path) -> None:
-    """Its response equals the simulated car's; frames and actions equal all others'."""
+    """The response equals the simulated car's; frames and actions equal all others'."""
     with closing(WaypointEnv("car")) as simulated:
         expected = simulated.response
         stated = find_profile("lab-car").read_text(encoding="utf-8")

@@ -64,7 +64,7 @@ def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_vehicles_are_filmed_from_outside(tmp_path: Path) -> None:
-    """Their envs render what the robot sees, not the robot."""
+    """Envs of vehicles render what the robot sees, not the robot."""
     source, target = driven(env_ref("CarWaypoint")), driven(env_ref("TankWaypoint"))
     whole = cast("Any", learner_settings("waypoint")).clone
     small = {"channels": (4, 8), "features": 8, "batch": 8}

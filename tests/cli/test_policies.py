@@ -195,7 +195,7 @@ def build(envs, seed):
 def test_a_policy_of_ones_own_learner_is_evaluated_when_it_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
-    """Its file alone does not import the user's module."""
+    """The policy's file alone does not import the user's module."""
     (tmp_path / "own_a2c.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))

@@ -72,7 +72,7 @@ def test_an_impedance_is_held_between_computations() -> None:
 
 
 def test_tensions_have_a_resolution() -> None:
-    """They are rounded down, as a servo rounds its current."""
+    """Tensions are rounded down, as a servo rounds its current."""
     seen = _tensions(_RIG.replace(path=CommandPath(tension_step=0.4)), [0.5])
     asked = NOMINAL.least_tension + 0.75 * (_MOST[0] - NOMINAL.least_tension)
     assert seen[-1] == pytest.approx(0.4 * np.floor(asked / 0.4), rel=1e-6)

@@ -329,7 +329,7 @@ def test_time_limits_restart_fingers_alone(parameters: Any) -> None:
 
 
 def test_a_finger_that_diverges_restarts_alone() -> None:
-    """Its reward is 0, and the others step as ever."""
+    """The reward of a diverged finger is 0, and the others step as ever."""
     pairs = [shapechanger.make_vec("Finger", 3, backend="warp", device="cpu") for _ in range(2)]
     whole, broken = pairs
     for worlds in pairs:
@@ -346,7 +346,7 @@ def test_a_finger_that_diverges_restarts_alone() -> None:
 
 
 def test_a_finger_given_at_a_reset_moves_as_one_made_with_it() -> None:
-    """Its arms, motors and history are its own, whichever finger the world had before."""
+    """Arms, motors and history are the new finger's, whichever finger the world had before."""
     bodies, arguments = KINDS["late"]
     worlds, _ = many("late")
     late: Any = {"command_delay": 0.0173, "motor_lag": 0.01}

@@ -17,7 +17,7 @@ def _is_within(angles: np.ndarray) -> bool:
 
 
 def test_fingertips_of_balanced_postures_are_reached() -> None:
-    """They are reached within 0.01 mm, from the resting posture and from nearby ones."""
+    """Each point is reached within 0.01 mm, from the resting posture and from nearby ones."""
     rng = np.random.default_rng(0)
     for _ in range(150):
         posture = draw_posture(rng)

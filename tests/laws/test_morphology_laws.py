@@ -207,7 +207,7 @@ def test_a_split_keeps_length_and_ends(at: float, body: str) -> None:
 @law
 @given(angle=ANGLES, hip=st.floats(-1.0, 0.5), knee=st.floats(-1.5, 0.0))
 def test_a_copied_limb_is_rotated(angle: float, hip: float, knee: float) -> None:
-    """It is rotated about the trunk's vertical axis, in every pose of its joints."""
+    """The copy is rotated about the trunk's vertical axis, in every pose of its joints."""
     model = built(leg(), AddLimb("thigh", "_2", angle))
     data = posed(model, {"hip": hip, "hip_2": hip, "knee": knee, "knee_2": knee})
     cos, sin = math.cos(angle), math.sin(angle)

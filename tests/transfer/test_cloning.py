@@ -113,7 +113,7 @@ def test_a_clone_can_start_from_another(tmp_path: Path) -> None:
 def test_rehearsal_starts_from_the_source_and_learns_from_both(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """It differs from fine-tuning only by the source's demonstrations, which exist already."""
+    """Rehearsal adds only the source's demonstrations, which exist already, to fine-tuning."""
     folder = tmp_path / "study"
     shutil.copytree(finished[1], folder)
     (folder / STUDY_FILE).unlink()
@@ -224,7 +224,7 @@ def test_steps_are_rounded_up_to_a_budget() -> None:
 
 
 def test_the_learner_is_found_by_name() -> None:
-    """Its settings round trip through the JSON of a plan."""
+    """The learner's settings round trip through the JSON of a plan."""
     settings = learner_settings("cloning")
     assert isinstance(settings, CloningSettings)
     assert settings is LEARNERS["cloning"]
@@ -245,7 +245,7 @@ def test_envs_without_a_demonstrator_are_refused(order: int) -> None:
 
 @pytest.mark.parametrize("vehicle", CLONES)
 def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
-    """Their cards name the env and the 12,000 demonstrated steps."""
+    """The cards name the env and the 12,000 demonstrated steps."""
     settings = LEARNERS["cloning"]
     assert isinstance(settings, CloningSettings)
     env = EnvRef(f"shapechanger/{vehicle.capitalize()}-v1", {"put_back": True})

@@ -111,7 +111,7 @@ def test_a_full_disk_ends_all_jobs(tmp_path: Path) -> None:
 
 
 def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
-    """Its workers end before they read their jobs, which resets the connections."""
+    """Workers end before they read their jobs, which resets the connections."""
     script = tmp_path / "unguarded.py"
     script.write_text(
         "from shapechanger.transfer.executor import Job, Processes\n"

@@ -109,7 +109,7 @@ def _study(out: Path, arms: tuple[str, ...]) -> Study:
 def test_a_study_runs_with_a_learner_and_a_method_of_others(
     installed: None, tmp_path: Path
 ) -> None:
-    """Its plan is read back, so that it can be resumed, and nothing runs twice."""
+    """The plan is read back, so that it can be resumed, and nothing runs twice."""
     arms = ("scratch", "zero-shot", "fine-tune", "patient")
     study = _study(tmp_path / "study", arms)
     assert [e.steps for e in study.of("patient")[0].curve] == [0, 2, 4]

@@ -193,7 +193,7 @@ def test_unsuitable_numbers_are_refused(
 def test_settings_of_a_stranger_are_refused(
     settings: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
-    """They allocate no memory, and call nothing."""
+    """Such settings allocate no memory, and call nothing."""
     known = json.loads(msgspec.json.encode(load_policy(POLICIES["reach"]).card.settings))
     with pytest.raises(CorruptStudy, match="is not a policy") as refusal:
         load_policy(_changed(tmp_path, {"settings": known | settings}))

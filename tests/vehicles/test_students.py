@@ -46,7 +46,7 @@ def teacher() -> TrainedPolicy:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_student_sees_images_only(teacher: TrainedPolicy, tmp_path: Path) -> None:
-    """Its card names the teacher, and it acts like it."""
+    """The card names the teacher, and the student acts like it."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
     policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)

@@ -193,11 +193,11 @@ class Run(msgspec.Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """Its name, which also names its folder."""
+        """Name of the run, and of its folder."""
         return f"{self.kind.replace(':', '.')}-{self.index}"
 
     def folder(self, study: Path) -> Path:
-        """Its folder in the folder of a study."""
+        """Folder of the run inside a study's folder."""
         return study / "runs" / self.name
 
     def policy_file(self, study: Path) -> Path:

@@ -62,7 +62,7 @@ def test_it_says_what_it_did(pi: FakePi, car: Profile, said: Said) -> None:
 
 
 def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
-    """It writes nothing, so the unit of `init` has to be there."""
+    """A dry run writes nothing, so the unit of `init` has to be there."""
     with pytest.raises(RobotError, match="it is written without --dry-run"):
         said(dry_run=True)
     said()

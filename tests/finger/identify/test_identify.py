@@ -244,7 +244,7 @@ def test_replay_of_the_true_finger_repeats_its_motion(stiffness: float | None) -
 
 
 def test_a_rig_changes_what_the_model_lacks() -> None:
-    """Its tensions reveal friction; play and sticking of its gears add to the errors of arms."""
+    """Tensions reveal friction; play and sticking of the gears add to the errors of arms."""
     plain, rig = estimates(), estimates(rig=NOMINAL.replace(path=CommandPath()))
     reach = interval_quantile(300, 0.02)
     arm = "moment_arms/FDP/MCP_flexion"

@@ -39,7 +39,7 @@ def test_a_circle_starts_distally_and_goes_palmar() -> None:
 
 
 def test_a_figure_eight_crosses_itself_once() -> None:
-    """It passes its centre twice a period, and its loops turn in opposite directions."""
+    """The path passes its centre twice a period, and the loops turn in opposite directions."""
     path = figure_eight(0.02)
     np.testing.assert_allclose(path.at([0.0, 1.0]), [CENTRE, CENTRE], atol=1e-15)
     towards, back = path.position(np.array([0.0, 1.0]), 1)

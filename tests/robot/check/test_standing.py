@@ -268,7 +268,7 @@ def test_pressed_switches(car: Profile) -> None:
 
 
 def test_the_battery_is_measured(car: Profile) -> None:
-    """Its voltage is compared with the limit at which the robot stops; 0 V is a wire."""
+    """The voltage is compared with the limit at which the robot stops; 0 V is a wire."""
     low = replace(car, limits=replace(car.limits, low_battery_v=50.0))
     level, sentence = _wired(low, _board(low).hardware)["sensor"][-1]
     assert (level, "below low_battery_v, 50 V: charge" in sentence) == ("bad", True)
@@ -293,7 +293,7 @@ def test_servo_boards() -> None:
 
 
 def test_the_servos_of_a_rig_answer() -> None:
-    """They are asked without torque, and a missing one is named."""
+    """Servos are read without torque, and a missing one is named."""
     rig = shipped("finger")
     board = _board(rig)
     assert _wired(rig, board.hardware)["servo bus"] == [("good", "All 7 servos answer.")]
@@ -303,7 +303,7 @@ def test_the_servos_of_a_rig_answer() -> None:
 
 
 def test_each_magnet_is_checked() -> None:
-    """It is reported for its joint only, and a dead multiplexer for each joint behind it."""
+    """A missing magnet is reported for its joint, a dead multiplexer for each joint behind it."""
     rig = shipped("finger")
     board = _board(rig)
     states: dict[str, Magnet] = {
@@ -345,7 +345,7 @@ def test_missing_and_wrong_resistors(kind: str, held: dict[int, bool], expected:
 
 
 def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: Profile) -> None:
-    """It needs pins and buses, and a robot that is not served."""
+    """The check needs pins and buses, and a robot that is not served."""
     for name in ("dev/gpiochip0", "dev/i2c-1"):
         _write(tmp_path, name)
 

@@ -231,7 +231,7 @@ def test_combinations_and_input_methods_are_no_orders(person: Input) -> None:
 
 
 def test_keys_held_while_somebody_else_arms_are_no_orders(car: RunningRobot, person: Input) -> None:
-    """They count once they are pressed again."""
+    """Held keys count once they are pressed again."""
     person.tap("KeyX", "x")
     person.console.await_state(robot="disarmed")
     person.key("Down", "KeyW", "w")

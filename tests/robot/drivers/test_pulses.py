@@ -195,7 +195,7 @@ def test_outputs_of_a_dead_process_do_not_come_back() -> None:
 
 
 def test_a_chip_that_lost_power_is_configured_again() -> None:
-    """It is noticed within 100 writes; then writes restore mode, prescaler and pulses."""
+    """The loss is noticed within 100 writes; then writes restore mode, prescaler and pulses."""
     hardware = FakeHardware({0x40: _asleep()})
     esc, servo = (hardware.output("servo", **_ON_CHIP, channel=channel) for channel in (0, 1))
     esc.write(0.0, 0)

@@ -93,7 +93,7 @@ def test_control_of_the_length_has_its_gain_in_metres() -> None:
 
 
 def test_a_feetech_rig_has_the_settings_of_its_power_switch() -> None:
-    """Its outputs know how long the enable line holds, and how long the servos start."""
+    """The plan has the time that the enable line holds, and the servos' start-up time."""
     profile = read(finger_text("Feetech") + "hold_ms = 50\n")
     settings = {
         (o.settings["model"], o.settings["cut_ms"], o.settings["arm_s"]) for o in profile.outputs

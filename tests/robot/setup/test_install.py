@@ -88,7 +88,7 @@ def _changed(robot: Profile, **settings: object) -> Profile:
 
 
 def test_another_bus_is_left_to_a_person(pi: FakePi) -> None:
-    """Its overlay depends on its pins."""
+    """The overlay depends on its pins."""
     plan = _changed(_blind("car-esc"), bus=3)
     level, sentence = _install(pi, plan)["I2C bus 3"]
     assert (level, "dtoverlay=i2c3" in sentence) == ("failed", True)
@@ -104,7 +104,7 @@ def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
 
 
 def test_a_rig_on_an_adapter(pi: FakePi) -> None:
-    """Its adapter gets a short latency, and its encoders a fast bus."""
+    """The adapter gets a short latency, and its encoders a fast bus."""
     found = _levels(_install(pi, _blind("finger")))
     assert (found["latency timer"], found["I2C speed"], found["group dialout"]) == ("did",) * 3
     assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}

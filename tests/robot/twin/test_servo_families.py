@@ -239,7 +239,7 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
 
 
 def test_feetech_servos_find_their_turns_again() -> None:
-    """Their lengths are right after each start, wherever within half a turn they stood."""
+    """Lengths are right after each start, wherever within half a turn they stood."""
     bench = _Bench(read(finger_text("Feetech")))
     bench.drive(_FLEX, 60)
     expected = bench.lengths_of_angles()

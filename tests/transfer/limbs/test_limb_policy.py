@@ -81,7 +81,7 @@ def test_limbs_may_come_in_any_order_and_number(policy: TrainedPolicy) -> None:
 
 
 def test_limbs_without_a_motor_count_in_no_probability(policy: TrainedPolicy) -> None:
-    """Their actions change neither the probability of the others nor the entropy."""
+    """Actions of such limbs change neither the probability of the others nor the entropy."""
     (env,) = limb_envs(EXTENDED.having({"actuated_extension": False}), 1)
     rows, _ = env.reset(seed=0)
     net = _net(policy)
@@ -186,7 +186,7 @@ def test_other_families_are_refused(policy: TrainedPolicy) -> None:
 
 
 def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
-    """It trains on the same bodies and is refused where the room differs."""
+    """The network trains on the same bodies, and is refused if the room differs."""
     learner = _learner(network="padded", room=9, net_arch=(8,))
     trained = learner.train(FEW, 32, 0, on_evaluation=lambda _: None)
     save_policy(trained, tmp_path / "padded.safetensors")
@@ -203,7 +203,7 @@ def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
 
 
 def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is evaluated before the first target step, and then learns there."""
+    """The generalist is evaluated before the first target step, and then learns there."""
     monkeypatch.setattr(generalist, "BODIES", 4)
     short = {"max_episode_steps": 20}
     task = TransferTask(ANT.having(short), EXTENDED.having(short))

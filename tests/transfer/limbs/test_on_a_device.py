@@ -160,7 +160,7 @@ def test_training_changes_every_layer(policy: TrainedPolicy) -> None:
 
 
 def test_the_file_acts_in_an_unseen_body(policy: TrainedPolicy, tmp_path: Path) -> None:
-    """It is loaded, evaluated, fine-tuned on either backend, and exported as any other."""
+    """The file is loaded, evaluated, fine-tuned on either backend, and exported as any other."""
     path = tmp_path / "ants.safetensors"
     save_policy(policy, path)
     loaded = load_policy(path)

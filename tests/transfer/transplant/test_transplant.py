@@ -596,7 +596,7 @@ def test_action_noise_is_not_guessed() -> None:
 
 @each_class
 def test_a_transplanted_model_can_be_trained(kind: type[Model]) -> None:
-    """It trains from step 0, and the source model is unchanged."""
+    """The model trains from step 0, and the source model is unchanged."""
     body_map = MAPS["growth"]
     source = trained(kind, body_map, normalised=True)
     before = {name: values.clone() for name, values in source.policy.state_dict().items()}

@@ -16,7 +16,7 @@ from tests.vehicles.bodies.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground,
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_vehicle_at_rest_stays(name: str) -> None:
-    """It creeps by less than 0.1 mm in ten seconds."""
+    """The vehicle creeps by less than 0.1 mm in ten seconds."""
     here = ground(name)
     here.drive(1.0, {})
     before = here.vehicle.motion()
@@ -102,7 +102,7 @@ def test_a_stalled_motor_draws_the_most_current(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
 def test_a_wall_stops_a_vehicle(name: str, heading: float) -> None:
-    """It neither climbs nor tips."""
+    """The vehicle neither climbs nor tips."""
     here = ground(name, wall_x=6.0)
     here.vehicle.place(0.0, 0.0, heading)
     most_height, least_upright, furthest = 0.0, 1.0, 0.0

@@ -44,7 +44,7 @@ def test_a_counter_clockwise_circle_turns_left() -> None:
 
 
 def test_tangent_radii_of_bends_and_necks() -> None:
-    """They equal a circle's radius, and half the distance between two long sides."""
+    """Tangent radii equal a circle's radius, and half the distance between two long sides."""
     assert tangent_radii(_ellipse(3.0, 3.0, 64)) == pytest.approx(3.0)
     x = np.linspace(-10.0, 10.0, 201)
     sides = np.concatenate([np.stack([x, 0 * x - 1], 1), np.stack([x[::-1], 0 * x + 1], 1)])

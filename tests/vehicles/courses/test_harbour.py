@@ -93,7 +93,7 @@ def test_obstacles_are_drawn_where_the_course_says(seed: int) -> None:
 
 @pytest.mark.parametrize("length", [1.600, 1.601], ids=["open", "with a cabin"])
 def test_a_dinghy_is_blunt(length: float) -> None:
-    """Its bow is at least 70 % as wide as its collision box, so that a boat meets what it sees."""
+    """The bow is at least 70 % as wide as its collision box, so that a boat meets what it sees."""
     dinghy = Obstacle("dinghy", 0.0, 0.0, 0.0, length, 0.8, 0.45)
     course = replace(lay_out("harbour", 0), obstacles=(dinghy,))
     bow = _points(Surfaces(course, Look.of("harbour")).obstacles())

@@ -17,7 +17,7 @@ from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
-    """It makes mistakes and drives without collisions."""
+    """The demonstrator makes mistakes and drives without collisions."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         driver: TaskDemonstrator = env.demonstrator(3)
         env.reset(seed=2)
@@ -65,7 +65,7 @@ def test_begin_takes_the_present_course() -> None:
 
 
 def test_put_back_it_goes_on_as_from_a_start() -> None:
-    """It forgets the manoeuvre that would have freed it where it was stuck."""
+    """The demonstrator forgets the manoeuvre that would have freed the vehicle."""
     with closing(VehicleEnv("car", image=False)) as env:
         driver = env.demonstrator(1)
         env.reset(options={"course": 3, "start": 1})

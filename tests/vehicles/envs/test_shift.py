@@ -34,7 +34,7 @@ def test_another_vehicle_is_a_shift(blind: dict[str, bool]) -> None:
 
 @pytest.mark.gl
 def test_the_map_of_waypoints_to_each_body_is_shown() -> None:
-    """It is how each body turns at full steering; its actions are a bearing and a speed."""
+    """The map shows how each body turns at full steering; actions are a bearing and a speed."""
     with closing(WaypointEnv("car")) as car, closing(WaypointEnv("tank")) as tank:
         text = str(WaypointEnv.certify_shift(car, tank))
         maps = [

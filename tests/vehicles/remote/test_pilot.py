@@ -173,7 +173,7 @@ def _moves(person: RobotClient) -> bool:
 @pytest.mark.system
 @pytest.mark.realtime
 def test_a_policy_drives_on_board(student: Path) -> None:
-    """It drives once a person arms the robot; a person takes over; it is ended and restarted."""
+    """The policy drives once a person arms, until a person takes over; it is ended and restarted."""
     with _served(student, "twin") as (robot, person), robot.operator() as operator:
         until(lambda: operator.where().truth["progress_m"] > 2.0)
         # Guard, daemon and twin have a higher priority, where the system permits it.
@@ -217,7 +217,7 @@ def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int)
 @pytest.mark.system
 @pytest.mark.realtime
 def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
-    """It ends with a sentence at its first action, and the robot stays at rest."""
+    """The program ends with a sentence at the first action, and the robot stays at rest."""
     policy = CameraPolicy.blank(_CLONE, seed=0)
     policy.network.hands.bias.data[:] = np.nan
     file = tmp_path / "nan.onnx"

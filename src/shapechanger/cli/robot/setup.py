@@ -67,7 +67,7 @@ class RobotInit:
     """Folder for the key and the certificate, if not the robot's own in the user's
     configuration."""
     camera: Literal["", "ribbon", "usb", "none"] = ""
-    """Its camera: on the Pi's ribbon cable, a webcam, or none; its kind's if not given."""
+    """The camera: on the Pi's ribbon cable, a webcam, or none; its kind's if not given."""
     arming: Literal["", "person", "anyone"] = ""
     """Who may arm it: only a person, or programs, too; as its kind has it if not given."""
 

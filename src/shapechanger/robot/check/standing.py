@@ -78,7 +78,7 @@ class StandingRobot:
 
     @cached_property
     def pins(self) -> Hardware:
-        """Its pins and buses, opened once."""
+        """Pins and buses of the robot, opened once."""
         return self.hardware()
 
     @cached_property

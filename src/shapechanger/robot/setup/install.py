@@ -172,7 +172,7 @@ class Machine:
 
     @property
     def config(self) -> Path | None:
-        """Its config.txt, which a Raspberry Pi has; None on other machines."""
+        """Path of config.txt, which a Raspberry Pi has; None on other machines."""
         paths = [self.root / name for name in ("boot/firmware/config.txt", "boot/config.txt")]
         return next((path for path in paths if path.exists()), None)
 

@@ -100,7 +100,7 @@ class BoardAt:
 
     @property
     def ledger_path(self) -> Path:
-        """Its ledger."""
+        """Ledger of the twin."""
         return self.folder / "ledger.jsonl"
 
     @property

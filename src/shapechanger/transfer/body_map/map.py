@@ -119,7 +119,7 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def layouts(self) -> tuple[Layout, Layout, Layout, Layout]:
-        """Its layouts, in the order of `between`."""
+        """The four layouts, in the order of `between`."""
         return (
             self.source_observation,
             self.target_observation,

@@ -55,7 +55,7 @@ class EnvReference(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def text(self) -> str:
-        """Its origin as text."""
+        """Origin of the policy as text."""
         return f"the reference ({self.learner}, {self.steps:,} steps, {len(self.seeds)} seeds)"
 
 

@@ -13,7 +13,7 @@ def _rig(direction: int = 1) -> Rig:
 
 
 def test_servos_are_in_current_based_position_mode() -> None:
-    """They hold their position at first, and after a stop do not turn back to an old length."""
+    """Servos hold their position at first, and after a stop do not turn back to an old length."""
     rig = _rig()
     for _ in range(2):
         for name in NAMES:

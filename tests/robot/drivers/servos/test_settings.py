@@ -140,7 +140,7 @@ def test_goals_stay_between_zero_and_the_cap(
 
 @given(length=st.floats(-1.0, 1.0), direction=st.sampled_from((1, -1)))
 def test_a_length_is_clipped_to_its_range(length: float, direction: int) -> None:
-    """Its position winds in by the circumference of the spool per turn, in either direction."""
+    """The position winds in by the circumference of the spool per turn, in either direction."""
     ends = {"longest_m": 0.01, "shortest_m": -0.02}
     one = _one(servo("FDP", control="length", direction=direction, **ends))
     one.request(5.0, length)

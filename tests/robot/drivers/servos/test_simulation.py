@@ -132,7 +132,7 @@ def test_a_feetech_servo_keeps_its_eeprom_locked() -> None:
 
 
 def test_a_feetech_servo_pulls_without_a_host_until_its_power_is_cut() -> None:
-    """It has no watchdog; after the power is back it has no torque and one turn."""
+    """The servo has no watchdog; after the power is back it has no torque and one turn."""
     bus = line(feetech("FDP", zero=6519))
     before = _position(bus)
     _feetech(bus, "goal_position", before + 1000)

@@ -31,7 +31,7 @@ from tests.robot.check.held_pins import HeldPins, shipped
 
 
 def test_a_probe_measures_the_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is the time of the last edge; a pin that stays high never stops."""
+    """A stop is measured at the last edge; a pin that stays high never stops."""
     now_ns = 0
     monkeypatch.setattr("time.monotonic_ns", lambda: now_ns)
     pins, car = HeldPins(), shipped("car")
@@ -87,7 +87,7 @@ _VOID = _result(0.0, drove=False)
 def test_a_fault_is_a_check(
     monkeypatch: pytest.MonkeyPatch, results: list[Any], level: str, sentence: str
 ) -> None:
-    """It is good only if each stop was in time, and was measured or seen."""
+    """A check passes only if each stop was in time, and was measured or seen."""
     monkeypatch.setattr(module, "_try", MagicMock(side_effect=results))
     trials = sum(result is not _VOID for result in results) or 1
     found = fault_finding(Bench(shipped("car")), FAULTS["driver killed"], trials)
@@ -103,7 +103,7 @@ def test_faults_need_parts_of_a_robot() -> None:
 
 
 def test_a_part_is_named_before_its_questions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its heading comes before anything is asked or opened, and each part ends at rest."""
+    """The heading comes before anything is asked or opened, and each part ends at rest."""
     bench: Any = Bench(shipped("car"))
     lit = Finding("LED GPIO22", "good", "lit.")
     lamps = MagicMock(return_value=[lit])
