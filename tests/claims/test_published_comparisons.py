@@ -44,8 +44,8 @@ def test_the_atlas_names_each_pair_whose_interval_excludes_zero(pairs, arm):
         "evolution": ["Ant-to-BigAnt", "AmputatedAnt-to-ExtendedAnt"],
     }
     assert list(found) == expected[arm]
-    words = " ".join(ATLAS.split())
-    assert all(interval in words for interval in found.values())
+    text = " ".join(ATLAS.split())
+    assert all(interval in text for interval in found.values())
 
 
 def test_scratch_with_the_steps_of_the_source_is_ahead_in_seven_pairs(pairs):
@@ -61,11 +61,11 @@ def test_scratch_with_the_steps_of_the_source_is_ahead_in_seven_pairs(pairs):
 
 def test_differences_between_limbs_and_padding_are_those_of_the_runs():
     runs = load("generalist-runs")
-    words = " ".join(MANY_BODIES.split())
+    text = " ".join(MANY_BODIES.split())
     for split in runs[0]["splits"]:
         ours, theirs = (
             [np.mean(run["splits"][split]) for run in runs if run["network"] == network]
             for network in ("limbs", "padded")
         )
         mean, low, high = difference(ours, theirs)
-        assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in words, split
+        assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in text, split

@@ -225,8 +225,8 @@ def test_invalid_actions_are_refused(env: Env) -> None:
         env.reset(options={"postur": 1})
 
 
-@pytest.mark.parametrize(("how", "words"), [("mute", "does not answer"), ("hot", "FDS")])
-def test_a_failed_servo_ends_the_episode(how: str, words: str) -> None:
+@pytest.mark.parametrize(("how", "text"), [("mute", "does not answer"), ("hot", "FDS")])
+def test_a_failed_servo_ends_the_episode(how: str, text: str) -> None:
     """Tensions ramp down to the pretension and then to zero, measured at the twin."""
     with run_robot(find_profile("finger"), clock="twin") as robot:
         env = _env(robot)
@@ -243,7 +243,7 @@ def test_a_failed_servo_ends_the_episode(how: str, words: str) -> None:
                 *_, truncated, info = env.step(pull)
                 if truncated:
                     break
-            assert words in info["truncated_because"]
+            assert text in info["truncated_because"]
             assert not info["armed"]
             operator.advance(0.2)
             assert max(operator.tensions().values()) < before

@@ -119,7 +119,7 @@ def test_a_path_survives_json() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "words"),
+    ("values", "text"),
     [
         ({"slew_per_s": 0.0}, "slew_per_s of a path must be above zero and finite, got 0.0"),
         ({"control_hz": -1.0}, "control_hz of a path must be above zero"),
@@ -128,9 +128,9 @@ def test_a_path_survives_json() -> None:
         ({"slew_per_s": "fast"}, "A command path is malformed: Expected"),
     ],
 )
-def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
+def test_bad_values_are_refused(values: dict[str, Any], text: str) -> None:
     """The sentence names the value."""
-    with pytest.raises(FingerError, match=words):
+    with pytest.raises(FingerError, match=text):
         NOMINAL.replace(path=values)
 
 
@@ -141,13 +141,13 @@ def test_an_unknown_value_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "words"),
+    ("path", "text"),
     [
         (CommandPath(control_hz=25.0), "control_hz of a path must be a multiple of 50"),
         (CommandPath(control_hz=50.0, tick_hz=300.0), "tick_hz of a path must divide 1000"),
     ],
 )
-def test_rates_that_do_not_fit_are_refused(path: CommandPath, words: str) -> None:
+def test_rates_that_do_not_fit_are_refused(path: CommandPath, text: str) -> None:
     """Computations must fit into a command, and simulation steps into a tick."""
-    with pytest.raises(FingerError, match=words):
+    with pytest.raises(FingerError, match=text):
         FingerPlant(_RIG.replace(path=path), drive_of("tension", NOMINAL))

@@ -89,11 +89,11 @@ def test_a_path_that_leaves_the_workspace_is_refused(
     path = circle(0.012, place, hz=1.5)
     with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
-    words = str(caught.value).split()
-    beyond_mm = float(words[words.index("beyond.") - 2])
+    text = str(caught.value).split()
+    beyond_mm = float(text[text.index("beyond.") - 2])
     assert beyond[0] < beyond_mm < beyond[1]
-    at = float(words[words.index("s") - 1])
-    x, y, z = (float(word.strip("(),")) for word in words[words.index("mm,") - 3 :][:3])
+    at = float(text[text.index("s") - 1])
+    x, y, z = (float(word.strip("(),")) for word in text[text.index("mm,") - 3 :][:3])
     np.testing.assert_allclose([x, y, z], 1e3 * path.at(at), atol=1.0)
 
 

@@ -78,15 +78,15 @@ def test_a_study_resumes_with_its_planned_clone_only(clone_file: Path, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("source", "words"),
+    ("source", "text"),
     [
         (WET, r"was trained in .*Dry-v1, and the source is .*Wet-v1"),
         (msgspec.structs.replace(DRY, kwargs={"grip": 0.1}), r"is .*Dry-v1 \(grip=0\.1\)"),
     ],
 )
-def test_a_clone_of_another_source_is_refused(clone_file: Path, source: EnvRef, words: str) -> None:
+def test_a_clone_of_another_source_is_refused(clone_file: Path, source: EnvRef, text: str) -> None:
     """The message names the env that it was trained in."""
-    with pytest.raises(SpaceMismatch, match=words):
+    with pytest.raises(SpaceMismatch, match=text):
         _plan(clone_file, task=TransferTask(source, ICY))
 
 

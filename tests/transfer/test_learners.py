@@ -205,7 +205,7 @@ def test_a_file_of_settings(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("learning_rate = 1e-4", "must name what it starts from"),
         ('preset = "sca"', "Did you mean 'sac'"),
@@ -216,10 +216,10 @@ def test_a_file_of_settings(tmp_path: Path) -> None:
         ('algorithm = "pathlib:Path"', "neither a class of models nor a function"),
     ],
 )
-def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, words: str) -> None:
+def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(text)
-    with pytest.raises(StudyError, match=words):
+    with pytest.raises(StudyError, match=message):
         resolve_learner(str(path), {})
 
 

@@ -146,7 +146,7 @@ _LOW = "spaces.observation.low"
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "text"),
     [
         (lambda t: t.update({_BIAS: t[_BIAS] * np.float32(np.nan)}), "must be finite"),
         (lambda t: t.update({_MEAN: t[_MEAN] * np.inf}), "must be finite"),
@@ -164,16 +164,16 @@ _LOW = "spaces.observation.low"
     ],
 )
 def test_unsuitable_numbers_are_refused(
-    change: Callable[[dict[str, Any]], None], words: str, tmp_path: Path
+    change: Callable[[dict[str, Any]], None], text: str, tmp_path: Path
 ) -> None:
     """A policy of NaN, of other types or without its normalisation would act, and wrongly."""
     with pytest.raises(CorruptStudy, match="is not a policy") as refusal:
         load_policy(_rewritten(tmp_path, change))
-    assert words in str(refusal.value)
+    assert text in str(refusal.value)
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"),
+    ("settings", "text"),
     [
         ({"net_arch": [100_000, 100_000]}, "its card needs at least 10003800000 weights"),
         ({"net_arch": [-1]}, "negative dimension"),
@@ -191,13 +191,13 @@ def test_unsuitable_numbers_are_refused(
     ],
 )
 def test_settings_of_a_stranger_are_refused(
-    settings: dict[str, Any], words: str, tmp_path: Path
+    settings: dict[str, Any], text: str, tmp_path: Path
 ) -> None:
     """Such settings allocate no memory, and call nothing."""
     known = json.loads(msgspec.json.encode(load_policy(POLICIES["reach"]).card.settings))
     with pytest.raises(CorruptStudy, match="is not a policy") as refusal:
         load_policy(_changed(tmp_path, {"settings": known | settings}))
-    assert words in str(refusal.value)
+    assert text in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 

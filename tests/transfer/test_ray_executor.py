@@ -130,7 +130,7 @@ def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Pa
 
 @pytest.mark.timeout(60)  # Ray alone tries for longer.
 @pytest.mark.parametrize(
-    ("address", "words"),
+    ("address", "text"),
     [
         ("127.0.0.1:9", "does not answer (nothing listens there)"),
         ("127.0.0.1:99999", "does not answer (nothing listens there)"),
@@ -138,8 +138,8 @@ def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Pa
         ("ray://127.0.0.1:9", "HOST:PORT"),
     ],
 )
-def test_an_address_that_does_not_answer_is_one_sentence(address: str, words: str) -> None:
-    with pytest.raises(StudyError, match=re.escape(words)):
+def test_an_address_that_does_not_answer_is_one_sentence(address: str, text: str) -> None:
+    with pytest.raises(StudyError, match=re.escape(text)):
         RayCluster(address).run([], lambda *_: None)
 
 

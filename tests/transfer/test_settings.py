@@ -30,7 +30,7 @@ def test_some_settings_change_and_others_stay() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "kind", "words"),
+    ("changed", "kind", "text"),
     [
         ({"learning_rat": 1.0}, UnknownName, "'learning_rate'"),
         ({"learning_rate": "fast"}, StudyError, "learning_rate"),
@@ -38,14 +38,14 @@ def test_some_settings_change_and_others_stay() -> None:
     ],
 )
 def test_wrong_settings_are_refused(
-    changed: dict[str, Any], kind: type[Exception], words: str
+    changed: dict[str, Any], kind: type[Exception], text: str
 ) -> None:
-    with pytest.raises(kind, match=words):
+    with pytest.raises(kind, match=text):
         resolve_learner("ppo-run", changed)
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ('preset = "sac"\n\nlearning_rat = 1e-3\n', "line 3: No setting of sac matches"),
         ('preset = "sac"\ngamma = "much"\n', "line 2: The settings of sac are wrong"),
@@ -53,9 +53,9 @@ def test_wrong_settings_are_refused(
         ('preset = "sac"\nn_envs = 0\n', "mine.toml: The settings .* and one episode\\.$"),
     ],
 )
-def test_a_wrong_file_has_a_line(text: str, words: str, tmp_path: Path) -> None:
+def test_a_wrong_file_has_a_line(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(text)
-    with pytest.raises(StudyError, match=words):
+    with pytest.raises(StudyError, match=message):
         resolve_learner(str(tmp_path / "mine.toml"), {})
 
 

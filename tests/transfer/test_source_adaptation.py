@@ -93,7 +93,7 @@ def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
     assert set(successes) == {"source", "random", "zero-action", *_EVERY}
     assert successes["randomised"].startswith("0 % [0 %, 0 %]")
     assert made.plan.measure == "success"
-    assert any("whose finger_seed is the index of the seed" in words for words in caveats(made))
+    assert any("whose finger_seed is the index of the seed" in text for text in caveats(made))
 
 
 def test_a_failed_study_keeps_finished_runs(

@@ -86,11 +86,11 @@ _EDITS = {
 @pytest.mark.parametrize(("edit", "seeds"), [*((edit, 2) for edit in _EDITS), ("the task", 3)])
 def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: Path) -> None:
     """Resuming and growing are refused, name the change and the way out, and change nothing."""
-    file, content, words = _EDITS[edit]
+    file, content, text = _EDITS[edit]
     (copied / file).write_text(content)
     before = files_of(copied / "study")
     plan = plan_of("shared", seeds)
-    with pytest.raises(ForeignStudy, match=f"(?s){words}.*give another --out, or delete"):
+    with pytest.raises(ForeignStudy, match=f"(?s){text}.*give another --out, or delete"):
         study_of(plan, Path("study"))
     assert files_of(copied / "study") == before
 

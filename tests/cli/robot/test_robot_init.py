@@ -69,7 +69,7 @@ def test_answers_are_checked_one_by_one(
     ]
     RobotInit().run()
     said = capsys.readouterr().out
-    for words in (
+    for text in (
         "  car         The New Bright car of 2017: two small motors",
         "No kind of robot matches 'kar'. Did you mean 'car'?",
         "No kind of robot matches 'Ca'.",
@@ -79,7 +79,7 @@ def test_answers_are_checked_one_by_one(
         "No answer matches 'me'.",
         "Next: shapechanger robot install rover.toml",
     ):
-        assert words in said
+        assert text in said
     assert len(questions) == 11
     profile = load_profile("rover.toml")
     assert (profile.name, profile.body, profile.camera) == ("rover", "tank", None)

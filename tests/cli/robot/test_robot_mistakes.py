@@ -102,7 +102,7 @@ def test_help(run: Run, command: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "text"),
     [
         ("init nocar", "No kind of robot matches 'nocar'"),
         ("init car --name ../up", "name"),
@@ -181,7 +181,7 @@ def test_help(run: Run, command: str) -> None:
     ],
 )
 def test_one_sentence(
-    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch, arguments: str, words: str
+    run: Run, home: Path, monkeypatch: pytest.MonkeyPatch, arguments: str, text: str
 ) -> None:
     """Exit code 2, and no new file or process."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
@@ -193,7 +193,7 @@ def test_one_sentence(
     code, _, output = run(*arguments.split())
     assert code == 2
     assert output.startswith("error: ")
-    assert words in output
+    assert text in output
     assert output.count("\n") == 1
     assert files(home) == before
 

@@ -66,10 +66,10 @@ class Person:
     def press(self, keys: str | bytes) -> None:
         os.write(self._main, keys.encode() if isinstance(keys, str) else keys)
 
-    def read_until(self, words: str, after: int = 0, seconds: float = 40.0) -> int:
+    def read_until(self, text: str, after: int = 0, seconds: float = 40.0) -> int:
         """Wait for a text, and return the index of its end."""
-        self.wait_for(lambda: words in self.text[after:], seconds, words)
-        return self.text.index(words, after) + len(words)
+        self.wait_for(lambda: text in self.text[after:], seconds, text)
+        return self.text.index(text, after) + len(text)
 
     def wait_for(self, done: Callable[[], bool], seconds: float = 40.0, what: str = "it") -> None:
         until_s = time.monotonic() + seconds

@@ -58,7 +58,7 @@ def test_another_layout_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("env", "error", "words"),
+    ("env", "error", "text"),
     [
         (("shapechanger/Finger-v1", {"goal": True}), FingerError, "omit `goal`"),
         (("Pendulum-v1", {}), LayoutError, "Pendulum-v1 publishes no observation_layout"),
@@ -66,10 +66,10 @@ def test_another_layout_is_refused() -> None:
     ],
 )
 def test_envs_that_give_no_log_are_refused(
-    env: tuple[str, dict[str, Any]], error: type[Exception], words: str
+    env: tuple[str, dict[str, Any]], error: type[Exception], text: str
 ) -> None:
     """Goals, an env without names and one that ends too early are refused with the reason."""
-    with gym.make(env[0], **env[1]) as made, pytest.raises(error, match=words):
+    with gym.make(env[0], **env[1]) as made, pytest.raises(error, match=text):
         record_babble(made, 3.0)
 
 

@@ -40,14 +40,14 @@ def _plan(driver: str, **settings: int | str) -> CameraPlan:
 
 def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
     """Close a camera while a thread reads it, and return the message of the error."""
-    words: list[str] = []
+    text: list[str] = []
 
     def wait() -> None:
         try:
             while True:
                 reads()
         except RobotError as error:
-            words.append(str(error))
+            text.append(str(error))
 
     thread = threading.Thread(target=wait)
     thread.start()
@@ -55,7 +55,7 @@ def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
     thread.join(10.0)
     assert not thread.is_alive()
     camera.close()  # Closing is idempotent.
-    return words[0]
+    return text[0]
 
 
 def test_the_pattern_changes_and_carries_its_time() -> None:

@@ -69,12 +69,12 @@ def test_the_plan_has_each_pin_with_its_position() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "probe", "words"),
+    ("kind", "probe", "text"),
     [("car", 27, "used by drive backward"), ("boat", 20, "needs a motor on an H-bridge")],
 )
-def test_probes_that_cannot_measure(kind: str, probe: int, words: str) -> None:
+def test_probes_that_cannot_measure(kind: str, probe: int, text: str) -> None:
     """A pin of the robot, and a servo's pulses, which go on at rest."""
-    with pytest.raises(RobotError, match=words):
+    with pytest.raises(RobotError, match=text):
         probed_pin(shipped(kind), probe)
     assert probed_pin(shipped("tank"), 20) == 17
 

@@ -175,7 +175,7 @@ def freed() -> Iterator[threading.Event]:
 
 @pytest.mark.parametrize("where", ["open", "read", "pin_factory", "i2c", "close"])
 @pytest.mark.parametrize(
-    ("error", "words"),
+    ("error", "text"),
     [
         (None, "No answer within|no frame within"),
         (RobotError("It burns."), r"^It burns\.|: It burns\."),
@@ -190,7 +190,7 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
     car: Profile,
     where: str,
     error: Exception | None,
-    words: str,
+    text: str,
 ) -> None:
     """Each check has a deadline, its failure is a finding, and all others are made."""
     limit_s = 0.05 if error is None else 5.0
@@ -206,7 +206,7 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
         return list(examine(robot))
 
     found = findings(_hardware(where, error or (lambda *_: freed.wait())))
-    assert any(re.search(words, one.sentence) for one in found if one.level == "bad")
+    assert any(re.search(text, one.sentence) for one in found if one.level == "bad")
     sound = findings(_hardware())
     assert [one.level for one in sound if one.check == "camera"] == ["good"]
     assert {one.check for one in found} >= {one.check for one in sound}

@@ -99,8 +99,8 @@ def test_a_missing_robot_is_one_error(run: Run, credentials: object) -> None:
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
-    words = "(?s)Connect call failed.*shapechanger robot serve"
-    with pytest.raises(LinkError, match=words) as refused:
+    text = "(?s)Connect call failed.*shapechanger robot serve"
+    with pytest.raises(LinkError, match=text) as refused:
         RobotClient.connect(known)
     shown = "".join(traceback.format_exception(refused.value))
     assert shown.count("Traceback") == 1

@@ -88,7 +88,7 @@ class Console:
         self._context.close()
 
     def _on_console(self, kind: str, text: str) -> None:
-        if kind == "error" and not any(words in text for words in _PROVOKED):
+        if kind == "error" and not any(message in text for message in _PROVOKED):
             self.errors.append(text)
 
     def _on_sent(self, message: str | bytes) -> None:
@@ -148,9 +148,9 @@ class Console:
         self.page.keyboard.press("Space")
         self.await_state(robot="emergency")
 
-    def await_words(self, where: str, words: str) -> None:
+    def await_words(self, where: str, text: str) -> None:
         """Wait until an element has a text."""
-        self.page.locator(where, has_text=words).first.wait_for(timeout=60_000)
+        self.page.locator(where, has_text=text).first.wait_for(timeout=60_000)
 
     def pixels(self) -> list[int]:
         """Return the pixels of the canvas."""

@@ -63,7 +63,7 @@ GOOD = picture(3)
 
 
 @pytest.mark.parametrize(
-    ("jpeg", "captured_ns", "words"),
+    ("jpeg", "captured_ns", "text"),
     [
         (b"", 2, "cannot be decoded"),
         (b"garbage" * 100, 2, "cannot be decoded"),
@@ -74,10 +74,10 @@ GOOD = picture(3)
         (GOOD, NOW_NS + 60_000_000, "from the future"),
     ],
 )
-def test_invalid_frames_are_rejected(jpeg: bytes, captured_ns: int, words: str) -> None:
+def test_invalid_frames_are_rejected(jpeg: bytes, captured_ns: int, text: str) -> None:
     checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
-    assert words in checks.refusal(Frame(jpeg, captured_ns))
+    assert text in checks.refusal(Frame(jpeg, captured_ns))
     assert checks.refusal(Frame(picture(4), 3)) == ""
 
 

@@ -15,7 +15,7 @@ def test_a_plan_round_trips() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "text"),
     [
         ({"control_hz": 0.0}, "control_hz"),
         ({"port": 65536}, "port"),
@@ -26,9 +26,9 @@ def test_a_plan_round_trips() -> None:
         ({"camera": {"driver": "pattern", "size": [160]}}, "camera"),
     ],
 )
-def test_an_invalid_field_is_named(change: dict[str, object], words: str) -> None:
+def test_an_invalid_field_is_named(change: dict[str, object], text: str) -> None:
     fields = msgspec.to_builtins(car_plan())
     name = next(iter(change))
     (fields["card"] if name in fields["card"] else fields).update(change)
-    with pytest.raises(msgspec.ValidationError, match=words):
+    with pytest.raises(msgspec.ValidationError, match=text):
         msgspec.convert(fields, DaemonPlan)

@@ -102,7 +102,7 @@ async def test_another_policy_takes_the_place(one: PolicyRunner, said: list[Poli
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "text"),
     [
         ("bad", "bad ended: It gave NaN."),
         ("crash", "crash ended: its process ended with code 7."),
@@ -110,11 +110,11 @@ async def test_another_policy_takes_the_place(one: PolicyRunner, said: list[Poli
     ],
 )
 async def test_a_policy_that_ends_is_reported(
-    one: PolicyRunner, said: list[PolicyState], name: str, words: str
+    one: PolicyRunner, said: list[PolicyState], name: str, text: str
 ) -> None:
     one.run(name)
     await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
-    assert said[-1].text.startswith(words)
+    assert said[-1].text.startswith(text)
     one.run("student")
     await until(lambda: said[-1].text == "it drives", "another drives")
 
@@ -130,11 +130,11 @@ async def test_a_deaf_policy_is_killed(
 
 
 async def test_an_unknown_policy_is_refused(one: PolicyRunner, said: list[PolicyState]) -> None:
-    for name, words in (
+    for name, text in (
         ("studnt", "Did you mean 'student'?"),
         ("../student", "No policy on board"),
     ):
-        with pytest.raises(Declined, match=words):
+        with pytest.raises(Declined, match=text):
             one.run(name)
     assert said == []
 

@@ -64,7 +64,7 @@ async def _flood(send: Callable[[Client], Awaitable[None]], client: Client) -> N
 
 
 @pytest.mark.parametrize(
-    ("misbehave", "words"),
+    ("misbehave", "text"),
     [
         (lambda client: client.socket.send_bytes(b"\xc1\xff\x00"), "Not a valid message"),
         (lambda client: client.socket.send_bytes(bytes(MAX_CLIENT_MESSAGE + 1)), "than the 65536"),
@@ -74,12 +74,12 @@ async def _flood(send: Callable[[Client], Awaitable[None]], client: Client) -> N
     ids=["garbage", "large", "pings", "pongs"],
 )
 async def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
-    robot: Running, misbehave: Callable[[Client], Awaitable[None]], words: str
+    robot: Running, misbehave: Callable[[Client], Awaitable[None]], text: str
 ) -> None:
     async with robot.client(role="person") as client:
         await robot.armed(client)
         await misbehave(client)
-        assert words in await client.closed_with()
+        assert text in await client.closed_with()
         await until(lambda: robot.guard.kinds()[-1:] == ["disarm"], "it is disarmed")
     async with robot.client() as other:
         assert (await other.observe()).armed is False

@@ -55,7 +55,7 @@ def test_unused_bits_of_the_high_byte_are_ignored() -> None:
 
 
 @pytest.mark.parametrize(
-    ("chips", "words"),
+    ("chips", "text"),
     [
         ({_MUX: {}}, "The encoder of knee, on channel 2, does not answer"),
         (
@@ -66,11 +66,11 @@ def test_unused_bits_of_the_high_byte_are_ignored() -> None:
     ],
 )
 def test_missing_hardware_is_reported_on_opening(
-    chips: dict[int, dict[int, int]], words: str
+    chips: dict[int, dict[int, int]], text: str
 ) -> None:
     """The error names the missing chip, and the bus is closed."""
     hardware = FakeHardware(chips)
-    with pytest.raises(RobotError, match=words):
+    with pytest.raises(RobotError, match=text):
         hardware.sensor("as5600", **_TWO)
     assert hardware.bus.closed == 1
 

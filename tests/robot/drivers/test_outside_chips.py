@@ -81,7 +81,7 @@ def test_chips_of_another_package_are_driven_on_the_twin() -> None:
 
 @pytest.mark.usefixtures("_outside")
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "text"),
     [
         ('"bh1750"', '"bh175"', "not 'bh175' (did you mean 'bh1750'?)"),
         (
@@ -99,12 +99,12 @@ def test_chips_of_another_package_are_driven_on_the_twin() -> None:
         ('"relay"', '"bh1750"', "not 'bh1750'"),
     ],
 )
-def test_mistakes_in_their_keys_are_named(old: str, new: str, words: str) -> None:
+def test_mistakes_in_their_keys_are_named(old: str, new: str, text: str) -> None:
     """Keys of another package are checked as ours: with line, reason and nearest spelling."""
     assert _LINES.count(old) == 1
     with pytest.raises(ProfileError, match=r"^lab-car\.toml, line \d+: ") as caught:
         _read(_LINES.replace(old, new))
-    assert words in str(caught.value)
+    assert text in str(caught.value)
 
 
 def test_an_entry_point_must_name_a_chip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

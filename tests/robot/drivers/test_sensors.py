@@ -195,7 +195,7 @@ def test_gyroscope_learns_no_bias_while_turning(counts: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("driver", "chips", "words"),
+    ("driver", "chips", "text"),
     [
         ("mpu6050", {0x68: {0x75: 0x71}}, "identifies itself as 0x71, not 0x68"),
         ("mpu6050", {}, "0x68 on I2C bus 1 does not answer"),
@@ -203,9 +203,9 @@ def test_gyroscope_learns_no_bias_while_turning(counts: int) -> None:
     ],
 )
 def test_a_wrong_or_missing_chip_is_named(
-    driver: str, chips: dict[int, dict[int, int]], words: str
+    driver: str, chips: dict[int, dict[int, int]], text: str
 ) -> None:
-    with pytest.raises(RobotError, match=words):
+    with pytest.raises(RobotError, match=text):
         FakeHardware(chips).sensor(driver)
 
 

@@ -45,7 +45,7 @@ def test_a_malformed_datagram_is_reported_and_the_next_order_arrives(
         daemon.send(data)
     orders, malformed = channel.orders()
     assert orders == [Order(kind="halt")]
-    assert [words.partition(":")[0] for words in malformed] == [
+    assert [text.partition(":")[0] for text in malformed] == [
         "Invalid order",
         f"A datagram is larger than {MAX_DATAGRAM} bytes.",
     ]
@@ -163,7 +163,7 @@ def _expected(kind: str, got: str, at: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "words"),
+    ("field", "value", "text"),
     [
         ("kind", "dance", "Invalid enum value 'dance' - at `$.kind`"),
         ("kind", ["command"], _expected("str", "array", "kind")),
@@ -183,14 +183,14 @@ def _expected(kind: str, got: str, at: str) -> str:
         ("other", 1, "Object contains unknown field `other`"),
     ],
 )
-def test_an_invalid_order_is_refused(field: str, value: object, words: str) -> None:
+def test_an_invalid_order_is_refused(field: str, value: object, text: str) -> None:
     data = json.dumps(msgspec.structs.asdict(_ORDER) | {field: value}).encode()
-    with pytest.raises(ValueError, match=rf"^{re.escape(words)}"):
+    with pytest.raises(ValueError, match=rf"^{re.escape(text)}"):
         decode_order(data)
 
 
 @pytest.mark.parametrize(
-    ("data", "words"),
+    ("data", "text"),
     [
         (b"", "Input data was truncated"),
         (b"\xff", "JSON is malformed: invalid character (byte 0)"),
@@ -199,8 +199,8 @@ def test_an_invalid_order_is_refused(field: str, value: object, words: str) -> N
         (b"{}", "Object missing required field `kind`"),
     ],
 )
-def test_anything_but_an_order_is_refused(data: bytes, words: str) -> None:
-    with pytest.raises(ValueError, match=rf"^{re.escape(words)}"):
+def test_anything_but_an_order_is_refused(data: bytes, text: str) -> None:
+    with pytest.raises(ValueError, match=rf"^{re.escape(text)}"):
         decode_order(data)
 
 
@@ -213,8 +213,8 @@ def test_a_state_without_a_field_is_refused(field: str) -> None:
 
 
 def test_a_state_with_long_reasons_fits_into_a_datagram() -> None:
-    words = "\N{GRINNING FACE}" * 250
-    state = msgspec.structs.replace(_STATE, stop_reason=words, refused=words)
+    text = "\N{GRINNING FACE}" * 250
+    state = msgspec.structs.replace(_STATE, stop_reason=text, refused=text)
     assert len(encode(state)) < MAX_DATAGRAM // 4
 
 

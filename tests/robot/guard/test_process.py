@@ -423,8 +423,8 @@ def test_a_restart_after_a_failure_starts_in_emergency_stop(make: _Make) -> None
     bench.clock.at(1, lambda: bench.send(arm(_T0, 1, person=False), command(1, _T0)))
     state = bench.run(20)
     assert (state.armed, state.emergency, state.emergencies) == (False, True, 1)
-    words = "Emergency stop: the robot's processes failed and started afresh."
-    assert state.stop_reason == words
+    text = "Emergency stop: the robot's processes failed and started afresh."
+    assert state.stop_reason == text
     assert not any(state.applied_seq for state in bench.states)
     bench.guard.ended = ""
     bench.clock.at(21, lambda: bench.send(arm(_T0, 1)))
@@ -568,8 +568,8 @@ def test_a_sensor_that_is_slow_stops_the_robot(
     bench.clock.at(45, lambda: setattr(sensor, "takes_ns", 21 * MS))
     bench.clock.at(150, lambda: setattr(sensor, "takes_ns", 20 * MS))
     bench.run(200)
-    words = "Sensor wheel holds up the robot: It took more than 20 ms to answer."
-    slow = [state for state in bench.states if state.stop_reason == words]
+    text = "Sensor wheel holds up the robot: It took more than 20 ms to answer."
+    slow = [state for state in bench.states if state.stop_reason == text]
     assert slow
     assert all(state.outputs["drive"] == 0.0 for state in slow)
     assert slow[0].at_ns == _T0 + 71 * MS

@@ -70,7 +70,7 @@ def test_times_slightly_in_the_future_count_from_now() -> None:
 
 
 @pytest.mark.parametrize(
-    ("order", "words"),
+    ("order", "text"),
     [
         (command(5, _T0, session=2), "not newer"),
         (command(4, _T0, session=2), "not newer"),
@@ -81,10 +81,10 @@ def test_times_slightly_in_the_future_count_from_now() -> None:
         (command(6, _T0, session=2, ttl_ms=0), "0 ms old"),
     ],
 )
-def test_stale_commands_are_refused(order: Order, words: str) -> None:
+def test_stale_commands_are_refused(order: Order, text: str) -> None:
     rules = _armed(quick_car())
     assert not rules.offer(command(5, _T0, session=2), _T0)
-    assert words in rules.offer(order, _T0)
+    assert text in rules.offer(order, _T0)
     assert rules.tick(_T0).seq == 5
 
 
@@ -264,14 +264,14 @@ def _ask(rules: Rules, seq: int, now_ns: int, throttle: float) -> tuple[float, s
 
 def test_a_bump_prevents_driving_forward() -> None:
     rules = _driving(quick_car())
-    words = "Not forward: the bumper touched something."
+    text = "Not forward: the bumper touched something."
     _sense(rules, _T0, bump=1.0)
-    assert _ask(rules, 2, _T0, 0.5) == (0.0, words)
+    assert _ask(rules, 2, _T0, 0.5) == (0.0, text)
     _sense(rules, _T0 + 10 * MS, bump=1.0)
     assert _ask(rules, 3, _T0 + 10 * MS, -0.3) == (-0.3, "")
     _sense(rules, _T0 + 20 * MS, bump=0.0)
     free = _T0 + 760 * MS
-    assert _ask(rules, 4, free - 1, 0.5) == (0.0, words)
+    assert _ask(rules, 4, free - 1, 0.5) == (0.0, text)
     assert rules.next_wake_ns(free - 1) == free
     assert _ask(rules, 5, free, 0.5) == (0.5, "")
     assert rules.bumps == 1
@@ -332,7 +332,7 @@ def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
 @pytest.mark.parametrize(("throttle", "way"), [(0.5, "forward"), (-0.4, "backward")])
 def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
     rules = _driving(quick_car(), (0.5, throttle))
-    words = f"Not {way}: it pushes and does not move."
+    text = f"Not {way}: it pushes and does not move."
     _sense(rules, _T0, speed=0.0)
     _sense(rules, _T0 + 400 * MS - 1, speed=0.0)
     later = _T0 + 400 * MS
@@ -340,9 +340,9 @@ def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
     _sense(rules, later, speed=0.0)
     assert rules.senses.quantities == {"speed": 0.0, "stall": 1.0, "collision": 1.0}
     assert rules.senses.sources == {"speed": "wheel", "stall": "wheel", "collision": "estimated"}
-    assert _ask(rules, 3, later, throttle) == (0.0, words)
+    assert _ask(rules, 3, later, throttle) == (0.0, text)
     _sense(rules, later + MS, speed=0.0)
-    assert _ask(rules, 4, later + MS, throttle) == (0.0, words)
+    assert _ask(rules, 4, later + MS, throttle) == (0.0, text)
     assert _ask(rules, 5, later + MS, -throttle / 2) == (-throttle / 2, "")
     assert _ask(rules, 6, later + MS, throttle) == (0.0, "")  # Through rest.
     assert _ask(rules, 7, later + MS, throttle) == (throttle, "")
@@ -389,13 +389,13 @@ def test_a_low_battery_stops_until_it_is_full_and_armed_again() -> None:
     for ms in (0, 400, 500, 999, 1_000):  # It is believed after 500 ms without interruption.
         assert rules.tick(_T0 + ms * MS).stop_reason in ("", "No fresh command.")
         _sense(rules, _T0 + ms * MS, battery=6.4 if ms == 400 else 6.05)
-    words = "The battery has 6.05 V, less than 6.4 V."
+    text = "The battery has 6.05 V, less than 6.4 V."
     later = _T0 + 1_010 * MS
-    assert rules.tick(later).stop_reason == words
+    assert rules.tick(later).stop_reason == text
     rules.offer(arm(later), later)
-    assert rules.tick(later).stop_reason == words
+    assert rules.tick(later).stop_reason == text
     _sense(rules, later, battery=6.4)
-    assert rules.tick(later).stop_reason == words
+    assert rules.tick(later).stop_reason == text
     rules.offer(arm(later), later)
     assert _ask(rules, 2, later, 0.5) == (0.5, "")
 

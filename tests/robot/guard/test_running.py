@@ -117,8 +117,8 @@ def pipe() -> Iterator[tuple[int, int]]:
     os.close(read)
 
 
-def _emit(lines: logging.Handler, words: str) -> None:
-    lines.handle(logging.LogRecord("robot", logging.INFO, "", 0, words, None, None))
+def _emit(lines: logging.Handler, text: str) -> None:
+    lines.handle(logging.LogRecord("robot", logging.INFO, "", 0, text, None, None))
 
 
 def test_a_full_pipe_drops_lines(
@@ -159,17 +159,17 @@ class _Unprintable:
 
 
 @pytest.mark.parametrize(
-    ("words", "args", "error"),
+    ("text", "args", "error"),
     [
         ("%s", (_Unprintable(RuntimeError()),), "RuntimeError"),
         ("%s %s", ("one",), "TypeError"),
     ],
 )
 def test_a_line_that_cannot_be_formatted_is_replaced(
-    pipe: tuple[int, int], words: str, args: tuple[object, ...], error: str
+    pipe: tuple[int, int], text: str, args: tuple[object, ...], error: str
 ) -> None:
     read, write = pipe
-    record = logging.LogRecord("robot", logging.INFO, "/x/rules.py", 7, words, args, None)
+    record = logging.LogRecord("robot", logging.INFO, "/x/rules.py", 7, text, args, None)
     _Lines(write).handle(record)
     assert os.read(read, 1 << 16) == f"A line of rules.py:7 fails: {error}.\n".encode()
 
@@ -184,8 +184,8 @@ def test_a_log_that_cannot_be_written_raises_nothing(kind: str) -> None:
     lines = _Lines(write)
     if kind == "closed":
         os.close(write)
-    for words in ("Hello.", "\ud800", "\0", "a\nb", "x" * 100_000):
-        _emit(lines, words)
+    for text in ("Hello.", "\ud800", "\0", "a\nb", "x" * 100_000):
+        _emit(lines, text)
     assert lines._lost == 5
     if kind != "closed":
         os.close(write)

@@ -73,8 +73,8 @@ def test_killed_daemon(tmp_path: Path) -> None:
         assert _is_gone(guard)
         assert robot.record.is_at_rest()
         # The restart must not clear a stop.
-        words = "guard: Emergency stop: the robot's processes failed and started afresh."
-        until(lambda: words in _log(tmp_path))
+        text = "guard: Emergency stop: the robot's processes failed and started afresh."
+        until(lambda: text in _log(tmp_path))
 
 
 def test_silent_daemon(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def test_a_key_can_be_copied_by_hand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("", "26 letters and digits, got 0"),
         ("ABCD-EFGH", "got 8"),
@@ -73,8 +73,8 @@ def test_a_key_can_be_copied_by_hand() -> None:
         ("A" * 25 + "B", "last letter of this key is wrong"),
     ],
 )
-def test_an_invalid_key_is_an_error(text: str, words: str) -> None:
-    with pytest.raises(LinkError, match=words):
+def test_an_invalid_key_is_an_error(text: str, message: str) -> None:
+    with pytest.raises(LinkError, match=message):
         parse_key(text)
 
 

@@ -153,7 +153,7 @@ for _base, _rows in ((_TEXT, _TABLE), (finger_text("Feetech"), _FEETECH)):
         _MISTAKES.append((_base.replace(_old, _new, 1), _words))
 
 
-@pytest.mark.parametrize(("text", "words"), _MISTAKES, ids=[words for _, words in _MISTAKES])
-def test_mistake_is_named(text: str, words: str) -> None:
-    with pytest.raises(ProfileError, match=rf"line \d+: .*{re.escape(words)}"):
+@pytest.mark.parametrize(("text", "message"), _MISTAKES, ids=[message for _, message in _MISTAKES])
+def test_mistake_is_named(text: str, message: str) -> None:
+    with pytest.raises(ProfileError, match=rf"line \d+: .*{re.escape(message)}"):
         read(text)

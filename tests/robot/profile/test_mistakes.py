@@ -140,14 +140,14 @@ MISTAKES = [
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake[1][:40])
 def test_mistake_is_named(mistake: tuple[str, ...]) -> None:
     """The error gives the line of the mistake and how to fix it."""
-    old, new, words, *part = mistake
+    old, new, message, *part = mistake
     text = changed(old, new)
     with pytest.raises(ProfileError) as caught:
         read(text)
     match = re.fullmatch(r"rover\.toml, line ([0-9]+): (.*)\.", str(caught.value))
     assert match is not None
     assert (part or new.split("\n"))[0] in text.split("\n")[int(match[1]) - 1]
-    assert words in match[2]
+    assert message in match[2]
 
 
 @given(

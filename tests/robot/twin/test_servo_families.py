@@ -145,7 +145,7 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench, family: str
 
 
 @pytest.mark.parametrize(
-    ("how", "words"),
+    ("how", "text"),
     [
         ("mute", "FDS .*does not answer"),
         ("deaf", "FDS .*does not answer"),
@@ -154,14 +154,14 @@ def test_servos_are_limp_after_the_death_of_the_guard(bench: _Bench, family: str
         ("power", "FDS .*(restarted|does not answer)"),
     ],
 )
-def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, words: str) -> None:
+def test_a_failed_servo_stops_all(bench: _Bench, family: str, how: str, text: str) -> None:
     """All servos let go, also one that hears nothing, and stay so until a person has armed."""
     bench.drive(_FLEX, 25)
     bench.rig.break_servo("FDS", how)
     for _ in range(40):
         if bench.drive(_FLEX, 1).stop_reason:
             break
-    assert re.search(words, bench.seen.stop_reason), bench.seen.stop_reason
+    assert re.search(text, bench.seen.stop_reason), bench.seen.stop_reason
     bench.drive(_FLEX, 40)
     assert bench.pulls() == [0.0] * 7
     assert bench.seen.stop_reason != ""

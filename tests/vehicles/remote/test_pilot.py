@@ -61,7 +61,7 @@ def test_policies_that_fit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("card", "origin", "robot", "words"),
+    ("card", "origin", "robot", "text"),
     [
         (_CLONE, {"body": "tank"}, _CAR, "learned to steer a tank, and my-car is a car"),
         (_CLONE, {"control_hz": 10.0}, _CAR, "10 actions a second, and my-car has control_hz = 20"),
@@ -77,12 +77,12 @@ def test_policies_that_fit() -> None:
     ],
 )
 def test_policies_that_do_not_fit(
-    card: CloneCard, origin: dict[str, Any], robot: RobotCard, words: str
+    card: CloneCard, origin: dict[str, Any], robot: RobotCard, text: str
 ) -> None:
     """The sentence names what differs."""
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
         require_fit(replace(card, **origin), robot, measures=False)
-    assert words in str(refusal.value)
+    assert text in str(refusal.value)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.system
 @pytest.mark.parametrize(
-    ("profile", "name", "words"),
+    ("profile", "name", "text"),
     [
         ("lab-tank", "student.onnx", "learned to steer a car, and lab-tank is a tank"),
         ("lab-car", "studnt.onnx", "student.onnx?"),
@@ -125,7 +125,7 @@ def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_serving_refuses_other_policies(
     profile: str,
     name: str,
-    words: str,
+    text: str,
     student: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -139,7 +139,7 @@ def test_serving_refuses_other_policies(
     with pytest.raises(SystemExit) as stop:
         main([*command, "--policy", str(path)])
     assert stop.value.code == 2
-    assert words in capsys.readouterr().err
+    assert text in capsys.readouterr().err
 
 
 @contextlib.contextmanager
@@ -161,8 +161,8 @@ def _served(policy: Path, clock: str) -> Generator[tuple[RunningRobot, RobotClie
 
 def _pilot(robot: RunningRobot) -> int:
     """Return the process id of the policy."""
-    words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "remote.pilot"]
-    return int(subprocess.check_output(words).split()[0])
+    text = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "remote.pilot"]
+    return int(subprocess.check_output(text).split()[0])
 
 
 def _moves(person: RobotClient) -> bool:
@@ -173,7 +173,7 @@ def _moves(person: RobotClient) -> bool:
 @pytest.mark.system
 @pytest.mark.realtime
 def test_a_policy_drives_on_board(student: Path) -> None:
-    """The policy drives once a person arms, until a person takes over; it is ended and restarted."""
+    """The policy drives once a person arms, until one takes over; it is ended and restarted."""
     with _served(student, "twin") as (robot, person), robot.operator() as operator:
         until(lambda: operator.where().truth["progress_m"] > 2.0)
         # Guard, daemon and twin have a higher priority, where the system permits it.

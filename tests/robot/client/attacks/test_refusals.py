@@ -20,11 +20,11 @@ Attack = Callable[[Scene], str]
 ATTACKS: dict[str, tuple[Attack, str]] = {}
 
 
-def refused(words: str) -> Callable[[Attack], Attack]:
+def refused(text: str) -> Callable[[Attack], Attack]:
     """Register an attack that must return a text with `words`."""
 
     def register(attack: Attack) -> Attack:
-        ATTACKS[attack.__name__] = attack, words
+        ATTACKS[attack.__name__] = attack, text
         return attack
 
     return register
@@ -361,5 +361,5 @@ ATTACKS.update(
 
 @pytest.mark.parametrize("name", ATTACKS)
 def test_an_attack_is_refused_without_a_movement(scene: Scene, name: str) -> None:
-    attack, words = ATTACKS[name]
-    assert words.lower() in attack(scene).lower()
+    attack, text = ATTACKS[name]
+    assert text.lower() in attack(scene).lower()

@@ -11,8 +11,8 @@ def test_another_servo_than_in_the_settings_is_refused(family: str) -> None:
     """All missing servos are named, and one of another model, whose torque constant differs."""
     rig = Rig(of(family))
     rig.twin("FDS").mute = rig.twin("PI").deaf = True
-    words = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
-    with pytest.raises(RobotError, match=words):
+    text = r"no servo answers as FDS \(id 2\), PI \(id 7\); those that do: FDP \(id 1\), EIP"
+    with pytest.raises(RobotError, match=text):
         rig.bus.set_up()
     rig = Rig(of(family))
     rig.twin("EIP").values["model_number"] = 1200

@@ -41,20 +41,20 @@ _FAULTS: list[tuple[_Fault, str]] = [
 
 
 @pytest.mark.parametrize(
-    ("family", "fault", "words"),
+    ("family", "fault", "text"),
     [
         *(("Dynamixel", *case) for case in (*_FAULTS, _SNAPPED)),
         *(("Feetech", *case) for case in _FAULTS),
     ],
 )
-def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, words: str) -> None:
+def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, text: str) -> None:
     rig = Rig(of(family)).start()
     rig.run(14.0, 20)
     fault(rig)
     reason = rig.until("stopping")
     assert rig.faulty == ["EIP"]
     assert reason.startswith("Servo EIP (id 3) ")
-    assert words in reason
+    assert text in reason
     with pytest.raises(RobotError, match=r"not held: Servo EIP \(id 3\)"):
         rig.bus.hold()
     rig.run(None)
@@ -64,8 +64,8 @@ def test_a_fault_of_one_servo_stops_all(family: str, fault: _Fault, words: str) 
     assert rig.twin("FDP").pulls_a > 0.05
     rig.run(None, 40)
     if rig.bus.mode == "silent":
-        words = "EIP did not confirm to let go, so nothing is sent any more"
-        assert words in rig.bus.reason
+        text = "EIP did not confirm to let go, so nothing is sent any more"
+        assert text in rig.bus.reason
         sent = len(rig.port.sent)
         rig.run(None, 3)
         assert len(rig.port.sent) == sent
@@ -104,14 +104,14 @@ def test_three_mute_servos_are_each_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("most_missed", "words"),
+    ("most_missed", "text"),
     [
         (50, "has restarted, for example after a dip of its power, and lost its zero"),
         (5, "does not answer, 5 cycles in a row"),
     ],
 )
 def test_a_power_dip_invalidates_the_zero(
-    most_missed: int, words: str, monkeypatch: pytest.MonkeyPatch
+    most_missed: int, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The servo has no length, and the robot is not armed before its zero has been found."""
     monkeypatch.setattr("shapechanger.robot.drivers.servos.servo._MOST_MISSED", most_missed)
@@ -122,7 +122,7 @@ def test_a_power_dip_invalidates_the_zero(
     while "EIP" not in seen:
         seen = rig.run(4.0)
     assert "length" not in seen["EIP"]
-    assert words in rig.bus.reason
+    assert text in rig.bus.reason
     assert "length" in seen["FDP"]
     with pytest.raises(RobotError, match="EIP lost the power, and so the zero of its tendon"):
         rig.bus.ready()
@@ -151,8 +151,8 @@ def test_servos_stop_without_cycles() -> None:
     assert rig.pulls() == [0.0] * 7
     rig.run(10.0, 4)
     assert rig.faulty == list(NAMES)
-    words = "was stopped by its own watchdog: it received nothing for 100 ms"
-    assert rig.bus.reason.count(words) == 7
+    text = "was stopped by its own watchdog: it received nothing for 100 ms"
+    assert rig.bus.reason.count(text) == 7
     assert rig.pulls() == [0.0] * 7
     rig.until("off")
 
@@ -164,8 +164,8 @@ def test_without_watchdogs_an_unplugged_adapter_ends_in_silence_at_once() -> Non
     rig.port.is_gone = True
     rig.run(20.0)
     assert rig.bus.mode == "silent"
-    words = "did not confirm to let go, so nothing is sent any more: [enable] stops"
-    assert words in rig.bus.reason
+    text = "did not confirm to let go, so nothing is sent any more: [enable] stops"
+    assert text in rig.bus.reason
     with pytest.raises(RobotError, match="is gone"):
         rig.bus.let_go()
     rig.line.advance(10 * CYCLE_NS)
@@ -188,14 +188,14 @@ def test_an_unplugged_adapter_is_reported_and_trips_the_watchdogs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("deaf_for", "words"),
+    ("deaf_for", "text"),
     [
         (102, "Servo PI (id 7) has a goal of 136 counts, and was sent 273"),
         (64, "Servo PI (id 7) has let go by itself."),
     ],
 )
 def test_what_was_not_applied_is_reported(
-    deaf_for: int, words: str, monkeypatch: pytest.MonkeyPatch
+    deaf_for: int, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sync writes have no reply, so the driver reads goals and torque back periodically."""
     rig = Rig().start()
@@ -210,4 +210,4 @@ def test_what_was_not_applied_is_reported(
 
     monkeypatch.setattr(servo, "write", deaf)
     rig.run(8.0, 8)
-    assert words in rig.bus.reason
+    assert text in rig.bus.reason

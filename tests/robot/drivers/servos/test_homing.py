@@ -35,7 +35,7 @@ def test_homing_finds_the_position_at_the_homing_tension(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "limits", "words"),
+    ("fault", "limits", "text"),
     [
         ("snapped", {"_TRAVEL_M": 0.03}, r"EDC \(id 4\) has no zero: it was wound in by 3"),
         (
@@ -47,12 +47,12 @@ def test_homing_finds_the_position_at_the_homing_tension(rig: Rig) -> None:
     ],
 )
 def test_a_zero_that_cannot_be_found_is_refused(
-    rig: Rig, fault: str, limits: dict[str, float], words: str, monkeypatch: pytest.MonkeyPatch
+    rig: Rig, fault: str, limits: dict[str, float], text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, limit in limits.items():
         monkeypatch.setattr(calibration, name, limit)
     rig.line.break_servo("EDC", fault)
-    with pytest.raises(RobotError, match=words):
+    with pytest.raises(RobotError, match=text):
         home(rig.bus, partial(_cycle, rig))
 
 

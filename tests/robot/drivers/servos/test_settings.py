@@ -24,7 +24,7 @@ from tests.robot.drivers.servos.wire import DYNAMIXEL, FEETECH
 
 
 @pytest.mark.parametrize(
-    ("make", "changes", "words"),
+    ("make", "changes", "text"),
     [
         (servo, {"id": 253}, "must be 0 to 252, not 253"),
         (servo, {"most_tension_n": 60.0}, "must be 0.029 to 51 N with this spool"),
@@ -44,15 +44,15 @@ from tests.robot.drivers.servos.wire import DYNAMIXEL, FEETECH
     ],
 )
 def test_what_a_servo_cannot_do_is_refused(
-    make: Callable[..., object], changes: dict[str, Any], words: str
+    make: Callable[..., object], changes: dict[str, Any], text: str
 ) -> None:
-    with pytest.raises(KeyMistake, match=words) as caught:
+    with pytest.raises(KeyMistake, match=text) as caught:
         make("FDP", **changes)
     assert caught.value.key in changes
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "words"),
+    ("changes", "key", "text"),
     [
         ({"baud": 12345}, "baud", "one that the servos have, 9600, 57600.*, not 12345"),
         (
@@ -63,8 +63,8 @@ def test_what_a_servo_cannot_do_is_refused(
         ({"servos": (feetech("FDP"),), "baud": 4_000_000}, "baud", "38400.*, not 4000000"),
     ],
 )
-def test_what_a_bus_cannot_do_is_refused(changes: dict[str, Any], key: str, words: str) -> None:
-    with pytest.raises(KeyMistake, match=words) as caught:
+def test_what_a_bus_cannot_do_is_refused(changes: dict[str, Any], key: str, text: str) -> None:
+    with pytest.raises(KeyMistake, match=text) as caught:
         settings(**changes)
     assert caught.value.key == key
 
