@@ -77,6 +77,7 @@ class MujocoWorld:
         data: State of the simulation.
         placed: How often the vehicle was put somewhere, at a start or back on its path.
         resting_v: Voltage of the battery without load.
+        travelled_m: Distance that the wheels rolled, m; backward counts down.
 
     Raises:
         UnknownName: If the vehicle, the world or a lens is unknown.
@@ -117,7 +118,7 @@ class MujocoWorld:
 
             self._distortions = [find_corruption(name) for name in lenses]
         self.resting_v = RESTING_V
-        self._travelled_m = 0.0
+        self.travelled_m = 0.0
         self.placed = 0
         self.lay_out(seed)
 
@@ -140,11 +141,6 @@ class MujocoWorld:
     def bumped(self) -> bool:
         """Return whether a contact presses the front bumper."""
         return self._contacts.bumped
-
-    @property
-    def travelled_m(self) -> float:
-        """Distance that the wheels rolled, m; backward counts down."""
-        return self._travelled_m
 
     @property
     def progress_m(self) -> float:
@@ -222,7 +218,7 @@ class MujocoWorld:
 
     def zero_odometer(self) -> None:
         """Reset the travelled distance, as restarting the robot does."""
-        self._travelled_m = 0.0
+        self.travelled_m = 0.0
 
     def truth(self) -> dict[str, float]:
         """`progress_m` and `collisions`; see `World.truth`."""
@@ -250,7 +246,7 @@ class MujocoWorld:
         return Readings(
             pose=Pose(x, y, heading),
             speed=speed,
-            travelled_m=self._travelled_m,
+            travelled_m=self.travelled_m,
             acceleration_x=self._acceleration[0],
             acceleration_y=self._acceleration[1],
             yaw_rate=yaw_rate,
@@ -400,7 +396,7 @@ class MujocoWorld:
         self._contacts.follow(self.data, now, dt_s)
         self._acceleration = ((now.speed - before.speed) / dt_s, now.speed * now.yaw_rate)
         rolled_m = bound.travelled_m()
-        self._travelled_m += rolled_m - self._rolled_m
+        self.travelled_m += rolled_m - self._rolled_m
         self._rolled_m = rolled_m
         self._current_a = _IDLE_A + bound.current_a()
 

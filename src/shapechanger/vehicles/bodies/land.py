@@ -79,8 +79,8 @@ class Rolling(BoundVehicle):
 
     def travelled_m(self) -> float:
         """Mean distance that the driven wheels rolled since `place`, m."""
-        turned = sum([drive.turned() for drive in self._drives.values()])
-        return self._radius * turned / len(self._drives)
+        # Each tendon measures the angle of one shaft, rad.
+        return self._radius * sum(self._data.ten_length.tolist()) / len(self._drives)
 
 
 # Spur gear to the axle, chosen for 2 m/s; its efficiency is an estimate.

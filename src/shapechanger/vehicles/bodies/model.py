@@ -48,7 +48,7 @@ class MotorDrive:
         self, model: mujoco.MjModel, data: mujoco.MjData, name: str, motor: DcMotor
     ) -> None:
         self._motor, self._ctrl = motor, data.ctrl
-        self._velocity, self._angle = data.ten_velocity, data.ten_length
+        self._velocity = data.ten_velocity
         self._actuator, self._tendon = int(model.actuator(name).id), int(model.tendon(name).id)
         self._is_open = False
 
@@ -65,11 +65,8 @@ class MotorDrive:
         """Current from the battery, A."""
         if self._is_open:
             return 0.0
-        return self._motor.amperes(float(self._ctrl[self._actuator]), self.rate())
-
-    def turned(self) -> float:
-        """Angle of the shaft, rad."""
-        return float(self._angle[self._tendon])
+        speed = float(self._velocity[self._tendon])
+        return self._motor.amperes(float(self._ctrl[self._actuator]), speed)
 
     def rate(self) -> float:
         """Speed of the shaft, rad/s."""
@@ -131,7 +128,10 @@ class BoundVehicle(ABC):
 
     def current_a(self) -> float:
         """Current of the motors, A, >= 0; a braking motor draws none."""
-        return sum([drive.current_a() for drive in self._drives.values()])
+        total_a = 0.0
+        for drive in self._drives.values():
+            total_a += drive.current_a()
+        return total_a
 
     def set_current(self, vx: float, vy: float) -> None:
         """Set the flow of the water, m/s; land vehicles ignore it, and `place` keeps it."""

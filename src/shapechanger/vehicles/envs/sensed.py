@@ -64,7 +64,10 @@ class WheelEncoder:
             self._sign = math.copysign(1.0, direction)
         if self._roll(now_ns, self._world.travelled_m):
             self._last_edge_ns = now_ns
-            self._speed = self._mean_speed()
+            (first_s, way), (last_s, _) = self._edges[0], self._edges[-1]
+            # All edges go one way.
+            moved_m = way * (len(self._edges) - 1) * self._edge_m
+            self._speed = moved_m / (last_s - first_s) if last_s > first_s else 0.0
         else:  # The next edge is not here yet, which bounds the speed.
             since_s = (now_ns - self._last_edge_ns) / 1e9
             if since_s > _STANDS_AFTER_S:
@@ -95,13 +98,6 @@ class WheelEncoder:
             self._edges.append((at_s, way))
             counted = True
         return counted
-
-    def _mean_speed(self) -> float:
-        edges = self._edges
-        if len(edges) < 2 or edges[-1][0] <= edges[0][0]:
-            return 0.0
-        moved_m = sum(way for _, way in list(edges)[1:]) * self._edge_m
-        return moved_m / (edges[-1][0] - edges[0][0])
 
 
 def _sonar(settings: dict[str, Any], world: MujocoWorld) -> _Read:

@@ -137,6 +137,7 @@ class VehicleEnv(DriveEnv):
         self._period_ns = round(1e9 / profile.control_hz)
         self._has_image, self._has_state = image, state or not image
         self._state = profile.state_layout
+        self._absent = {feature.name: feature.middle for feature in self._state}
         self._applied = [f"{action.name}/applied" for action in profile.plan.actions]
         shape = (*profile.size[::-1], 3)
         pixels = Feature("camera/image", "1", 0.0, 255, Element("camera", "camera"), shape)
@@ -202,8 +203,8 @@ class VehicleEnv(DriveEnv):
     def _observe(self) -> tuple[Any, dict[str, Any]]:
         vehicle, world = self._vehicle, self.world
         numbers = vehicle.quantities | dict(zip(self._applied, vehicle.applied, strict=True))
-        features = self._state.features
-        state = np.array([numbers.get(one.name, one.middle) for one in features], np.float32)
+        values = map(numbers.get, self._absent, self._absent.values())
+        state = np.array([*values], np.float32)
         seen: Any = state
         if self._has_image:
             image = world.picture()
@@ -214,7 +215,7 @@ class VehicleEnv(DriveEnv):
             "refused": "",
             "armed": True,
             "emergency": False,
-            "absent": tuple(one.name for one in features if one.name not in numbers),
+            "absent": tuple([name for name in self._absent if name not in numbers]),
             "reward_sources": {name: vehicle.sources.get(name, "absent") for name in _REWARDED},
             "captured_ns": vehicle.now_ns,
             "decided_ns": vehicle.now_ns - self._period_ns,
