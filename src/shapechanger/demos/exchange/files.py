@@ -16,14 +16,11 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
-
-import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.demos.episodes.files import MAX_TEXT_BYTES, read_file
@@ -48,12 +45,6 @@ MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
 _SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # As Excel writes it.
-_ROWS: Final = 256  # Of Parquet in memory at once; fewer if the values of a column are large.
-_MAX_TEXT: Final = 4096  # Characters of a text in Parquet.
-
-
-class UnpacksToTooMuch(DemosError):
-    """A file claims far more than it holds: nothing of it is imported."""
 
 
 def library(name: str, extra: str = "data") -> Any:
@@ -277,114 +268,3 @@ def names_in(file: Any, *groups: str) -> list[str]:
         if not is_there or not isinstance(found := found[part], h5py.Group):
             return []
     return [str(name) for name in found]
-
-
-@contextmanager
-def _open_parquet(path: Path) -> Generator[Any]:
-    """Open a Parquet file as a `pyarrow.parquet.ParquetFile`."""
-    arrow = library("pyarrow", "lerobot")
-    try:
-        # Without `buffer_size` a whole row group is in memory, which may be an episode of images.
-        opened = library("pyarrow.parquet", "lerobot").ParquetFile
-        with opened(path, pre_buffer=False, buffer_size=1 << 20) as file:
-            size = path.stat().st_size
-            claimed = sum(_sizes_of(file, range(file.metadata.num_row_groups)))
-            if claimed > MAX_UNPACKED + MAX_PACKED * size or file.metadata.num_rows > size:
-                raise UnpacksToTooMuch(
-                    f"{path} has {size} bytes, but claims to unpack to {claimed}."
-                )
-            yield file
-    except (arrow.ArrowException, OSError) as error:
-        reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
-        raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error
-
-
-def _sizes_of(file: Any, groups: Iterable[int]) -> Iterator[int]:
-    for group in map(file.metadata.row_group, groups):
-        for column in map(group.column, range(group.num_columns)):
-            yield max(column.total_uncompressed_size, 8 * column.num_values)
-
-
-def _batches(file: Any, columns: Sequence[str], groups: Sequence[int]) -> Any:
-    """Return the rows of some row groups, a few at a time."""
-    # Many rows may share one large value, which is in memory once for each.
-    largest = max(_sizes_of(file, groups), default=1)
-    rows = max(1, min(_ROWS, MAX_UNPACKED // max(1, largest)))
-    return file.iter_batches(rows, row_groups=groups, columns=columns)
-
-
-def all_rows(path: Path, columns: set[str] | None) -> list[dict[str, Any]]:
-    """Return the rows of a small Parquet table."""
-    found: list[dict[str, Any]] = []
-    with _open_parquet(path) as file:
-        known = set(file.schema_arrow.names)
-        groups = range(file.metadata.num_row_groups)
-        for batch in _batches(file, sorted(columns & known if columns else known), groups):
-            for row in cast("list[dict[str, Any]]", batch.to_pylist()):
-                for value in row.values():  # A text, or a list of texts.
-                    texts = cast("list[Any]", value) if isinstance(value, list) else [value]
-                    if any(isinstance(text, str) and len(text) > _MAX_TEXT for text in texts):
-                        raise DemosError(f"{path} has a text of more than {_MAX_TEXT} characters.")
-                found.append(row)
-    return found
-
-
-def _vectors(column: Any, size: int, what: str) -> NDArray[np.float64]:
-    """Return the numbers of a column, shape (n, size)."""
-    types = library("pyarrow.types", "lerobot")
-    rows = len(column)
-    values: Any = getattr(column, "storage", column)  # Of arrays in an extension type.
-    even = not types.is_list(values.type) or len(np.unique(values.value_lengths())) <= 1
-    while types.is_list(values.type) or types.is_fixed_size_list(values.type):
-        values = values.flatten()
-    if even and len(values) == rows * size:
-        try:
-            return np.asarray(values.to_numpy(zero_copy_only=False), np.float64).reshape(rows, size)
-        except (TypeError, ValueError) as error:
-            raise DemosError(f"{what} is not numeric ({error}).") from error
-    raise DemosError(f"{what} does not have {size} numbers in each row.")
-
-
-def number_columns(
-    path: Path, names: Sequence[str]
-) -> tuple[dict[str, NDArray[np.float64]], set[str]]:
-    """Return Parquet columns of single numbers, shape (n,) each, and the names of all columns.
-
-    Columns that the file lacks are left out.
-    """
-    with _open_parquet(path) as file:
-        columns = set(file.schema_arrow.names)
-        table = file.read(columns=[name for name in names if name in columns])
-        found = {
-            name: _vectors(table.column(name).combine_chunks(), 1, f"{path}: {name!r}")[:, 0]
-            for name in table.column_names
-        }
-        return found, columns
-
-
-def rows_at(
-    path: Path, rows: NDArray[np.int64], sizes: Mapping[str, int], stored: Sequence[str]
-) -> Iterator[dict[str, Any]]:
-    """Yield some rows of a Parquet file, in its order: vectors, and images as stored."""
-    with _open_parquet(path) as file:
-        wanted = [*sizes, *stored]
-        if missing := [key for key in wanted if key not in file.schema_arrow.names]:
-            raise DemosError(f"{path} has no column {missing[0]!r}, which meta/info.json names.")
-        counts = [file.metadata.row_group(n).num_rows for n in range(file.metadata.num_row_groups)]
-        starts = np.cumsum([0, *counts])
-        first, last = (int(n) for n in np.searchsorted(starts, rows[[0, -1]], "right") - 1)
-        done = int(starts[first])
-        for batch in _batches(file, wanted, range(first, last + 1)):
-            here = rows[(rows >= done) & (rows < done + batch.num_rows)] - done
-            done += batch.num_rows
-            # Not of the images: a copy of them may not fit into memory.
-            part = batch.select(list(sizes)).take(library("pyarrow", "lerobot").array(here))
-            numbers = {
-                key: _vectors(part.column(key), size, f"{path}: {key!r}")
-                for key, size in sizes.items()
-            }
-            for number, row in enumerate(here.tolist()):
-                vectors = {key: values[number] for key, values in numbers.items()}
-                yield vectors | {key: batch.column(key)[row].as_py() for key in stored}
-            if done > rows[-1]:
-                return

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, Step
 from shapechanger.demos.episodes.records import longest_period_s
-from shapechanger.demos.exchange.files import UnpacksToTooMuch
 from shapechanger.demos.exchange.format import (
     DEFAULT_HZ,
     ExchangeStep,
@@ -108,7 +107,7 @@ def rows_of(
                     try:
                         jpeg, *_ = load_jpeg(record.picture, size)
                     except PictureError as error:
-                        reason = error.reason
+                        reason = str(error)
                 fault = reason
             if fault:
                 context.leave_out(what, fault, record.name)
@@ -118,8 +117,6 @@ def rows_of(
             yield ExchangeStep(
                 step=record.step, jpeg=picture, marks=record.marks, dropped=record.dropped
             )
-    except UnpacksToTooMuch:
-        raise
     except DemosError as error:
         for name in rest[done:]:
             context.leave_out(what, unreadable(error), name)
@@ -153,7 +150,7 @@ def with_pictures(
                 _, sizes[place], is_new = load_jpeg(record.picture)
                 encoded += is_new
             except PictureError as error:
-                record.fault = error.reason
+                record.fault = str(error)
     common = Counter(sizes.values()).most_common(1)[0][0] if sizes else None
     for place, size in sizes.items():
         if common is not None and size != common:

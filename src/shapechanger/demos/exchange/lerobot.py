@@ -4,17 +4,23 @@ Of a dataset of others, `action` becomes the action, the numbers of `observation
 state, and one camera the image. Units are unknown and written "?", unless the feature states
 them, and the driver is taken to be a person, who teleoperated the robot. Images that are stored
 as JPEG are kept; videos and PNGs are encoded as JPEG of quality 100, which changes them slightly.
+
+A row is the step that its `episode_index`, `frame_index`, `index` and `timestamp` and the entry of
+its episode in `meta/episodes` agree on, and its image is the one that the video shows at that time.
+What contradicts is left out: one of them is wrong, and nothing says which.
 """
 
 from __future__ import annotations
 
+import glob
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, repeat
+from itertools import chain, islice, repeat
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple, cast
+from typing import Annotated, Any, Final, Literal, cast
 
 import msgspec
 import numpy as np
@@ -24,9 +30,8 @@ from shapechanger.demos.episodes import Driver, EpisodeHeader, Step
 from shapechanger.demos.exchange import files, imports
 from shapechanger.demos.exchange.format import ExchangeEpisode, Format, ImportContext, name_in
 from shapechanger.demos.exchange.imports import SourceRecord
-from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
-from shapechanger.demos.exchange.lerobot_index import Index, Located
-from shapechanger.demos.exchange.pictures import read_pictures
+from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, write
+from shapechanger.demos.exchange.pictures import VideoTimes, read_pictures, read_times
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
@@ -34,14 +39,21 @@ from shapechanger.layout import Feature
 _ACTION, _STATE, _REWARD, _TERMINATED = (
     name_in("lerobot", field) for field in ("action", "state", "reward", "terminated")
 )
+# Largest difference between the time of a step and that of its image, s: `tolerance_s` of lerobot
+# 0.4.4. Rounding to 32 bits and to the ticks of the video is allowed in addition.
+_TOLERANCE_S: Final = 1e-4
+_ROUNDING: Final = 2.0**-23
+_KEYS: Final = ("episode_index", "frame_index", "index", "timestamp")
 _OBSERVATION: Final = "observation."
 _CAMERAS: Final = "observation.images."
 _NUMBERS: Final = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)")
-_BOOKKEEPING: Final = ("timestamp", "frame_index", "episode_index", "index", "task_index")
-_DEPTH: Final = ("video.is_depth_map", "is_depth_map")
 _CHANNELS: Final = (1, 3, 4)
-_AXES: Final = ["c", "h", "w"]
-_MAX_STEPS: Final = 1 << 20  # Of an episode, of which a header names the drivers.
+_PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
+_MOST: Final = 1 << 20  # Steps of an episode, and episodes.
+_ROWS: Final = 256  # In memory at once; fewer if the values of a column are large.
+
+
+_Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
 
 
 class _Feature(msgspec.Struct, kw_only=True):
@@ -53,64 +65,300 @@ class _Feature(msgspec.Struct, kw_only=True):
     names: Any = None
     units: Any = None
     info: dict[str, Any] | None = None
-    depth: Any = msgspec.field(default=None, name="is_depth_map")
-    video_depth: Any = msgspec.field(default=None, name="video.is_depth_map")
-
-    @property
-    def is_depth(self) -> bool:
-        about = self.info or {}
-        return bool(self.depth or self.video_depth) or any(map(about.get, _DEPTH))
 
     @property
     def size(self) -> int:
         return math.prod(self.shape)
 
     @property
-    def is_image(self) -> bool:
-        """Whether it is an image of any kind, also as numbers."""
-        return len(self.shape) == 3 or self.key.startswith(_CAMERAS)
-
-    @property
-    def is_number(self) -> bool:
-        """Whether its values are numbers, and not those of an image."""
-        plain = bool(_NUMBERS.fullmatch(self.kind)) and self.size <= files.MAX_VALUES
-        return plain and not self.is_image
-
-    @property
-    def is_picture(self) -> bool:
-        """Whether it is a camera's whose images can be imported."""
-        return self.kind in {"video", "image"} and not self.is_depth
+    def role(self) -> Literal["picture", "number", "unknown image", "other"]:
+        """What it is: an image that can be imported, numbers, another image, or anything else."""
+        is_depth = any(map((self.info or {}).get, ("video.is_depth_map", "is_depth_map")))
+        if self.kind in {"video", "image"} and not is_depth:
+            return "picture"
+        is_image = len(self.shape) == 3 or self.key.startswith(_CAMERAS) or is_depth
+        if _NUMBERS.fullmatch(self.kind) and self.size <= files.MAX_VALUES and not is_image:
+            return "number"
+        return "unknown image" if is_image or len(self.shape) > 1 else "other"
 
     def picture_size(self, path: Path) -> tuple[int, int]:
-        """Return the width and height of its images, pixels, which are compared with it.
-
-        Axes are found by their names if those fit, or else by the number of colours.
-        """
-        shape = (self.shape if len(self.shape) == 3 else (*self.shape, 1, 0, 0))[:3]
-        axes = [name[:1].lower() for name in self.names]
-        if sorted(axes) == _AXES and shape[axes.index("c")] in _CHANNELS:
-            channels, height, width = (shape[axes.index(axis)] for axis in _AXES)
-        elif shape[2] in _CHANNELS:
-            height, width, channels = shape
-        else:
-            channels, height, width = shape
-        if channels not in _CHANNELS or not 0 < height * width <= MAX_PIXELS:
-            raise DemosError(
-                f"{path}: {self.key} has the shape {list(self.shape)}, not of an image."
-            )
+        """Return the width and height of its images, pixels, which are compared with it."""
+        shape = (*self.shape, 1, 1)[:3]
+        height, width, channels = shape if shape[-1] in _CHANNELS else (*shape[1:], shape[0])
+        if len(self.shape) < 2 or channels not in _CHANNELS or height * width > MAX_PIXELS:
+            shown = list(self.shape)
+            raise DemosError(f"{path}: {self.key} has the shape {shown}, not of an image.")
         return width, height
 
 
-def _read_features(info: Mapping[str, Any], path: Path) -> list[_Feature]:
+class _Info(msgspec.Struct, kw_only=True):
+    """`info.json`."""
+
+    codebase_version: str
+    fps: Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
+    features: dict[str, _Feature]
+    data_path: str
+    video_path: str | None = None
+    robot_type: str | None = None
+    total_episodes: int
+    total_frames: int
+
+
+class _Entry(msgspec.Struct, kw_only=True):
+    """A row of `meta/episodes`; the last four columns are of the video, if there is one."""
+
+    episode_index: Annotated[int, msgspec.Meta(ge=0, lt=_MOST)]
+    length: Annotated[int, msgspec.Meta(ge=1, lt=_MOST)]
+    tasks: list[Annotated[str, msgspec.Meta(max_length=4096)]]
+    dataset_from_index: int
+    chunk_index: int = 0
+    file_index: int = 0
+    from_timestamp: _Seconds = 0.0
+    to_timestamp: _Seconds = 0.0
+
+
+class _Dataset:
+    """A dataset that is read."""
+
+    def __init__(self, folder: Path, context: ImportContext) -> None:
+        self._folder = folder
+        self._context = context
+        self._path = folder / INFO
+        self._info: _Info = _converted(files.read_json_object(self._path), _Info, self._path)
+        if not (version := self._info.codebase_version).startswith("v3."):
+            raise DemosError(
+                f"{folder} has version {version} of LeRobot's format, and only 3 can be imported: "
+                "`python -m lerobot.datasets.v30.convert_dataset_v21_to_v30` of lerobot 0.4 "
+                "converts v2.1."
+            )
+        for key, feature in self._info.features.items():
+            feature.key = key
+        self._choose_features(list(self._info.features.values()))
+        camera = self._camera
+        self._size = None if camera is None else camera.picture_size(self._path)
+        self._stored = camera.key if camera and camera.kind == "image" else ""
+        self._video = f"videos/{camera.key}/" if camera and camera.kind == "video" else ""
+        self._entries = self._read_entries()
+        self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
+        self._paths: dict[float, list[Path]] = defaultdict(list)
+        self._find_rows()
+        self._filmed: dict[str, list[_Entry]] = defaultdict(list)
+        self._videos: dict[str, VideoTimes | str] = {}
+        for entry in self._entries.values():
+            self._filmed[self._video_name(entry)].append(entry)
+
+    def read(self) -> Iterator[ExchangeEpisode]:
+        """Yield the episodes whose keys agree; the others are reported."""
+        notes = {"dataset": self._folder.resolve().name}
+        header = EpisodeHeader(
+            action_layout=_layout([self._action], self._context),
+            state_layout=_layout(self._states, self._context),
+            image_size=self._size,
+            control_hz=self._info.fps,
+            robot=self._info.robot_type or "",
+            source="lerobot",
+            notes=notes | ({"camera": self._camera.key} if self._camera else {}),
+        )
+        own, ours = self._folder / OURS, list[Any]()
+        if own.is_file():
+            ours = files.own_episodes(files.read_json_object(own), own, max(self._entries) + 1)
+        for number, entry in self._entries.items():
+            drivers, outcome = list[Driver](), ""
+            task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}
+            about = replace(header, notes=header.notes | task)
+            if ours:
+                about, outcome, drivers = _own(ours[number], about, f"{own}, episode {number}")
+            pictures = self._pictures(entry) if self._video else repeat(None, entry.length)
+            if len(paths := self._paths[number]) != 1:
+                pictures = f"with rows in {len(paths)} files"
+            if isinstance(pictures, str):
+                self._context.leave_out("episode", pictures, number)
+                continue
+            records = self._records(entry, paths[0], pictures, drivers)
+            rest = [f"{frame} of episode {number}" for frame in range(entry.length)]
+            rows = imports.rows_of(records, self._size, self._context, "step", rest)
+            name = f"{self._folder}, episode {number}"
+            yield ExchangeEpisode(header=about, rows=rows, name=name, outcome=outcome)
+
+    def _choose_features(self, features: Sequence[_Feature]) -> None:
+        """Choose the action, the states, the camera and single numbers, and report the others."""
+        context = self._context
+        numbers = {feature.key: feature for feature in features if feature.role == "number"}
+        if _ACTION not in numbers:
+            raise DemosError(f"{self._path} has no numeric feature {_ACTION!r}, so no action.")
+        self._action = numbers[_ACTION]
+        self._states = [f for key, f in numbers.items() if key.startswith(_OBSERVATION)]
+        self._states.sort(key=lambda feature: feature.key != _STATE)  # Stable: the state first.
+        single = {key for key, feature in numbers.items() if feature.size == 1}
+        self._columns = {_REWARD, DONE, _TERMINATED} & single
+        cameras = {f.key.removeprefix(_CAMERAS): f for f in features if f.role == "picture"}
+        context.camera = context.camera.removeprefix(_CAMERAS)
+        self._camera = cameras.get(imports.choose_camera(self._folder, list(cameras), context))
+        taken = {_ACTION, *(f.key for f in self._states), *self._columns, *_KEYS, "task_index"}
+        for feature in features:
+            if feature.key not in taken and feature is not self._camera:
+                about = f"{feature.key} ({feature.kind}, {' x '.join(map(str, feature.shape))})"
+                if feature.role == "unknown image":
+                    reason = "with images of an unknown kind or of depth"
+                    context.leave_out("feature", reason, about)
+                else:
+                    context.note(f"The feature {about} is not imported.")
+
+    def _read_entries(self) -> dict[int, _Entry]:
+        """Return the rows of `meta/episodes` by their number, in order."""
+        fields = _Entry.__struct_fields__ if self._video else _Entry.__struct_fields__[:4]
+        names = [name if n < 4 else self._video + name for n, name in enumerate(fields)]
+        entries: list[_Entry] = []
+        for path in sorted((self._folder / EPISODES).glob("*/*.parquet")):
+            files.inside(self._folder, str(path.relative_to(self._folder)), path)
+            for batch in _batches(path, names):
+                rows = batch.rename_columns(list(fields)).to_pylist()
+                entries += _converted(rows, list[_Entry], path, strict=False)
+        found = {entry.episode_index: entry for entry in entries}
+        if not found or len(found) < len(entries):
+            raise DemosError(f"{self._folder / EPISODES} does not have each episode once.")
+        totals = self._info.total_episodes, self._info.total_frames
+        if totals != (count := (len(entries), sum(entry.length for entry in entries))):
+            about = "{} has {} episodes with {} steps, and {} {} with {}."
+            self._context.warn(about.format(INFO, *totals, EPISODES, *count))
+        return dict(sorted(found.items()))
+
+    def _find_rows(self) -> None:
+        """Find the rows of the episodes in all files that fit the template of `info.json`."""
+        pattern = _PLACE.sub("*", glob.escape(self._info.data_path))
+        if not files.is_inside(self._folder, pattern):
+            raise DemosError(f"{self._path}: the name {pattern!r} leaves the folder.")
+        if not (names := sorted(glob.glob(pattern, root_dir=self._folder))):
+            raise DemosError(f"There is no {self._folder / pattern}: restore it.")
+        unknown = set[str]()
+        for name in names:
+            try:
+                path, numbers = files.inside(self._folder, name, INFO), set[float]()
+                for batch in _batches(path, _KEYS[:1]):
+                    numbers.update(_vectors(batch, _KEYS[0], 1, path).ravel().tolist())
+            except DemosError as error:
+                self._context.leave_out("file", imports.unreadable(error), name)
+                continue
+            self._most_bytes += files.MAX_PACKED * path.stat().st_size
+            unknown |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
+            for number in sorted(numbers):
+                self._paths[number].append(path)
+        for column in sorted(unknown - self._info.features.keys()):
+            if not column.startswith("__index_level_"):  # Of pandas.
+                self._context.leave_out("column", f"that {INFO} does not describe", column)
+        for number in sorted(self._paths.keys() - self._entries.keys()):
+            self._context.leave_out("episode", f"that {EPISODES} does not have", f"{number:g}")
+
+    def _video_name(self, entry: _Entry) -> str:
+        """Fill in the template of `info.json`, without Python's own formats."""
+        about = {"chunk_index": str(entry.chunk_index), "file_index": str(entry.file_index)}
+        about["video_key"] = self._video.removeprefix("videos/").rstrip("/")
+        template = self._info.video_path or ""
+        return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
+
+    def _read_video(self, name: str) -> VideoTimes | str:
+        """Return the times of a video, or why its episodes are left out."""
+        entries = self._filmed[name]
+        try:
+            times = read_times(files.inside(self._folder, name, self._folder / EPISODES))
+        except DemosError as error:
+            return f"whose video cannot be read: {str(error).removesuffix('.')}"
+        if times.size != self._size:
+            return f"whose images in {name} have {times.size} pixels, not {self._size}"
+        spans_s = np.array(sorted((entry.from_timestamp, entry.to_timestamp) for entry in entries))
+        steps_s = np.diff(times.seconds)
+        half_s = 0.5 * float(np.median(steps_s)) if len(steps_s) else 0.5 / self._info.fps
+        late_s = times.seconds[0] - spans_s[0, 0]
+        early_s = spans_s[-1, 1] - times.seconds[-1] - 2.0 * half_s
+        # If an image is lost, the ones after it moved up, and nothing says which one is lost.
+        if late_s > half_s:
+            return f"of {name}, which begins {late_s:.4g} s later than {EPISODES} says"
+        if times.is_cut_off:
+            self._context.leave_out("file", "that is cut off, without the images after that", name)
+        elif early_s > half_s:
+            return f"of {name}, which ends {early_s:.4g} s earlier than {EPISODES} says"
+        if (np.diff(spans_s.ravel()) < -half_s).any():
+            return f"whose parts of {name} overlap, or end before they begin"
+        return times
+
+    def _pictures(self, entry: _Entry) -> Iterator[NDArray[np.uint8]] | str:
+        """Return the image of each step of an episode, or why it is left out."""
+        name = self._video_name(entry)
+        if name not in self._videos:
+            self._videos[name] = self._read_video(name)
+        if isinstance(times := self._videos[name], str):
+            return times
+        at_s = entry.from_timestamp + np.arange(entry.length) / self._info.fps
+        most_s = _TOLERANCE_S + _ROUNDING * at_s + 0.5 * float(times.tick_s)
+        nearest = np.searchsorted((times.seconds[1:] + times.seconds[:-1]) / 2.0, at_s)
+        off_s = np.abs(times.seconds[nearest] - at_s)
+        if not (off_s <= most_s).all() or at_s[-1] > entry.to_timestamp - 2.0 * most_s[-1]:
+            return f"without an image within {_TOLERANCE_S * 1e3:g} ms of each step"
+        return read_pictures(self._folder / name, times, times.ticks[nearest])
+
+    def _records(
+        self,
+        entry: _Entry,
+        path: Path,
+        pictures: Iterable[NDArray[np.uint8] | None],
+        drivers: Sequence[Driver],
+    ) -> Iterator[SourceRecord]:
+        """Yield the records of an episode, up to the first rows with other keys than expected."""
+        number, rate_hz = entry.episode_index, self._info.fps
+        sizes = {f.key: f.size for f in (self._action, *self._states)}
+        sizes |= dict.fromkeys((*self._columns, *_KEYS), 1)
+        steps = enumerate(pictures)
+        done, read = 0, b""
+        stored = [self._stored] if self._stored else []
+        for batch in _batches(path, [*sizes, *stored], number):
+            columns = {key: _vectors(batch, key, size, path) for key, size in sizes.items()}
+            rows = int(batch.num_rows)
+            frames = np.arange(done, done + rows)
+            done += rows
+            first, keys = entry.dataset_from_index, np.hstack([columns[key] for key in _KEYS[1:]])
+            right = np.stack([frames, frames + first, frames / rate_hz], axis=1)
+            if done > entry.length or not np.allclose(keys, right, _ROUNDING, _TOLERANCE_S):
+                raise DemosError(f"{path}: keys of episode {number} do not fit {EPISODES}.")
+            images: list[Any] | None = batch.column(self._stored).to_pylist() if stored else None
+            for row in range(rows):
+                frame, picture = next(steps)
+                single = {key: float(columns[key][row, 0]) for key in self._columns}
+                reward, is_done = single.get(_REWARD, math.nan), bool(single.get(DONE, False))
+                ended = bool(single.get(_TERMINATED, is_done))
+                if images is not None:
+                    picture = _bytes(images[row])
+                    self._most_bytes -= 0 if picture == read else len(picture)
+                    read = picture
+                    if self._most_bytes < 0:
+                        raise DemosError(f"{path} has images of far more bytes than its own.")
+                yield SourceRecord(
+                    name=f"{frame} of episode {number}",
+                    step=Step(
+                        action=tuple(columns[_ACTION][row].tolist()),
+                        driver=drivers[frame] if frame < len(drivers) else "person",
+                        state=tuple(v for f in self._states for v in columns[f.key][row].tolist()),
+                        captured_ns=round(frame / rate_hz * 1e9),
+                        reward=None if math.isnan(reward) else reward,
+                        terminated=ended,
+                        truncated=is_done and not ended,
+                    ),
+                    picture=picture,
+                    frame=frame if self._video else None,
+                )
+        if done < entry.length:
+            raise DemosError(f"{path} has {done} rows of {entry.length} of episode {number}.")
+
+
+def _bytes(image: Any) -> bytes:
+    data = cast("dict[str, Any]", image).get("bytes") if isinstance(image, dict) else None
+    return data if isinstance(data, bytes) else b""
+
+
+def _converted(plain: object, kind: Any, path: Path, *, strict: bool = True) -> Any:
     try:
-        found = msgspec.convert(info.get("features"), dict[str, _Feature])
+        return msgspec.convert(plain, kind, strict=strict)
     except msgspec.ValidationError as error:
-        raise DemosError(f"{path}: the features are invalid ({error}).") from error
-    for key, feature in found.items():
-        feature.key, feature.names = key, _flat_names(feature.names)
-        if key in {_ACTION, _STATE} and feature.size > files.MAX_VALUES:
-            raise DemosError(f"{path}: the feature {key!r} has the shape {list(feature.shape)}.")
-    return list(found.values())
+        raise DemosError(f"{path} does not have what LeRobot writes: {error}.") from error
 
 
 def _flat_names(plain: Any) -> tuple[str, ...]:
@@ -126,129 +374,26 @@ def _flat_names(plain: Any) -> tuple[str, ...]:
     return tuple(map(str, cast("list[Any]", plain))) if isinstance(plain, list) else ()
 
 
-class _Kept(NamedTuple):
-    """The features that are imported; `columns` has those of single numbers."""
-
-    action: _Feature
-    states: tuple[_Feature, ...]
-    camera: _Feature | None
-    columns: frozenset[str]
-
-
-def _chosen(features: Sequence[_Feature], context: ImportContext, path: Path) -> _Kept:
-    """Choose features, and report the others."""
-    numbers = {feature.key: feature for feature in features if feature.is_number}
-    if _ACTION not in numbers:
-        raise DemosError(f"{path} has no numeric feature {_ACTION!r}: there is no action.")
-    states = [f for key, f in numbers.items() if key.startswith(_OBSERVATION)]
-    states.sort(key=lambda feature: feature.key != _STATE)  # Stable: the state first.
-    single = {key for key, feature in numbers.items() if feature.size == 1}
-    columns = frozenset({_REWARD, DONE, _TERMINATED} & single)
-    cameras = {f.key.removeprefix(_CAMERAS): f for f in features if f.is_picture}
-    context.camera = context.camera.removeprefix(_CAMERAS)
-    camera = cameras.get(imports.choose_camera(path.parent.parent, list(cameras), context))
-    taken = {_ACTION, *(f.key for f in states), *columns, *_BOOKKEEPING}
-    for feature in features:
-        if feature.key in taken or feature is camera:
-            continue
-        about = f"{feature.key} ({feature.kind}, {' x '.join(map(str, feature.shape))})"
-        image = len(feature.shape) > 1 or feature.is_image or feature.is_depth
-        if feature.is_number or feature.is_picture or not image:
-            context.note(f"The feature {about} is not imported.")
-        else:
-            context.leave_out("feature", "with images of an unknown kind or of depth", about)
-    return _Kept(numbers[_ACTION], tuple(states), camera, columns)
-
-
 def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
     """Return a layout for the values of features, in order, with their names and units."""
     found: list[Feature] = []
     for feature in features:
-        key = feature.key.removeprefix(_OBSERVATION)
+        key, size = feature.key.removeprefix(_OBSERVATION), feature.size
         prefix = "" if feature.key in {_ACTION, _STATE} else f"{key}/"
-        stated = feature.units
-        units = list(map(str, cast("list[Any]", stated))) if isinstance(stated, list) else []
-        named = tuple(prefix + name for name in feature.names)
-        if len(set(named)) != feature.size or not all(feature.names):
-            if named:
-                context.note(
-                    f"The {len(set(named))} names of {feature.key} do not fit its {feature.size} "
-                    "values, which are numbered."
-                )
-            named = ()
-        found += imports.features_of(key, feature.size, names=named, units=units)
-    if len({feature.name for feature in found}) < len(found):
-        context.note("Names of several features are the same: their values are numbered.")
-        found = imports.features_of("value", sum(feature.size for feature in found))
+        names = [name and prefix + name for name in _flat_names(feature.names)]
+        if names and (len(set(names)) != size or not all(names)):
+            context.note(f"The names of {feature.key} do not fit its {size} values: numbers do.")
+            names = []
+        units = _flat_names(feature.units)
+        found += imports.features_of(key, size, names=names, units=units)
     return imports.as_json(found)
-
-
-def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    path = folder / INFO
-    info = files.read_json_object(path)
-    version = str(info.get("codebase_version", "unknown"))
-    if not version.startswith("v3."):
-        raise DemosError(
-            f"{folder} has version {version} of LeRobot's format, and only 3 can be imported: "
-            "convert it with `python -m lerobot.datasets.v30.convert_dataset_v21_to_v30` of "
-            "lerobot 0.4, which converts v2.1."
-        )
-    kept = _chosen(_read_features(info, path), context, path)
-    rate = info.get("fps")
-    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < math.inf:
-        raise DemosError(f"{path}: fps must be a positive number, got {rate!r}.")
-    camera = kept.camera
-    notes = {"dataset": folder.resolve().name}
-    header = EpisodeHeader(
-        action_layout=_layout([kept.action], context),
-        state_layout=_layout(kept.states, context),
-        image_size=None if camera is None else camera.picture_size(path),
-        control_hz=float(rate),
-        robot=str(info.get("robot_type") or ""),
-        source="lerobot",
-        notes=notes if camera is None else notes | {"camera": camera.key},
-    )
-    has_tasks = (folder / TASKS).is_file()
-    rows = files.all_rows(files.inside(folder, TASKS, path), None) if has_tasks else []
-    texts = [[value for value in row.values() if isinstance(value, str)] for row in rows]
-    tasks = [text[0] for text in texts if text]
-    video = camera.key if camera is not None and camera.kind == "video" else ""
-    index = Index(folder, info, video, header.image_size, context)
-    for key, count in (("total_episodes", len(index.places)), ("total_frames", index.steps)):
-        if info.get(key, count) != count:
-            context.warn(f"{INFO} has {key} {info[key]}, and {EPISODES} {count}.")
-    ours: list[Any] = []
-    if (folder / OURS).is_file():
-        count = max(index.places, default=-1) + 1
-        ours = files.own_episodes(files.read_json_object(folder / OURS), folder / OURS, count)
-    unpacked: dict[Path, int] = {}
-    for located in index.locate():
-        number, task = located.place.number, located.place.tasks
-        about, drivers, outcome = header, list[Driver](), ""
-        said = ", ".join(map(str, cast("list[Any]", task))) if isinstance(task, list) else ""
-        if said or len(tasks) == 1:
-            about = replace(about, notes=about.notes | {"task": said or tasks[0]})
-        if ours:
-            about, outcome, drivers = _own(
-                ours[number], about, f"{folder / OURS}, episode {number}"
-            )
-        records = _records(located, kept, about, drivers, unpacked)
-        rest = [f"{frame} of episode {number}" for frame in located.steps["frame"].tolist()]
-        rows = imports.rows_of(records, about.image_size, context, "step", rest)
-        name = f"{folder}, episode {number}"
-        yield ExchangeEpisode(header=about, rows=rows, name=name, outcome=outcome)
 
 
 def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, str, list[Driver]]:
     """Return the header and the outcome of an own episode, and the driver of each step."""
     header, outcome = files.own_header(plain, where)
-    try:
-        runs = msgspec.convert(plain.get("drivers", []), list[tuple[Driver, int]])
-    except msgspec.ValidationError as error:
-        raise DemosError(f"{where}: the drivers are invalid ({error}).") from error
-    if any(count < 0 for _, count in runs) or sum(count for _, count in runs) > _MAX_STEPS:
-        raise DemosError(f"{where}: the drivers have less than no step, or more than {_MAX_STEPS}.")
-    drivers: list[Driver] = [driver for driver, count in runs for _ in range(count)]
+    runs = _converted(plain.get("drivers", []), list[tuple[Driver, int]], Path(where))
+    drivers = islice(chain.from_iterable(repeat(*run) for run in runs), _MOST)
     ours, theirs = ((one.action_size, one.state_size, one.image_size) for one in (header, found))
     if ours != theirs:
         raise DemosError(
@@ -257,81 +402,49 @@ def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, s
         )
     # The times come from the dataset.
     clock = "real" if header.clock == "none" else header.clock
-    return replace(header, clock=clock, notes=found.notes | header.notes), outcome, drivers
+    return replace(header, clock=clock, notes=found.notes | header.notes), outcome, list(drivers)
 
 
-def _records(
-    located: Located,
-    kept: _Kept,
-    header: EpisodeHeader,
-    drivers: Sequence[Driver],
-    unpacked: dict[Path, int],
-) -> Iterator[SourceRecord]:
-    """Yield the records of an episode; `unpacked` counts the bytes of images of each file."""
-    stored = kept.camera.key if kept.camera is not None and kept.camera.kind == "image" else ""
-    times = located.times
-    videos: Iterator[NDArray[np.uint8] | None] = repeat(None, len(located.steps))
-    if located.video is not None and times is not None and header.image_size is not None:
-        ticks = located.steps["tick"].tolist()
-        videos = read_pictures(located.video, times, ticks, header.image_size)
-    paths = [path for path, _, _ in located.rows_by_file()]
-    first, sizes = paths[0], sum(path.stat().st_size for path in paths)
-    most = files.MAX_UNPACKED + files.MAX_PACKED * sizes
-    read = b""
-    rows = _in_order(located, kept, stored)
-    for step, row, picture in zip(located.steps, rows, videos, strict=True):
-        frame = int(step["frame"])
-        reward = float(row[_REWARD][0]) if _REWARD in row else math.nan
-        done = DONE in row and bool(row[DONE][0])
-        ended = bool(row[_TERMINATED][0]) if _TERMINATED in row else done
-        record = SourceRecord(
-            name=f"{frame} of episode {located.place.number}",
-            step=Step(
-                action=tuple(row[_ACTION].tolist()),
-                driver=drivers[frame] if frame < len(drivers) else "person",
-                state=tuple(value for f in kept.states for value in row[f.key].tolist()),
-                captured_ns=int(step["time_ns"]),
-                reward=None if math.isnan(reward) else reward,
-                terminated=ended,
-                truncated=done and not ended,
-            ),
-            picture=picture,
-            frame=None if picture is None else frame,
+def _batches(path: Path, columns: Sequence[str], number: int | None = None) -> Iterator[Any]:
+    """Yield the rows of a Parquet file, or those of an episode, a few at a time, in order."""
+    arrow, parquet, system, data = (
+        files.library(name, "lerobot")
+        for name in ("pyarrow", "pyarrow.parquet", "pyarrow.fs", "pyarrow.dataset")
+    )
+    try:
+        about, size = parquet.read_metadata(path), path.stat().st_size
+        groups = map(about.row_group, range(about.num_row_groups))
+        parts = (group.column(n) for group in groups for n in range(group.num_columns))
+        sizes = [max(part.total_uncompressed_size, 8 * part.num_values) for part in parts]
+        if sum(sizes) > files.MAX_UNPACKED + files.MAX_PACKED * size or about.num_rows > size:
+            raise DemosError(f"{path} has {size} bytes, but claims to unpack to {sum(sizes)}.")
+        known = about.schema.to_arrow_schema().names
+        if missing := [key for key in columns if key not in known]:
+            raise DemosError(f"{path} has no column {missing[0]!r}.")
+        # Otherwise a whole row group is in memory, which may be an episode of images.
+        frugal = {"use_buffered_stream": True, "buffer_size": 1 << 20, "pre_buffer": False}
+        options = data.ParquetFragmentScanOptions(**frugal)
+        form = data.ParquetFileFormat(default_fragment_scan_options=options)
+        fragment = form.make_fragment(str(path), filesystem=system.LocalFileSystem())
+        yield from fragment.to_batches(
+            columns=list(columns),
+            filter=None if number is None else data.field(_KEYS[0]) == number,
+            # Many rows may share one large value, which is in memory once for each.
+            batch_size=max(1, min(_ROWS, files.MAX_UNPACKED // max(1, *sizes))),
+            use_threads=False,
         )
-        if stored:
-            record.picture = data = _bytes(row[stored])
-            unpacked[first] = unpacked.get(first, 0) + (len(data) if data != read else 0)
-            if unpacked[first] > most:  # One image can stand in any number of rows.
-                raise files.UnpacksToTooMuch(
-                    f"{first} unpacks to more than {most} bytes of images."
-                )
-            read = data
-            record.fault = "" if data else "whose image is not in the table"
-        yield record
+    except (arrow.ArrowException, OSError) as error:
+        reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
+        raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error
 
 
-def _in_order(located: Located, kept: _Kept, stored: str) -> Iterator[dict[str, Any]]:
-    """Yield the features of each step in order: vectors, and the image as stored."""
-    sizes = {f.key: f.size for f in (kept.action, *kept.states)} | dict.fromkeys(kept.columns, 1)
-    waiting: dict[int, dict[str, Any]] = {}  # Rows of a file that is not in order.
-    due = held = 0
-    for path, places, rows in located.rows_by_file():
-        found = files.rows_at(path, rows, sizes, [stored] if stored else [])
-        for place, row in zip(places.tolist(), found, strict=True):
-            waiting[place] = row
-            held += len(_bytes(row.get(stored)))
-            while due in waiting:
-                row = waiting.pop(due)
-                held -= len(_bytes(row.get(stored)))
-                yield row
-                due += 1
-            if held > files.MAX_UNPACKED:  # Many rows may share one large value.
-                raise DemosError(f"{path} has images too far out of order: sort its rows.")
-
-
-def _bytes(value: Any) -> bytes:
-    data = cast("dict[str, Any]", value).get("bytes") if isinstance(value, dict) else None
-    return data if isinstance(data, bytes) else b""
+def _vectors(batch: Any, key: str, size: int, path: Path) -> NDArray[np.float64]:
+    """Return the numbers of a column, shape (n, size)."""
+    try:
+        values = np.array(batch.column(key).to_pylist(), np.float64)
+        return values.reshape(batch.num_rows, size)
+    except (TypeError, ValueError) as error:
+        raise DemosError(f"{path}: {key!r} does not have {size} numbers in each row.") from error
 
 
 FORMAT: Final = Format(
@@ -339,7 +452,7 @@ FORMAT: Final = Format(
     title="LeRobot",
     sign=INFO,
     detect=lambda folder: (folder / INFO).is_file(),
-    read=_read,
+    read=lambda folder, context: _Dataset(folder, context).read(),
     write=write,
     options=frozenset({"camera", "task", "images"}),
     consecutive=True,
