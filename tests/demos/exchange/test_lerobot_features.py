@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,15 @@ from shapechanger.demos.exchange import ImportContext, import_recording
 from shapechanger.demos.exchange.lerobot import FORMAT
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
-from tests.demos.exchange.lerobot_set import CAMERA, SIZE, VIDEO, pairs_of, write_set, write_video
+from tests.demos.exchange.lerobot_set import (
+    CAMERA,
+    DATA,
+    SIZE,
+    VIDEO,
+    pairs_of,
+    write_set,
+    write_video,
+)
 from tests.demos.exchange.small import all_of, picture
 
 AXES = ["height", "width", "channels"]
@@ -196,8 +205,84 @@ def test_names_and_units_of_values(
     action = {"dtype": "float32", "shape": [2], "names": named, "units": ["rad", "deg"]}
     folder = write_set(tmp_path / "set", video=False, features={"action": action})
     done = import_recording(folder, tmp_path / "back")
-    about = all_of(tmp_path / "back")[0].header
+    episode = all_of(tmp_path / "back")[0]
+    about = episode.header
+    assert about.notes == {"dataset": "set", "task": "drive"}
+    assert {step.driver for step in episode.steps} == {"person"}
     assert about.created == ""  # Unknown.
     layout = Layout.from_json(about.action_layout)
     assert (layout.names, [feature.unit for feature in layout]) == (expected, ["rad", "deg"])
     assert any("names of action do not fit its 2 values" in note for note in done.notes) == noted
+
+
+def test_one_of_several_cameras(tmp_path: Path) -> None:
+    """Several cameras need a choice; its name may be short or complete."""
+    camera = {"dtype": "video", "shape": [SIZE, SIZE, 3], "names": AXES}
+    folder = write_set(tmp_path / "set", features={"observation.images.wrist": camera})
+    with pytest.raises(DemosError, match=r"2 cameras \(front, wrist\).*--camera front"):
+        import_recording(folder, tmp_path / "back")
+    with pytest.raises(UnknownName, match="Did you mean 'wrist'"):
+        import_recording(folder, tmp_path / "back", camera="wirst")
+    assert pairs_of(folder, "front")[0] == pairs_of(folder, CAMERA)[0]
+
+
+def spoil(name: str, content: bytes | None = None, size: int | None = None) -> Any:
+    """Return a change that replaces or cuts a file."""
+
+    def change(folder: Path) -> None:
+        path = folder / name
+        path.write_bytes(path.read_bytes()[:size] if content is None else content)
+
+    return change
+
+
+def outside(folder: Path) -> None:
+    """Move a file out of the dataset, and link to it."""
+    shutil.move(folder / DATA, folder.parent / "moved.parquet")
+    (folder / DATA).symlink_to(folder.parent / "moved.parquet")
+
+
+NUMBER = {"dtype": "float32", "shape": [3]}
+PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"info": {"codebase_version": "v2.1"}}, "version v2.1.*convert_dataset_v21"),
+        ({"info": {"fps": 0}}, r"Expected `float` > 0.0 - at `\$.fps`"),
+        ({"info": {"features": []}}, "Expected `object`, got `array`.*features"),
+        ({"info": {"data_path": "../../{chunk_index}"}}, "leaves the folder"),
+        ({"info": {"data_path": "{chunk_index:99d}"}}, "There is no .*99d"),
+        ({"info": {"data_path": None}}, "Expected `str`, got `null`.*data_path"),
+        ({"info": {"data_path": "**/*"}}, r"There is no .*\[\*\]"),
+        ({"info": {"video_path": "/etc/{video_key}"}}, "video cannot be read.*leaves the folder"),
+        (
+            {"features": {"action": {"dtype": "string", "shape": [1]}}},
+            "no numeric feature 'action'",
+        ),
+        ({"features": {"action": {"dtype": "float32"}}}, "required field `shape`"),
+        ({"features": {"action": NUMBER}}, "'action' does not have 3 numbers in each row"),
+        ({"features": {"observation.x": NUMBER}}, "no column 'observation.x'"),
+        (
+            {"features": {CAMERA: {"dtype": "video", "shape": [16, SIZE, 3]}}},
+            r"have \(32, 32\) pixels, not \(32, 16\)",
+        ),
+        (
+            {"features": {CAMERA: {"dtype": "video", "shape": [7]}}},
+            "the shape .7., not",
+        ),
+        (spoil(DATA, size=300), "not an intact Parquet file"),
+        (spoil(VIDEO, PLAYLIST), "video cannot be read: .*is damaged"),
+        (outside, "leaves the folder"),
+        (lambda folder: shutil.rmtree(folder / "meta/episodes"), "not have each episode once"),
+    ],
+)
+def test_refused_imports(tmp_path: Path, options: Any, message: str) -> None:
+    """One sentence, and nothing is left behind."""
+    folder = write_set(tmp_path / "set", **({} if callable(options) else options))
+    if callable(options):
+        options(folder)
+    with pytest.raises(DemosError, match=message):
+        import_recording(folder, tmp_path / "back")
+    assert not [path.name for path in tmp_path.iterdir() if "back" in path.name]

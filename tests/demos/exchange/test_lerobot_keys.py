@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -202,6 +203,36 @@ def test_a_video_that_is_cut_off(tmp_path: Path) -> None:
     pairs, context = pairs_of(folder)
     assert pairs == BOTH[:1]
     assert any("cut off" in line for line in context.left_out_lines())
+
+
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_no_damage_shifts_the_pictures(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    """Whatever happens to its tables, no video shows another image at a step, and none is new."""
+    options = ["-g", "4", "-bf", "2", "-movflags", "+faststart"]
+    folder = write_set(tmp_path_factory.mktemp("damaged") / "set", options=options)
+    content = bytearray((folder / VIDEO).read_bytes())
+    start, end = content.index(b"moov"), content.index(b"mdat")
+    for place in data.draw(st.lists(st.integers(start, end), min_size=1, max_size=3)):
+        content[place] = data.draw(st.integers(0, 255))
+    (folder / VIDEO).write_bytes(content)
+    pairs, _ = pairs_of(folder)
+    assert all(step == picture for episode in pairs for step, picture in episode)
+
+
+def test_a_damaged_image(tmp_path: Path) -> None:
+    """The rest of its episode is left out, and the next episode is not."""
+    folder = write_set(tmp_path / "set", options=["-g", "1", "-movflags", "+faststart"])
+    with av.open(str(folder / VIDEO)) as file:
+        image = list(file.demux(video=0))[5]
+    content = bytearray((folder / VIDEO).read_bytes())
+    content[image.pos + 5 : image.pos + image.size] = b"\xff" * (image.size - 5)
+    (folder / VIDEO).write_bytes(content)
+    pairs, context = pairs_of(folder)
+    assert pairs == [BOTH[0][:5], BOTH[1]]
+    assert "is damaged" in context.left_out_lines()[0]
 
 
 def test_one_damaged_file_of_several(tmp_path: Path) -> None:
