@@ -38,9 +38,6 @@ from shapechanger.layout import Layout
 MAX_UNPACKED: Final = 64 << 20
 """Bytes in memory at once, and allowed for any file. An image of `MAX_PIXELS` has 48 MiB."""
 
-MAX_PACKED: Final = 64
-"""Largest share of unpacked bytes to those of a file."""
-
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 

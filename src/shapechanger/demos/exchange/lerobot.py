@@ -49,9 +49,9 @@ _CAMERAS: Final = "observation.images."
 _NUMBERS: Final = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)")
 _CHANNELS: Final = (1, 3, 4)
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
+_MAX_PACKED: Final = 64  # Largest share of unpacked bytes to those of a file.
 _MOST: Final = 1 << 20  # Steps of an episode, and episodes.
 _ROWS: Final = 256  # In memory at once; fewer if the values of a column are large.
-
 
 _Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
 
@@ -239,7 +239,7 @@ class _Dataset:
             except DemosError as error:
                 self._context.leave_out("file", imports.unreadable(error), name)
                 continue
-            self._most_bytes += files.MAX_PACKED * path.stat().st_size
+            self._most_bytes += _MAX_PACKED * path.stat().st_size
             unknown |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
             for number in sorted(numbers):
                 self._paths[number].append(path)
@@ -277,6 +277,9 @@ class _Dataset:
             self._context.leave_out("file", "that is cut off, without the images after that", name)
         elif early_s > half_s:
             return f"of {name}, which ends {early_s:.4g} s earlier than {EPISODES} says"
+        if min(late_s, early_s) < -half_s:
+            more_s = -min(late_s, early_s)
+            self._context.warn(f"{name} has {more_s:.4g} s more of images than {EPISODES} says.")
         if (np.diff(spans_s.ravel()) < -half_s).any():
             return f"whose parts of {name} overlap, or end before they begin"
         return times
@@ -384,8 +387,7 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
         if names and (len(set(names)) != size or not all(names)):
             context.note(f"The names of {feature.key} do not fit its {size} values: numbers do.")
             names = []
-        units = _flat_names(feature.units)
-        found += imports.features_of(key, size, names=names, units=units)
+        found += imports.features_of(key, size, names=names, units=_flat_names(feature.units))
     return imports.as_json(found)
 
 
@@ -414,13 +416,16 @@ def _batches(path: Path, columns: Sequence[str], number: int | None = None) -> I
     try:
         about, size = parquet.read_metadata(path), path.stat().st_size
         groups = map(about.row_group, range(about.num_row_groups))
-        parts = (group.column(n) for group in groups for n in range(group.num_columns))
-        sizes = [max(part.total_uncompressed_size, 8 * part.num_values) for part in parts]
-        if sum(sizes) > files.MAX_UNPACKED + files.MAX_PACKED * size or about.num_rows > size:
-            raise DemosError(f"{path} has {size} bytes, but claims to unpack to {sum(sizes)}.")
+        parts = [group.column(n) for group in groups for n in range(group.num_columns)]
+        claimed = sum(max(part.total_uncompressed_size, 8 * part.num_values) for part in parts)
+        if claimed > files.MAX_UNPACKED + _MAX_PACKED * size or about.num_rows > size:
+            raise DemosError(f"{path} has {size} bytes, but claims to unpack to {claimed}.")
         known = about.schema.to_arrow_schema().names
         if missing := [key for key in columns if key not in known]:
             raise DemosError(f"{path} has no column {missing[0]!r}.")
+        # Many rows may share one large value, which is in memory once for each.
+        read = [part for part in parts if part.path_in_schema.startswith(tuple(columns))]
+        largest = max((part.total_uncompressed_size for part in read), default=1)
         # Otherwise a whole row group is in memory, which may be an episode of images.
         frugal = {"use_buffered_stream": True, "buffer_size": 1 << 20, "pre_buffer": False}
         options = data.ParquetFragmentScanOptions(**frugal)
@@ -429,8 +434,7 @@ def _batches(path: Path, columns: Sequence[str], number: int | None = None) -> I
         yield from fragment.to_batches(
             columns=list(columns),
             filter=None if number is None else data.field(_KEYS[0]) == number,
-            # Many rows may share one large value, which is in memory once for each.
-            batch_size=max(1, min(_ROWS, files.MAX_UNPACKED // max(1, *sizes))),
+            batch_size=max(1, min(_ROWS, files.MAX_UNPACKED // max(1, largest))),
             use_threads=False,
         )
     except (arrow.ArrowException, OSError) as error:

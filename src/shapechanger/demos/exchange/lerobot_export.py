@@ -13,9 +13,7 @@ kept. Numbers have 32 bits. A state that nothing measured is the middle of its r
 NaN would make all statistics of a dataset NaN.
 
 Statistics have LeRobot's keys and its way to combine episodes (`compute_stats.py` of lerobot
-0.4.4), with three differences: quantiles are exact where LeRobot's come from a histogram, all
-images of an episode count, not a sample, and their standard deviation is the true one, where
-LeRobot's squares overflow 8 bits.
+0.4.4); docs/exchange.md says where their numbers differ.
 """
 
 from __future__ import annotations
@@ -100,7 +98,7 @@ class _Dataset:
 
     def add(self, episode: ExchangeEpisode) -> None:
         """Append an episode."""
-        header, size = episode.header, self._header.image_size
+        header = episode.header
         said = header.notes.get("task") or header.env or header.body or "demonstration"
         task = self._context.task or str(said)
         self._tasks += [] if task in self._tasks else [task]
@@ -115,11 +113,9 @@ class _Dataset:
             parts.append(columns)
             drivers += [step.driver for step, _ in chunk]
         count = len(drivers)
-        stats = {
-            key: _stats_of(np.concatenate([part[key] for part in parts]).astype(np.float64))
-            for key in parts[0]
-        }
-        if size is not None:
+        numbers = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+        stats = {key: _stats_of(values.astype(np.float64)) for key, values in numbers.items()}
+        if header.image_size is not None:
             levels = np.repeat(np.arange(_LEVELS)[:, None] / (_LEVELS - 1), 3, axis=1)
             found = _stats_of(levels, histograms)
             stats[_CAMERA] = {name: value.reshape(-1, 1, 1) for name, value in found.items()}
@@ -131,13 +127,13 @@ class _Dataset:
             "dataset_from_index": self.steps,
             "dataset_to_index": self.steps + count,
         }
+        for what in ("data", "meta/episodes"):
+            place |= {f"{what}/chunk_index": 0, f"{what}/file_index": 0}
         if video is not None:
-            first, end = (float(n / self._rate) for n in (video.frames - count, video.frames))
-            place |= {f"videos/{_CAMERA}/from_timestamp": first}
-            place |= {f"videos/{_CAMERA}/to_timestamp": end}
-        for what in ("data", "meta/episodes", *([f"videos/{_CAMERA}"] if video else [])):
-            number = len(self._videos) - 1 if what.startswith("videos") else 0
-            place |= {f"{what}/chunk_index": 0, f"{what}/file_index": number}
+            part = dict[str, float](chunk_index=0, file_index=len(self._videos) - 1)
+            part["from_timestamp"] = float((video.frames - count) / self._rate)
+            part["to_timestamp"] = float(video.frames / self._rate)
+            place |= {f"videos/{_CAMERA}/{name}": value for name, value in part.items()}
         for key, found in stats.items():
             place |= {f"stats/{key}/{name}": value.tolist() for name, value in found.items()}
         self._places.append(place)
@@ -148,16 +144,15 @@ class _Dataset:
 
     def _new_video(self) -> VideoWriter:
         """Return the video of the next episode: a new one once the last one is full."""
-        last = self._videos[-1] if self._videos else None
-        if last is not None and last.frames < _VIDEO_FILE_S * self._rate:
-            return last
-        if last is not None:
+        for last in self._videos[-1:]:
+            if last.frames < _VIDEO_FILE_S * self._rate:
+                return last
             last.close()
         where = {"video_key": _CAMERA, "chunk_index": 0, "file_index": len(self._videos)}
         path = self._folder / _VIDEO_PATH.format(**where)
         path.parent.mkdir(parents=True, exist_ok=True)
-        assert self._header.image_size is not None
-        self._videos.append(VideoWriter(path, self._header.image_size, self._rate))
+        size = self._header.image_size or (0, 0)
+        self._videos.append(VideoWriter(path, size, self._rate))
         return self._videos[-1]
 
     def _with_images(
@@ -205,9 +200,9 @@ class _Dataset:
                 raise DemosError(
                     f"{name} has a number in {key} that is not finite in 32 bits: export it to csv."
                 )
-            flat, size = arrow.array(values.ravel()), values.shape[1]
-            fixed = arrow.FixedSizeListArray
-            stored[key] = flat if size == 1 else fixed.from_arrays(flat, size)
+            size, flat = values.shape[1], arrow.array(values.ravel())
+            lists = arrow.FixedSizeListArray
+            stored[key] = flat if size == 1 else lists.from_arrays(flat, size)
         if self._header.image_size is not None and not self._is_filmed:
             first = columns["frame_index"][0, 0]
             names = [f"frame-{number:06d}.jpg" for number, _ in enumerate(jpegs, first)]

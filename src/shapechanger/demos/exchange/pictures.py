@@ -180,7 +180,9 @@ def _opened(path: Path) -> Generator[tuple[Any, Any]]:
     strict = {"max_pixels": str(MAX_PIXELS), "err_detect": "explode"}
     with (
         translate_errors(
-            av.FFmpegError, to=lambda error: DemosError(f"{path} is damaged: {error.strerror}.")
+            av.FFmpegError,
+            OSError,
+            to=lambda error: DemosError(f"{path} is damaged: {error.strerror}."),
         ),
         path.open("rb") as file,
         av.open(file, format="mov", options=strict, metadata_errors="replace") as container,
@@ -217,8 +219,9 @@ def read_times(path: Path) -> VideoTimes:
         if not shown.any():
             raise DemosError(f"{path} has no images: restore it.")
         keys = dts[np.maximum.accumulate(np.where(is_key, np.arange(len(dts)), 0))]
-        ticks, first = np.unique(ticks[shown > 0], return_index=True)
-        keys = keys[shown > 0][first]
+        ticks, keys = ticks[shown > 0], keys[shown > 0]
+        if (np.diff(ticks) == 0).any():
+            raise DemosError(f"{path} has two images at one time.")
         seconds = ticks.astype(np.float64) * float(stream.time_base)
         size = (codec.width, codec.height)
         return VideoTimes(ticks, seconds, keys, stream.time_base, size, _is_cut_off(path))
