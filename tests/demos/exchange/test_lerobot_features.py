@@ -76,12 +76,10 @@ FADED = np.dstack([plain(5), np.full((SIZE, SIZE), 128, np.uint8)])
     [
         (png(DEPTH.astype(np.uint16)), "more than 8 bits a value, like that of a depth camera"),
         (png(DEPTH.astype(np.float32), "TIFF"), "not JPEG, PNG or BMP"),
-        (png(plain(5), "WEBP"), "not JPEG, PNG or BMP"),
         (png(FADED), "partly transparent"),
         (png(np.zeros((8, 16, 3), np.uint8)), "of 16 x 8 pixels, and not 32 x 32"),
         pytest.param(png(plain(5))[:60], "a damaged image", id="cut PNG"),
         (picture(0, SIZE, SIZE)[:200], "a damaged image"),
-        (picture(0, 16, 8), "of 16 x 8 pixels, and not 32 x 32"),
         (None, "an empty image"),
     ],
 )
@@ -251,7 +249,6 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
     [
         ({"info": {"codebase_version": "v2.1"}}, "version v2.1.*convert_dataset_v21"),
         ({"info": {"fps": 0}}, r"Expected `float` > 0.0 - at `\$.fps`"),
-        ({"info": {"features": []}}, "Expected `object`, got `array`.*features"),
         ({"info": {"data_path": "../../{chunk_index}"}}, "leaves the folder"),
         ({"info": {"data_path": "{chunk_index:99d}"}}, "There is no .*99d"),
         ({"info": {"data_path": None}}, "Expected `str`, got `null`.*data_path"),
@@ -261,7 +258,6 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
             {"features": {"action": {"dtype": "string", "shape": [1]}}},
             "no numeric feature 'action'",
         ),
-        ({"features": {"action": {"dtype": "float32"}}}, "required field `shape`"),
         ({"features": {"action": NUMBER}}, "'action' does not have 3 numbers in each row"),
         ({"features": {"observation.x": NUMBER}}, "no column 'observation.x'"),
         (

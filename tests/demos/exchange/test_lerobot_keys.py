@@ -14,11 +14,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from shapechanger.demos.exchange import pictures
 from shapechanger.errors import DemosError
 from tests.demos.exchange.lerobot_set import (
     CAMERA,
     DATA,
     EPISODES,
+    SIZE,
     VIDEO,
     pairs_of,
     write_set,
@@ -233,6 +235,15 @@ def test_a_damaged_image(tmp_path: Path) -> None:
     (folder / VIDEO).write_bytes(content)
     pairs, context = pairs_of(folder)
     assert pairs == [BOTH[0][:5], BOTH[1]]
+    assert "is damaged" in context.left_out_lines()[0]
+
+
+def test_a_video_of_too_many_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit holds before an image is decoded, whatever the file says."""
+    folder = write_set(tmp_path / "set")
+    monkeypatch.setattr(pictures, "MAX_PIXELS", SIZE * SIZE - 1)
+    pairs, context = pairs_of(folder)
+    assert not pairs
     assert "is damaged" in context.left_out_lines()[0]
 
 
