@@ -267,21 +267,6 @@ class Reshapable(MujocoEnv):
             result[-1]["diverged"] = True
         return result
 
-    def step_into(
-        self, action: Any, observation: NDArray[np.float64]
-    ) -> tuple[Any, bool, bool, dict[str, Any]]:
-        """Take one step as `step` does, and write the observation into an array.
-
-        Args:
-            action: Shape (nu,), finite.
-            observation: Overwritten; shape of the observation space, float64, contiguous.
-
-        Returns:
-            Reward, terminated, truncated and info.
-        """
-        observation[:], reward, terminated, truncated, info = self.step(action)
-        return reward, terminated, truncated, info
-
     @property
     def diverged(self) -> bool:
         """Return whether MuJoCo has found the state huge or not finite since the last reset.

@@ -104,6 +104,7 @@ def test_divergence_is_found_without_autoreset() -> None:
     envs = shapechanger.make_vec("HalfCheetah", 2)
     envs.envs[0].unwrapped.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     envs.reset(seed=0)
+    envs.step(np.zeros((2, 6)))
     envs.envs[0].unwrapped.data.qvel[:] = 1e30
     ended = False
     for _ in range(3):

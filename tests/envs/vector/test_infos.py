@@ -37,14 +37,18 @@ _CASES: dict[str, list[dict[str, Any]]] = {
 }
 
 
+def _many(count: int) -> Any:
+    envs: Any = VectorEnv()
+    envs.num_envs = count
+    return envs
+
+
 def _ours(infos: list[dict[str, Any]]) -> dict[str, Any]:
-    return batched(in_columns(range(len(infos)), infos), len(infos))
+    return batched(_many(len(infos)), in_columns(dict(enumerate(infos))))
 
 
 def _gymnasiums(infos: list[dict[str, Any]]) -> dict[str, Any]:
-    envs: Any = VectorEnv()
-    envs.num_envs = len(infos)
-    batch: dict[str, Any] = {}
+    envs, batch = _many(len(infos)), {}
     for number, info in enumerate(infos):
         batch = envs._add_info(batch, info, number)
     return batch
@@ -79,10 +83,9 @@ def test_columns_are_batched_alike(kinds: list[int], order: Any) -> None:
         if numbers:
             values = {"a": np.array(numbers, np.float64), "b": np.array(numbers)}
             parts.append(InfoColumns(numbers, values))
-    alone = [i for i, each in enumerate(kinds) if each == 0]
-    parts += in_columns(alone, [infos[i] for i in alone])
+    parts += in_columns({i: infos[i] for i, each in enumerate(kinds) if each == 0})
     order.shuffle(parts)
-    require_same(batched(parts, len(infos)), _gymnasiums(infos))
+    require_same(batched(_many(len(infos)), parts), _gymnasiums(infos))
 
 
 def test_columns_are_split_by_env() -> None:
@@ -90,6 +93,6 @@ def test_columns_are_split_by_env() -> None:
     results = StepResults(2)
     infos = InfoColumns([0, 1], {"a": np.array([1.0, 2.0])})
     results.put_columns(infos, np.zeros(2), np.zeros(2, np.bool_), [False, False])
-    assert results.info(1) == {"a": 2.0}
+    assert results.of_each()[1] == {"a": 2.0}
     results.put(0, (0.5, True, False, {"diverged": True}))
     assert results.of_each() == [{"diverged": True}, {"a": 2.0}]

@@ -6,7 +6,7 @@ import threading
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from functools import partial
 from typing import Any, cast
 
@@ -23,14 +23,8 @@ from shapechanger.envs.checks import (
     require_boxes,
     require_same_spaces,
 )
-from shapechanger.envs.vector.results import (
-    InfoColumns,
-    Restart,
-    StepResults,
-    SubEnv,
-    batched,
-    in_columns,
-)
+from shapechanger.envs.vector.results import InfoColumns, Restart, StepResults, SubEnv
+from shapechanger.envs.vector.results import batched, in_columns
 from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
 from shapechanger.errors import VectorEnvError
 
@@ -110,7 +104,6 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             SubEnv(env, row) for env, row in zip(self.envs, self._observations, strict=True)
         ]
         self._ended = np.zeros(self.num_envs, np.bool_)
-        self._none = np.zeros(self.num_envs, np.bool_)
         self._awaits_reset = True
         self.threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
         self._threads = EnvThreads(self.threads, self.num_envs)
@@ -147,13 +140,13 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             raise gym.error.ResetNeeded("No episode is under way: call `reset` without a mask.")
         chosen = None if mask is None else np.flatnonzero(mask).tolist()
         observations, infos = self.reset_each(seeds, [options] * self.num_envs, chosen)
-        return observations, batched(in_columns(range(self.num_envs), infos), self.num_envs)
+        return observations, batched(self, in_columns(dict(enumerate(infos))))
 
     def reset_each(
         self,
         seeds: Sequence[int | None],
         options: Sequence[dict[str, Any] | None],
-        chosen: Sequence[int] | None = None,
+        chosen: Iterable[int] | None = None,
     ) -> tuple[NDArray[Any], list[dict[str, Any]]]:
         """Start an episode in each env as `reset` does, but return one info per env.
 
@@ -167,17 +160,20 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """
         self._require_open()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        numbers = range(self.num_envs) if chosen is None else chosen
-        changes_bodies = any(given and "body" in given for given in options)
-        # One thread at a time compiles a body, and its renderer is replaced.
-        compiling = threading.Lock() if changes_bodies else nullcontext()
+        numbers = list(range(self.num_envs) if chosen is None else chosen)
+        compiling = threading.Lock()
 
         def start(i: int) -> None:
-            with compiling:
-                infos[i] = self._subs[i].reset(seeds[i], options[i])
+            infos[i] = self._subs[i].reset(seeds[i], options[i])
 
-        run = self._at_home if changes_bodies else self._threads.do
-        self._guarded(lambda: run(start, numbers))
+        def start_alone(i: int) -> None:
+            with compiling:  # One thread at a time compiles a body, and its renderer is replaced.
+                start(i)
+
+        if any(given and "body" in given for given in options):
+            self._guarded(lambda: self._at_home(start_alone, numbers))
+        else:
+            self._guarded(lambda: self._threads.do(start, numbers))
         self._ended[numbers] = False
         return self._present_observations(), infos
 
@@ -194,7 +190,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """
         observations, results = self.step_each(actions)
         ends = results.terminated, results.truncated
-        return observations, results.rewards, *ends, results.batched()
+        return observations, results.rewards, *ends, results.batched(self)
 
     def step_each(self, actions: Any) -> tuple[NDArray[Any], StepResults]:
         """Take one step in each env as `step` does, but return results that hold one info per env.
@@ -206,9 +202,17 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             The observations of all envs, and all other results.
         """
         self._require_open()
-        waiting = self._ended if self._mode is AutoresetMode.NEXT_STEP else self._none
+        waits = self._mode is AutoresetMode.NEXT_STEP
+        waiting = self._ended if waits else np.zeros(self.num_envs, np.bool_)
         given = check_actions(actions, self.num_envs, self._action_shape, waiting)
-        self._require_running()
+        if self._awaits_reset:
+            raise gym.error.ResetNeeded("These envs are not at the same step: call `reset` first.")
+        if self._mode is AutoresetMode.DISABLED and self._ended.any():
+            numbers = ", ".join(str(i) for i in np.flatnonzero(self._ended))
+            raise gym.error.ResetNeeded(
+                f"The episodes of envs {numbers} have ended, and nothing resets them in this mode: "
+                "call `reset` with options={'reset_mask': terminations | truncations}."
+            )
         results = StepResults(self.num_envs)
         self._guarded(lambda: self._advance(given, waiting.tolist(), results))
         self._ended = results.terminated | results.truncated
@@ -260,13 +264,17 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         for i, one in enumerate(moved):
             if one is not None:
                 kinds.setdefault(one[0].kind, []).append(i)
+        diverged: set[int] = set()
         for numbers in kinds.values():
-            self._conclude(numbers, [moved[i] for i in numbers], actions, results)
+            diverged.update(self._conclude(numbers, moved, actions, results))
         # Observations that are not finite end episodes, even if no simulation has noticed.
         finite = np.isfinite(self._observations)
         if not np.logical_and.reduce(finite, axis=None):
-            for i in np.flatnonzero(~finite.reshape(self.num_envs, -1).all(axis=1)).tolist():
-                self._end_diverged(i, results)
+            rows = finite.reshape(self.num_envs, -1).all(axis=1)
+            diverged.update(np.flatnonzero(~rows).tolist())
+        for i in diverged:
+            info = results.of_each()[i]
+            results.put(i, self._subs[i].diverged(bool(results.truncated[i]), info))
         if self._mode is AutoresetMode.SAME_STEP:
 
             def restart(i: int) -> None:
@@ -278,30 +286,34 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
     def _conclude(
         self, numbers: list[int], moved: list[Any], actions: NDArray[Any], results: StepResults
-    ) -> None:
-        """Compute the results of envs of one kind whose physics has stepped."""
+    ) -> list[int]:
+        """Compute the results of envs of one kind whose physics has stepped.
+
+        Args:
+            numbers: Numbers of the envs.
+            moved: Binding, and state from before the physics, of each env.
+            actions: The action of each env.
+            results: Takes the results.
+
+        Returns:
+            Numbers of the envs whose simulation has diverged.
+        """
         subs = [self._subs[i] for i in numbers]
         everyone = len(numbers) == self.num_envs
-        where = slice(None) if everyone else np.array(numbers)
+        where: Any = slice(None) if everyone else numbers
+        bounds, before = zip(*[moved[i] for i in numbers], strict=True)
         observations, rewards, terminated, infos = cast("Any", subs[0].tuned).conclude(
-            [bound for bound, _ in moved],
-            [before for _, before in moved],
-            actions[where],
-            self._observations if everyone else None,
+            bounds, before, actions[where], self._observations if everyone else None
         )
         if not everyone:
             self._observations[where] = observations
         truncated = [sub.tick() for sub in subs]
         results.put_columns(InfoColumns(numbers, infos), rewards, terminated, truncated)
-        warnings = np.concatenate([bound.warnings for bound, _ in moved])
-        if warnings.any():
-            for place in np.flatnonzero(warnings.reshape(len(subs), -1).any(axis=1)).tolist():
-                self._end_diverged(numbers[place], results)
-
-    def _end_diverged(self, i: int, results: StepResults) -> None:
-        """End the episode of an env that has stepped, because its simulation has diverged."""
-        truncated = bool(results.truncated[i])
-        results.put(i, self._subs[i].diverged(truncated, results.info(i)))
+        warnings = np.concatenate([bound.warnings for bound in bounds])
+        if not warnings.any():
+            return []
+        bad = warnings.reshape(len(subs), -1).any(axis=1)
+        return [numbers[place] for place in np.flatnonzero(bad)]
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -319,13 +331,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return self._of_each(lambda i: cast("Any", self.envs[i]).render())
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of each env, or read an attribute.
-
-        Args:
-            name: Its name.
-            *args: Arguments of the method.
-            **kwargs: Named arguments of the method.
-        """
+        """Call a method of each env with the arguments given, or read an attribute."""
 
         def ask(i: int) -> Any:
             found = self.envs[i].get_wrapper_attr(name)
@@ -347,12 +353,10 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Raises:
             VectorEnvError: If there are not as many values as envs.
         """
-        each = cast("Sequence[Any]", values) if isinstance(values, list | tuple) else None
-        if each is not None and len(each) != self.num_envs:
+        each: Any = values if isinstance(values, list | tuple) else [values] * self.num_envs
+        if len(each) != self.num_envs:
             raise VectorEnvError(f"There are {self.num_envs} envs and {len(each)} values.")
-        self._of_each(
-            lambda i: self.envs[i].set_wrapper_attr(name, values if each is None else each[i])
-        )
+        self._of_each(lambda i: self.envs[i].set_wrapper_attr(name, each[i]))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close each env and end the threads."""
@@ -361,7 +365,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         finally:
             self._threads.stop()
 
-    def _at_home(self, work: Callable[[int], None], numbers: Iterable[int]) -> None:
+    def _at_home(self, work: Callable[[int], object], numbers: Iterable[int]) -> None:
         """Do `work` for some envs in the thread that owns their OpenGL contexts.
 
         Envs whose physics step separately never draw while they step, so the caller's thread draws
@@ -372,37 +376,17 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
     def _of_each(self, work: Callable[[int], Any]) -> tuple[Any, ...]:
         """Return the result of `work` for each env."""
-        found: dict[int, Any] = {}
+        found: list[Any] = [None] * self.num_envs
 
         def ask(i: int) -> None:
             found[i] = work(i)
 
         self._at_home(ask, range(self.num_envs))
-        return tuple(found[i] for i in range(self.num_envs))
+        return tuple(found)
 
     def _require_open(self) -> None:
-        """Refuse to go on after `close`.
-
-        Raises:
-            ClosedEnvironmentError: If the vector env is closed.
-        """
         if self.closed:
             raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
-
-    def _require_running(self) -> None:
-        """Refuse to step envs whose episode has not begun or has ended.
-
-        Raises:
-            ResetNeeded: If an env must be reset first.
-        """
-        if self._awaits_reset:
-            raise gym.error.ResetNeeded("These envs are not at the same step: call `reset` first.")
-        if self._mode is AutoresetMode.DISABLED and self._ended.any():
-            numbers = ", ".join(str(i) for i in np.flatnonzero(self._ended))
-            raise gym.error.ResetNeeded(
-                f"The episodes of envs {numbers} have ended, and nothing resets them in this mode: "
-                "call `reset` with options={'reset_mask': terminations | truncations}."
-            )
 
     def _guarded(self, work: Callable[[], None]) -> None:
         """Let the threads work; if that fails, the envs must be reset."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
+from gymnasium.vector import VectorEnv
+from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ Step = tuple[Any, Any, Any, dict[str, Any]]
 
 
 class InfoColumns(NamedTuple):
-    """Infos of envs that have the same keys.
+    """Infos of envs that have the same keys, and no infos within.
 
     Attributes:
         numbers: The numbers of the envs, ascending.
@@ -33,94 +33,41 @@ class InfoColumns(NamedTuple):
     values: Mapping[str, Sequence[Any] | NDArray[Any]]
 
 
-def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> list[InfoColumns]:
-    """Group the infos of some envs by their keys, including the keys of nested infos.
-
-    Args:
-        numbers: Numbers of the envs.
-        infos: The info of each.
-    """
-    groups: dict[tuple[Any, ...], list[int]] = {}
-    for place, info in enumerate(infos):
-        groups.setdefault(_keys(info), []).append(place)
+def in_columns(infos: Mapping[int, Mapping[str, Any]]) -> list[InfoColumns]:
+    """Group the infos of some envs, by number; an info with others within is a group by itself."""
+    groups: dict[Any, list[int]] = {}
+    for number, info in infos.items():
+        nested = any(isinstance(value, dict) for value in info.values())
+        groups.setdefault(number if nested else tuple(info), []).append(number)
     return [
-        InfoColumns(
-            [numbers[place] for place in places],
-            {key: [infos[place][key] for place in places] for key in infos[places[0]]},
-        )
-        for places in groups.values()
+        InfoColumns(numbers, {key: [infos[i][key] for i in numbers] for key in infos[numbers[0]]})
+        for numbers in groups.values()
     ]
 
 
-def _keys(info: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return the keys of an info; a nested info stands as a pair of its key and its keys.
-
-    Two envs whose nested infos differ must not share a group: the keys of the batch would come in
-    another order than Gymnasium's.
-    """
-    return tuple(
-        (key, _keys(cast("dict[str, Any]", value))) if isinstance(value, dict) else key
-        for key, value in info.items()
-    )
-
-
-def batched(
-    parts: Iterable[InfoColumns], num_envs: int, batch: dict[str, Any] | None = None
-) -> dict[str, Any]:
+def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dict[str, Any]:
     """Return the infos of all envs as Gymnasium's vector envs do.
 
     For each key there is an array of one entry per env, and under `_key` a mask of the envs that
-    have one. Gymnasium adds one env after another, key by key. Adding envs whose infos have the
-    same keys together takes a tenth of the time.
-
-    Args:
-        parts: The infos of the envs that have any.
-        num_envs: How many envs there are.
-        batch: Infos to which these are added, in place; None for new ones.
+    have one. Gymnasium adds one env after another, key by key; here it does so with the first env
+    of each part, which makes the arrays, and the others are added together, in a tenth of the time.
     """
-    batch = {} if batch is None else batch
+    batch: dict[str, Any] = {}
     # The lowest env first, as it sets the dtypes.
     for numbers, values in sorted(parts, key=lambda part: part.numbers[0]):
-        where = _where(numbers, num_envs)
-        masks = np.zeros((len(values), num_envs), np.bool_)
-        masks[:, where] = True
-        for (key, column), mask in zip(values.items(), masks, strict=True):
-            if isinstance(column[0], dict) and key != "final_obs":
-                nested = in_columns(numbers, cast("Sequence[Any]", column))
-                batch[key] = batched(nested, num_envs, batch.get(key))
-            elif key not in batch and isinstance(column, np.ndarray) and column.size == num_envs:
-                batch[key] = column.copy()
+        envs._add_info(batch, {key: column[0] for key, column in values.items()}, numbers[0])
+        if len(numbers) == 1:
+            continue
+        others = slice(1, None) if len(numbers) == envs.num_envs else np.asarray(numbers[1:])
+        for key, column in values.items():
+            array = batch[key]
+            if array.dtype == np.object_:  # Numbers and arrays in it stay what they are.
+                for number, value in zip(numbers, column, strict=True):
+                    array[number] = value
             else:
-                if key not in batch:
-                    batch[key] = _empty(key, column, num_envs)
-                array = batch[key]
-                if array.dtype == np.object_:  # Numbers and arrays in it stay what they are.
-                    for number, value in zip(numbers, column, strict=True):
-                        array[number] = value
-                else:
-                    array[where] = column
-            name = f"_{key}"
-            batch[name] = batch[name] | mask if name in batch else mask
+                array[others] = column[1:]
+            batch[f"_{key}"][others] = True
     return batch
-
-
-def _empty(key: str, values: Sequence[Any] | NDArray[Any], num_envs: int) -> NDArray[Any]:
-    """Return an array of all envs for values such as these."""
-    if isinstance(values, np.ndarray):
-        return np.zeros(num_envs, values.dtype)
-    first: Any = values[0]
-    # NumPy's booleans get an array of objects, as in Gymnasium.
-    if type(first) in (int, float, bool) or isinstance(first, np.number):
-        return np.zeros(num_envs, np.asarray(cast("Any", first)).dtype)
-    if isinstance(first, np.ndarray) and key != "final_obs":
-        array = cast("NDArray[Any]", first)
-        return np.zeros((num_envs, *array.shape), array.dtype)
-    return np.full(num_envs, None, np.object_)
-
-
-def _where(numbers: Sequence[int], num_envs: int) -> slice | NDArray[np.intp]:
-    """Return the index of envs in arrays of all envs; a slice, which copies nothing, for all."""
-    return slice(None) if len(numbers) == num_envs else np.asarray(numbers)
 
 
 class Restart(NamedTuple):
@@ -160,10 +107,7 @@ class StepResults:
 
     def put(self, number: int, step: Step) -> None:
         """Set the result of one env."""
-        reward, terminated, truncated, info = step
-        self.rewards[number] = reward
-        self.terminated[number] = terminated
-        self.truncated[number] = truncated
+        self.rewards[number], self.terminated[number], self.truncated[number], info = step
         self._infos[number] = info
 
     def put_columns(
@@ -174,49 +118,32 @@ class StepResults:
         truncated: list[bool],
     ) -> None:
         """Set the results of several envs, whose numbers come with their infos."""
-        where = _where(infos.numbers, self.rewards.size)
+        where = infos.numbers
         self.rewards[where] = rewards
         self.terminated[where] = terminated
         self.truncated[where] = truncated
         self._columns.append(infos)
 
-    def info(self, number: int) -> dict[str, Any]:
-        """Return the info of one env."""
-        self._expand()
-        return self._infos[number]
-
     def of_each(self) -> list[dict[str, Any]]:
         """Return the info of each env."""
-        self._expand()
-        return [self._infos[number] for number in range(self.rewards.size)]
-
-    def batched(self) -> dict[str, Any]:
-        """Return all infos as Gymnasium's vector envs do, including the infos of restarts."""
-        if self.restarts:
-            self._expand()
-        numbers = sorted(self._infos)
-        infos = in_columns(numbers, [self._with_restart(number) for number in numbers])
-        return batched([*self._columns, *infos], self.rewards.size)
-
-    def _expand(self) -> None:
-        """Split the columns into one info per env."""
         for numbers, values in self._columns:
             for number, *row in zip(numbers, *values.values(), strict=True):
                 self._infos[number] = dict(zip(values, row, strict=True))
         self._columns = []
+        return [self._infos[number] for number in range(self.rewards.size)]
 
-    def _with_restart(self, number: int) -> dict[str, Any]:
-        info, restart = self._infos[number], self.restarts.get(number)
-        if restart is None:
-            return info
-        return {"final_obs": restart.final_observation, "final_info": info, **restart.info}
+    def batched(self, envs: VectorEnv[Any, Any, Any]) -> dict[str, Any]:
+        """Return all infos as Gymnasium's vector envs do, including the infos of restarts."""
+        if self.restarts:
+            self.of_each()
+        infos = {number: self._infos[number] for number in sorted(self._infos)}
+        for number, (last, info) in self.restarts.items():
+            infos[number] = {"final_obs": last, "final_info": infos[number], **info}
+        return batched(envs, [*self._columns, *in_columns(infos)])
 
 
 class SubEnv:
     """One env of a vector env, which writes its observations into a row of a batch.
-
-    An env with a method `step_into(action, row)` is stepped by it, past the wrappers of `gym.make`:
-    the clock of `TimeLimit` is counted here, and the others do nothing between two resets.
 
     A simulation has diverged when the env's info says so, when MuJoCo found a position, velocity or
     acceleration that is huge or not finite, or when an observation is not finite. MuJoCo then
@@ -228,60 +155,39 @@ class SubEnv:
         row: Where to write its observations.
 
     Attributes:
-        tuned: The env without its wrappers if its physics can be stepped separately, else None.
+        tuned: The env without its time limit if its physics can be stepped separately, else None.
     """
 
-    __slots__ = ("_clock", "_limit", "_step_into", "_warnings", "env", "row", "tuned")
+    __slots__ = ("_clock", "_warnings", "env", "row", "tuned")
 
     def __init__(self, env: gym.Env[Any, Any], row: NDArray[Any]) -> None:
         self.env = env
         self.row = row
-        self._clock: Any = None
-        self._limit = math.inf
-        self._step_into: Any = None
+        self._clock: Any = env if isinstance(env, TimeLimit) else None
         self._warnings: NDArray[Any] | None = None
-        inner: Any = env
-        while isinstance(inner, OrderEnforcing | PassiveEnvChecker | TimeLimit):
-            if isinstance(inner, TimeLimit):
-                self._clock = inner
-                self._limit = cast("Any", inner)._max_episode_steps
-            inner = cast("Any", inner).env
-        if inner is env.unwrapped and row.dtype == np.float64:
-            self._step_into = getattr(inner, "step_into", None)
+        inner: Any = env if self._clock is None else self._clock.env
+        together = inner is env.unwrapped and hasattr(inner, "ready_together")
         self.tuned: TunedStep | None = (
-            cast("TunedStep", inner)
-            if self._step_into is not None and hasattr(inner, "ready_together")
-            else None
+            cast("TunedStep", inner) if together and row.dtype == np.float64 else None
         )
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> dict[str, Any]:
-        """Start an episode, and return its info.
-
-        Args:
-            seed: Seed of the env; None to go on with its generator.
-            options: Options of the env's reset.
-        """
-        observation, info = self.env.reset(seed=seed, options=options)
-        self.row[...] = observation
-        if self._step_into is None:
-            # A reset may have replaced the data.
-            data = getattr(self.env.unwrapped, "data", None)
-            self._warnings = None if data is None else data.warning.number[_BAD_STATE]
+        """Start an episode, and return its info; see `gymnasium.Env.reset`."""
+        self.row[...], info = self.env.reset(seed=seed, options=options)
+        inner: Any = self.env.unwrapped
+        # Ours say themselves that they have diverged. A reset may have replaced the data.
+        if hasattr(inner, "data") and not hasattr(inner, "diverged"):
+            self._warnings = inner.data.warning.number[_BAD_STATE]
         return info
 
     def step(self, action: Any) -> Step:
         """Take one step."""
-        if self._step_into is None:
-            observation, reward, terminated, truncated, info = self.env.step(action)
-            self.row[...] = observation
-        else:
-            reward, terminated, truncated, info = self._step_into(action, self.row)
-            truncated = self.tick() or truncated
+        self.row[...], reward, terminated, truncated, info = self.env.step(action)
         if "diverged" in info or (self._warnings is not None and self._warnings.any()):
             return self.diverged(truncated, info)
-        return reward, terminated, truncated, info
+        return cast("Any", reward), terminated, truncated, info
 
     def tick(self) -> bool:
         """Count one more step; return whether the episode's time limit is reached."""
@@ -289,7 +195,7 @@ class SubEnv:
         if clock is None:
             return False
         clock._elapsed_steps += 1
-        return clock._elapsed_steps >= self._limit
+        return clock._elapsed_steps >= clock._max_episode_steps
 
     def diverged(self, truncated: Any, info: dict[str, Any]) -> Step:
         """Return the result of a step whose simulation has diverged.

@@ -44,12 +44,11 @@ class _Worker(threading.Thread):
 
 
 class EnvThreads:
-    """Threads that each work for a fixed range of envs.
+    """Threads that each work for a fixed range of envs, the first of which is the caller's.
 
     An env stays with its thread: neighbours are close in memory, and OpenGL contexts may not change
-    threads. The first range is the caller's. The other threads start with the first
-    work, and again in a forked process. A SimpleQueue stays consistent even when a signal
-    interrupts the caller; a pair of locks does not.
+    threads. The other threads start with the first work, and again in a forked process. A
+    SimpleQueue stays consistent even when a signal interrupts the caller; a pair of locks does not.
 
     Args:
         threads: How many threads, including the caller's.
@@ -67,7 +66,7 @@ class EnvThreads:
         self._workers: list[_Worker] = []
 
     def do(
-        self, work: Callable[[int], None], numbers: Iterable[int], *, alone: bool = False
+        self, work: Callable[[int], object], numbers: Iterable[int], *, alone: bool = False
     ) -> None:
         """Do `work` for some envs, each in its own thread; return when all of it is done.
 
@@ -99,22 +98,13 @@ class EnvThreads:
             BaseException: What a job itself raised, such as KeyboardInterrupt.
         """
         failures: Failures = []
-        self._run([partial(job, failures) for job in jobs])
-        if failures:
-            number, error = min(failures, key=lambda failure: failure[0])
-            error.add_note(f"This was raised by env {number} of the vector env.")
-            raise error
-
-    def _run(self, jobs: Sequence[Callable[[], None]]) -> None:
-        if len(jobs) == 1:
-            jobs[0]()
-            return
-        workers = self._awake()
+        first, *others = [partial(job, failures) for job in jobs]
+        workers = self._awake() if others else []
         answers = _Answers()
         try:
-            for worker, job in zip(workers, jobs[1:], strict=True):
+            for worker, job in zip(workers, others, strict=True):
                 worker.inbox.put((job, answers))
-            jobs[0]()
+            first()
             errors = [answers.get() for _ in workers]
         except BaseException:
             self._settle()
@@ -122,6 +112,10 @@ class EnvThreads:
         for error in errors:
             if error is not None:
                 raise error
+        if failures:
+            number, failure = min(failures, key=lambda failure: failure[0])
+            failure.add_note(f"This was raised by env {number} of the vector env.")
+            raise failure
 
     def stop(self) -> None:
         """End the threads; the next work starts new ones."""
@@ -161,13 +155,7 @@ class EnvThreads:
 
 
 def attempt(work: Callable[[int], object], number: int, failures: Failures) -> None:
-    """Do `work` for one env, and record what it raises.
-
-    Args:
-        work: Takes the number of an env.
-        number: The number.
-        failures: Receives the exception, which the caller's thread raises.
-    """
+    """Do `work` for one env, and record what it raises, which the caller's thread raises."""
     try:
         work(number)
     except Exception as error:
