@@ -213,8 +213,8 @@ def speed() -> Iterator[Row]:
     value = statistics.median(rates)
     spread = f"{rates[0]:,.0f} to {rates[-1]:,.0f} in {len(rates)} rounds, {_card()}"
     yield Row(name, f"{value:,.0f}", spread, target, value >= SPEED)
-    worlds = envs.batches[0].worlds
-    share = value * _seconds(worlds.step, STEPS) / MANY
+    worlds = envs.batches[0]
+    share = value * _seconds(worlds.simulate, STEPS) / MANY
     yield Row(
         f"Ant, N={MANY}: share of physics in a whole step",
         f"{share:.0%}",
@@ -245,13 +245,13 @@ def graphs() -> Iterator[Row]:
     """Compare physics that is launched kernel by kernel with a captured graph of it."""
     envs = made("Ant", FEW)
     _seconds(_stepper(envs, actions(envs, 20)), 20)
-    worlds = envs.batches[0].worlds
+    worlds = envs.batches[0]
 
     def launched() -> None:
         with on(worlds.device):
-            worlds._step()
+            worlds._simulate()
 
-    ratios = _ratio(launched, worlds.step, 4)
+    ratios = _ratio(launched, worlds.simulate, 4)
     value = statistics.median(ratios)
     yield Row(
         f"Ant, N={FEW}: time of physics by kernels over that of its graph, {_card()}",

@@ -14,7 +14,7 @@ import torch
 import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.envs.warp.devices import as_torch
-from shapechanger.envs.warp.noise import uniforms
+from shapechanger.envs.warp.kernels import uniforms
 from shapechanger.errors import FingerError, UnknownName, VectorEnvError
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.gap import GAPS, Gap
@@ -98,13 +98,13 @@ def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]
     batch: Any = worlds.batches[0]
     begun: list[Any] = []
     for i, env in enumerate(alone):
-        options = {"posture": batch.worlds.qpos[i, :4].double().numpy()}
+        options = {"posture": batch.qpos[i, :4].double().numpy()}
         if isinstance(env, FingerReachEnv):
             target = infos["target"][i].double().numpy()
             begun.append(env.reset(seed=seed, options={**options, "target": target}))
             continue
         env.reset(seed=seed, options=options)
-        env._t = batch.kind.task._times[i]
+        env._t = batch.task._times[i]
         env._look()
         begun.append((env._observation(env._senses), env._info()))
     return begun
@@ -113,7 +113,7 @@ def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]
 def copy_states(worlds: WarpVectorEnv, alone: list[Any]) -> None:
     """Put the worlds into the states of CPU envs, of which single precision is left."""
     batch: Any = worlds.batches[0]
-    physics, task = batch.worlds, batch.kind.task
+    physics, task = batch, batch.task
     for i, env in enumerate(alone):
         data = env.plant.data
         for name in ("qpos", "qvel", "act", "ctrl", "history"):
@@ -194,7 +194,7 @@ def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
         for name, value in info.items():
             assert apart(infos[name][i], value) < REWARD_TOLERANCE, name
     if kind == "circles":  # Starts are spread over closed paths.
-        times = worlds.batches[0].kind.task._times  # pyright: ignore[reportAttributeAccessIssue]
+        times = worlds.batches[0].task._times  # pyright: ignore[reportAttributeAccessIssue]
         assert 0.0 <= times.min() < times.max() < alone[0].path.duration_s
     for _ in range(30 if kind == "circles" else 8):
         actions = rng.uniform(-1.0, 1.0, (len(alone), 7)).astype(np.float32)
@@ -253,10 +253,10 @@ def noisy(seed: int, steps: int, **noise: float) -> tuple[Any, Any]:
         "Finger", 2, backend="warp", device="cpu", parameters=noise, max_episode_steps=1000
     )
     seen = [worlds.reset(seed=seed)[0]]
-    true = [worlds.batches[0].worlds.qpos.clone()]
+    true = [worlds.batches[0].qpos.clone()]
     for _ in range(steps):
         seen.append(worlds.step(torch.zeros(2, 7))[0])
-        true.append(worlds.batches[0].worlds.qpos.clone())
+        true.append(worlds.batches[0].qpos.clone())
     return torch.stack(seen).double().numpy(), torch.stack(true).double().numpy()
 
 
@@ -335,7 +335,7 @@ def test_a_finger_that_diverges_restarts_alone() -> None:
     for worlds in pairs:
         worlds.reset(seed=0)
     pull = torch.zeros(3, 7)
-    broken.batches[0].worlds.qvel[1] = torch.nan
+    broken.batches[0].qvel[1] = torch.nan
     for step in range(3):
         expected, found = whole.step(pull), broken.step(pull)
         for one, other in zip(found[:4], expected[:4], strict=True):

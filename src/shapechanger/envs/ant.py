@@ -30,11 +30,11 @@ from shapechanger.envs.odrl import published
 from shapechanger.envs.stepping.tuned import (
     NO_WARNINGS,
     Binding,
+    ModelWatch,
     Outcomes,
     StepResult,
     TunedStep,
 )
-from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
 from shapechanger.morphology import AddSegment, Body, Cut, JointRange, StartHeight, Stretch
 from shapechanger.morphology.families import BodyLike, Family, length_axes, strength_axes
@@ -259,7 +259,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         """The body whose velocity is rewarded, by number or name."""
         return self._main_body
 
-    def _advance(self, bound: _Ant, action: Any, out: NDArray[np.float64] | None) -> StepResult:
+    def _advance(self, bound: _Ant, action: Any) -> StepResult:
         # Gymnasium's `step`, `_get_obs` and `is_healthy`, each number computed once, in their order
         # and precision: the cost of an action is summed in the action's own.
         if type(action) is not np.ndarray or action.shape != bound.shape:
@@ -278,7 +278,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         contact_cost = self._contact_cost_weight * _sum(
             np.square(bound.clipped, out=bound.squared), axis=None
         )
-        observation = np.concatenate(bound.observed, out=out)
+        observation = np.concatenate(bound.observed)
 
         qpos = bound.qpos
         x, y, z, _, up_x, up_y = qpos[:6].tolist()

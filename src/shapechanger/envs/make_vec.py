@@ -24,11 +24,14 @@ from shapechanger.errors import UnknownName, VectorEnvError
 if TYPE_CHECKING:
     from shapechanger.envs.warp.env import WarpVectorEnv
 
-_BACKENDS: Final = ("threads", "warp")
-# Arguments of a CPU env that have no meaning on a device, with the reason.
+# Arguments that a backend does not have, with the reason.
 _REFUSED: Final = {
-    "render_mode": "nothing is drawn on the device; render the same body with gymnasium.make",
-    "towards": "a reset draws no body by itself; hand it with options={'bodies': [...]}",
+    "threads": dict.fromkeys(("device", "pool", "nconmax", "njmax"), "use backend='warp'"),
+    "warp": {
+        "threads": "all worlds are stepped at once",
+        "render_mode": "nothing is drawn on the device; render the same body with gymnasium.make",
+        "towards": "a reset draws no body by itself; hand it with options={'bodies': [...]}",
+    },
 }
 
 
@@ -100,28 +103,23 @@ def make_vec(
     count = _at_least_one("env", num_envs)
     if bodies is not None and len(bodies) != count:
         raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
-    if backend not in _BACKENDS:
-        raise UnknownName("backend", backend, _BACKENDS)
+    if backend not in _REFUSED:
+        raise UnknownName("backend", backend, _REFUSED)
     made_from, mode = _known_id(env_id), _mode(autoreset_mode, backend)
-    limits = {"nconmax": nconmax, "njmax": njmax}
-    limits = {name: number for name, number in limits.items() if number is not None}
-    recorded: dict[str, Any] = {
-        "threads": threads,
-        "device": device,
-        "bodies": bodies,
-        "pool": pool,
-    }
-    recorded = {name: value for name, value in recorded.items() if value is not None} | limits
+    own = {"threads": threads, "device": device, "bodies": bodies, "pool": pool}
+    own |= {"nconmax": nconmax, "njmax": njmax}
+    recorded: dict[str, Any] = {name: value for name, value in own.items() if value is not None}
+    for name, reason in _REFUSED[backend].items():
+        if {**arguments, **recorded}.get(name) is not None:
+            raise VectorEnvError(f"backend={backend!r} takes no {name}: {reason}.")
     if backend == "warp":
-        if threads is not None or not copy:
-            raise VectorEnvError("backend='warp' has no threads, and always copies observations.")
+        if not copy:
+            raise VectorEnvError("backend='warp' always copies observations.")
         if pool is not None and (bodies is not None or not len(pool)):
             raise VectorEnvError("Give either `bodies`, one per world, or a `pool` of some bodies.")
-        for name, reason in _REFUSED.items():
-            if arguments.get(name) is not None:
-                raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
         from shapechanger.envs.warp import WarpVectorEnv, find_device, make_reader  # Warp.
 
+        limits = {name: recorded[name] for name in ("nconmax", "njmax") if name in recorded}
         place = find_device(device)
         envs = WarpVectorEnv(
             make_reader(made_from, partial(_make, made_from), arguments),
@@ -135,12 +133,10 @@ def make_vec(
         spec = copying.deepcopy(envs.made_from)
         recorded |= {"backend": backend, "task_infos": task_infos}
     else:
-        if wrong := [name for name in ("device", "pool", *limits) if name in recorded]:
-            raise VectorEnvError(f"backend='threads' has no {wrong[0]}: use backend='warp'.")
-        cores = _cores() if threads is None else _at_least_one("thread", threads)
         each: list[dict[str, Any]] = [arguments] * count
         if bodies is not None:
             each = [{**arguments, "body": body} for body in bodies]
+        cores = _cores() if threads is None else _at_least_one("thread", threads)
         envs = ThreadVectorEnv(
             [partial(_make, made_from, one) for one in each],
             threads=min(cores, count),

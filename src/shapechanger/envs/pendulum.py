@@ -7,7 +7,6 @@ from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra, MorphologyError
 
@@ -25,8 +24,13 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import position_features, velocity_features
 from shapechanger.envs.reshapable import Reshapable
-from shapechanger.envs.stepping.tuned import NO_WARNINGS, Binding, StepResult, TunedStep
-from shapechanger.envs.stepping.watch import ModelWatch
+from shapechanger.envs.stepping.tuned import (
+    NO_WARNINGS,
+    Binding,
+    ModelWatch,
+    StepResult,
+    TunedStep,
+)
 from shapechanger.layout import Element, Feature
 from shapechanger.morphology import Stretch, compile_body
 from shapechanger.morphology.families import BodyLike, Family
@@ -118,9 +122,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         cast("Any", GymnasiumInvertedPendulumEnv).__init__(self, **arguments)
         self._finish(arguments)
 
-    def _advance(
-        self, bound: _Pendulum, action: Any, out: NDArray[np.float64] | None
-    ) -> StepResult:
+    def _advance(self, bound: _Pendulum, action: Any) -> StepResult:
         # Gymnasium's `step`, with each number computed once.
         if type(action) is not np.ndarray or action.shape != bound.shape:
             action = check_action(self, action)
@@ -128,7 +130,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
             check_action(self, action)
         bound.ctrl[:] = action
         bound.move()
-        observation = np.concatenate(bound.observed, out=out)
+        observation = np.concatenate(bound.observed)
         numbers = observation.tolist()
         # A sum is finite only if every number is; one that is not may have overflowed.
         finite = math.isfinite(sum(numbers)) or bool(np.isfinite(observation).all())

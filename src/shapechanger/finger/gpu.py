@@ -13,20 +13,17 @@ from functools import partial
 from typing import Any, Final, cast
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 from typing_extensions import override
 
-from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.noise import normals, uniforms
-from shapechanger.envs.warp.reader import register_reader
-from shapechanger.envs.warp.starts import length
-from shapechanger.envs.warp.tasks import Constants, DeviceOutcome, DeviceTask
-from shapechanger.envs.warp.worlds import Worlds
+from shapechanger.envs.warp.kernels import normals, uniforms
+from shapechanger.envs.warp.reader import BodyReader, register_reader
+from shapechanger.envs.warp.tasks import DeviceTask, length
+from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.finger.anatomy import DIP_BAND, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.env import SMOOTHNESS, FingerLike, as_finger
@@ -50,8 +47,8 @@ class DeviceFinger(DeviceTask):
 
     precision = torch.float64
 
-    def __init__(self, env: Any, plant: FingerPlant) -> None:
-        super().__init__(env)
+    def __init__(self, env: Any, plant: FingerPlant, frame_skip: int) -> None:
+        super().__init__(env, plant.model, frame_skip)
         parameters = plant.parameters
         self._gives = parameters.gives
         self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
@@ -62,7 +59,7 @@ class DeviceFinger(DeviceTask):
         self._former_places = first[:, None] + np.arange(samples)
 
     @override
-    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+    def attach(self, worlds: Worlds) -> None:
         count, device = worlds.count, worlds.device
         zeros = partial(torch.zeros, dtype=self.precision, device=device)
         whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
@@ -81,9 +78,8 @@ class DeviceFinger(DeviceTask):
         self._seeds, self._episodes, self._steps = whole(), whole(), whole()
 
     @override
-    def start(
-        self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
-    ) -> None:
+    def start(self, worlds: Worlds, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
+        constants = worlds.constants
         _put(self._seeds, mask, seeds)
         _put(self._episodes, mask, episodes)
         self._steps.masked_fill_(mask, 0)
@@ -105,7 +101,7 @@ class DeviceFinger(DeviceTask):
         _put(self._commands, mask, command)
         self._change.masked_fill_(mask[:, None], 0.0)
         worlds.forward()
-        self._measure(worlds, constants, mask)
+        self._measure(worlds, mask)
 
     @abstractmethod
     def _begin(self, mask: Tensor) -> Tensor:
@@ -121,47 +117,49 @@ class DeviceFinger(DeviceTask):
         """Whether each finger does its task, shape (n,)."""
 
     @override
-    def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
+    def act(self, worlds: Worlds, actions: Tensor) -> None:
+        constants = worlds.constants
         before = self._commands
         self._commands = actions.to(self.precision).clip(-1.0, 1.0)
         self._change = self._commands - before
         if self._held is None:
             worlds.ctrl[:] = self._commands
-            worlds.step()
+            worlds.simulate()
         else:
             for _ in range(self._held.computations):
-                lengths, speeds = self._lengths(worlds, constants)
+                lengths, speeds = self._lengths(worlds)
                 tensions = self._drive.tension(self._commands, lengths, speeds)
                 aim = _share(constants, tensions)
                 for _ in range(self._held.ticks):
                     lowest = self._shares - constants["fall"]
                     self._shares = aim.clip(lowest, self._shares + constants["rise"])
                     worlds.ctrl[:] = self._controls(constants)
-                    worlds.step()
+                    worlds.simulate()
         self._steps += 1
-        self._measure(worlds, constants, None)
+        self._measure(worlds, None)
         self._follow()
 
-    def _controls(self, constants: Constants) -> Tensor:
+    def _controls(self, constants: dict[str, Tensor]) -> Tensor:
         """Return the controls of the present tensions on the path, as `HeldTensions` does."""
         least, step = constants["least"], constants["step"]
         tensions = least + self._shares * (constants["most"] - least)
         rounded = _share(constants, torch.floor(tensions / step) * step)
         return 2.0 * torch.where(step > 0.0, rounded, self._shares) - 1.0
 
-    def _lengths(self, worlds: Worlds, constants: Constants) -> tuple[Tensor, Tensor]:
+    def _lengths(self, worlds: Worlds) -> tuple[Tensor, Tensor]:
         """Return lengths at the motors, m, and their rates, m/s, shape (n, 7) each."""
         state = worlds.qpos.to(self.precision), worlds.qvel.to(self.precision)
         if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
             return -state[0][:, _J:], -state[1][:, _J:]
-        return -_turned(constants["arms"], state[0]), -_turned(constants["arms"], state[1])
+        arms = worlds.constants["arms"]
+        return -_turned(arms, state[0]), -_turned(arms, state[1])
 
-    def _measure(self, worlds: Worlds, constants: Constants, mask: Tensor | None) -> None:
+    def _measure(self, worlds: Worlds, mask: Tensor | None) -> None:
         """Measure after a step, or where a mask is given after a start in some worlds."""
         angles = true = worlds.qpos[:, :_J].to(self.precision)
         tensions = worlds.actuator_force.abs().to(self.precision)
         if any(self._noisy):
-            stream = _SENSES + self._steps
+            constants, stream = worlds.constants, _SENSES + self._steps
             noise = normals(self._seeds, self._episodes, stream, _J + _T)
             angles = angles + constants["joint_noise"] * noise[:, :_J]
             tensions = (tensions + constants["tension_noise"] * noise[:, _J:]).clip(0.0)
@@ -170,7 +168,7 @@ class DeviceFinger(DeviceTask):
             velocities = torch.zeros_like(velocities)
         elif self._noisy[0]:
             velocities = smoothed(self._velocities, self._angles, angles)
-        lengths, _ = self._lengths(worlds, constants)
+        lengths, _ = self._lengths(worlds)
         senses = torch.cat([angles, velocities, tensions, lengths, self._commands], dim=1)
 
         def kept(former: Tensor, new: Tensor) -> Tensor:
@@ -194,10 +192,8 @@ class DeviceFinger(DeviceTask):
         return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(worlds.qpos.dtype)
 
     @override
-    def outcome(
-        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
-    ) -> DeviceOutcome:
-        pulled = worlds.actuator_force / constants["most"]
+    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
+        pulled = worlds.actuator_force / worlds.constants["most"]
         terms: dict[str, Tensor] = self._env._reward.terms(
             length(self._tip - self._target),
             pulled.square().mean(dim=1),
@@ -208,11 +204,11 @@ class DeviceFinger(DeviceTask):
         plain = {name: term.to(worlds.qpos.dtype) for name, term in terms.items()}
         rewards = sum(term for name, term in terms.items() if name != SMOOTHNESS.key)
         never = torch.zeros_like(self._steps, dtype=torch.bool)
-        infos = {**self.start_infos(worlds, constants), **plain}
+        infos = {**self.start_infos(worlds), **plain}
         return DeviceOutcome(cast("Tensor", rewards).to(worlds.qpos.dtype), never, infos)
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         return {
             "is_success": self._succeeds,
             "distance": length(self._tip - self._target).to(worlds.qpos.dtype),
@@ -224,8 +220,8 @@ class DeviceReach(DeviceFinger):
     """Fingers that reach for a point."""
 
     @override
-    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
-        super().attach(model, worlds)
+    def attach(self, worlds: Worlds) -> None:
+        super().attach(worlds)
         self._near = torch.zeros_like(self._steps)
         self._low, self._high, self._rest = (
             torch.as_tensor(angles, dtype=self.precision, device=worlds.device)
@@ -261,8 +257,8 @@ class DeviceTrack(DeviceFinger):
     """
 
     @override
-    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
-        super().attach(model, worlds)
+    def attach(self, worlds: Worlds) -> None:
+        super().attach(worlds)
         self._path, self._angles_there = self._env.path, self._env.start_angles
         self._times = np.zeros(worlds.count)
         self._ahead = self._target[:, None].expand(-1, len(SEEN_S) - 1, -1).clone()
@@ -311,9 +307,9 @@ class DeviceTrack(DeviceFinger):
         return self._rms < FOLLOWS_M
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         rms = self._rms.to(worlds.qpos.dtype)
-        return {**super().start_infos(worlds, constants), "rms": rms}
+        return {**super().start_infos(worlds), "rms": rms}
 
 
 FINGERS: Final = {FingerReachEnv: DeviceReach, FingerTrackEnv: DeviceTrack}
@@ -331,7 +327,7 @@ def _turned(arms: Tensor, angles: Tensor) -> Tensor:
     return torch.einsum("ntj,nj->nt", arms, angles[:, :_J])
 
 
-def _share(constants: Constants, tensions: Tensor) -> Tensor:
+def _share(constants: dict[str, Tensor], tensions: Tensor) -> Tensor:
     """Return tensions as shares of their ranges, 0 to 1, shape (n, 7)."""
     least = constants["least"]
     return ((tensions - least) / (constants["most"] - least)).clip(0.0, 1.0)
@@ -349,14 +345,14 @@ _WHOLE: Final = 1e-6
 _LONGEST_NAME: Final = 60
 
 
-class FingerReader:
+class FingerReader(BodyReader):
     """Compiles fingers of a CPU env's task, and reads the numbers that a device needs.
 
     Raises:
         VectorEnvError: If the env has goals, or draws another finger at each reset.
     """
 
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
+    def __init__(self, env: gym.Env[Any, Any], *_: Any) -> None:
         self._env: Any = env.unwrapped
         self._task = FINGERS[type(self._env)]
         self.spec = env.spec
@@ -374,12 +370,14 @@ class FingerReader:
                 "finger by itself; hand drawn ones with bodies=[...] and options={'bodies': [...]}."
             )
 
+    @override
     def body(self, value: FingerLike | None) -> FingerParameters:
         """Return the parameters of a finger; None gives the env's; see `as_finger`."""
         return self._env.parameters if value is None else as_finger(value)
 
-    def read(self, body: FingerParameters) -> tuple[DeviceBody, BatchKind]:
-        """Return a compiled finger, and the kind of a batch that begins with it.
+    @override
+    def read(self, body: FingerParameters) -> tuple[DeviceBody, DeviceTask]:
+        """Return a compiled finger, and the task of a batch that begins with it.
 
         Raises:
             VectorEnvError: If its delay is a whole number of simulation steps.
@@ -402,12 +400,9 @@ class FingerReader:
         }
         encoded = {name: text.encode() for name, text in shared.items()}
         found = found._replace(rows=rows, shared={**found.shared, **encoded})
-        layouts = env.observation_layout, env.action_layout
-        kind = BatchKind(
-            found, model, self._task(env, plant), rhythm[0], *layouts, env.action_space
-        )
-        return found, kind
+        return found, self._task(env, plant, rhythm[0])
 
+    @override
     def close(self) -> None:
         """Close the CPU env."""
         self._env.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -97,26 +96,6 @@ def test_pendulums(seed: int | str) -> None:
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 1000, seed=seed, reach=1.0 if seed % 2 else 0.1)
     assert _steps_fast(ours)
-
-
-@pytest.mark.parametrize(
-    "env_id", [f"shapechanger/{name}-v1" for name in (*_ANTS, *_POLES, "Hopper", "Humanoid")]
-)
-def test_step_into_equals_step(env_id: str) -> None:
-    """`step_into` writes the observation to the given row and nothing else."""
-    with gym.make(env_id) as one, gym.make(env_id) as two:
-        ours: Any = one.unwrapped
-        theirs: Any = two.unwrapped
-        ours.reset(seed=0)
-        theirs.reset(seed=0)
-        ours.action_space.seed(0)
-        rows = np.full((3, *ours.observation_space.shape), 7.0)
-        for _ in range(30):
-            action = ours.action_space.sample()
-            observation, *rest = theirs.step(action)
-            assert same(list(ours.step_into(action, rows[1])), rest)
-            assert same(rows[1], observation)
-        assert (rows[[0, 2]] == 7.0).all()
 
 
 def test_the_fast_model_is_shared() -> None:

@@ -12,8 +12,7 @@ import pytest
 
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.pendulum import InvertedPendulumEnv
-from shapechanger.envs.stepping import watch as watches
-from shapechanger.envs.stepping.watch import ModelWatch
+from shapechanger.envs.stepping.tuned import ModelWatch, shared_by
 from tests.envs.stepping.side_by_side import same
 
 _MODEL = AntEnv().model
@@ -147,7 +146,7 @@ def test_an_edit_takes_effect(edit: Edit) -> None:
 
 def test_an_edit_before_the_first_step_takes_effect() -> None:
     """The fast model is searched only while the model is unedited."""
-    watches.snapshots.clear()
+    shared_by.cache_clear()
     ours, theirs = envs = _ants()
     for env in envs:
         env.model.body_mass[1] *= 1.75

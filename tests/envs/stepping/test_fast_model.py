@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -11,7 +12,7 @@ import pytest
 
 from shapechanger.envs.ant import AntEnv
 from shapechanger.envs.pendulum import InvertedPendulumEnv
-from shapechanger.envs.stepping import watch
+from shapechanger.envs.stepping import tuned
 from shapechanger.envs.stepping.fast_model import find_fast_model, moves_equally
 
 _ISLAND = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
@@ -263,7 +264,7 @@ def test_any_difference_is_detected(change: Any) -> None:
 def test_envs_of_a_body_count_steps_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search starts after `patience` steps; an env that is made later has its result."""
     monkeypatch.setattr(AntEnv, "patience", 6)
-    watch.snapshots.clear()
+    tuned.shared_by.cache_clear()
     envs = [AntEnv(), AntEnv(), AntEnv()]
     for env in envs:
         env.reset(seed=0)
@@ -279,7 +280,7 @@ def test_envs_of_a_body_count_steps_together(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_the_number_of_remembered_bodies_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """The most recent bodies are kept, with their fast models."""
-    monkeypatch.setattr(watch, "_REMEMBERED", 2)
+    monkeypatch.setattr(tuned, "shared_by", lru_cache(2)(tuned.shared_by.__wrapped__))
     found = []
     for body in ("Ant", "BigAnt", "AmputatedAnt", "BigAnt", "Ant"):
         env = AntEnv(body)
@@ -288,7 +289,7 @@ def test_the_number_of_remembered_bodies_is_bounded(monkeypatch: pytest.MonkeyPa
         found.append(env._bound.stepping)
     assert found[1] is found[3]
     assert found[0] is not found[4]
-    assert len(watch.snapshots) == 2
+    assert tuned.shared_by.cache_info().currsize == 2
 
 
 def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:

@@ -90,14 +90,14 @@ def test_unknown_ids_and_modes_are_refused() -> None:
     [
         ({"backend": "warp", "pool": []}, "a `pool` of some bodies"),
         ({"backend": "warp", "bodies": ["Ant"] * 2, "pool": ["Ant"]}, "either `bodies`, one per"),
-        ({"backend": "warp", "threads": 2}, "has no threads"),
+        ({"backend": "warp", "threads": 2}, "takes no threads"),
         ({"backend": "warp", "copy": False}, "always copies observations"),
         ({"backend": "warp", "njmax": 0}, "needs at least one njmax, got 0"),
         ({"backend": "warp", "render_mode": "rgb_array"}, "takes no render_mode: nothing is drawn"),
         ({"backend": "warp", "towards": "BigAnt"}, "takes no towards: a reset draws no body"),
         ({"backend": "warp", "autoreset_mode": "Disabled"}, "has no autoreset mode Disabled"),
-        ({"pool": ["Ant"]}, "backend='threads' has no pool: use backend='warp'"),
-        ({"njmax": 3}, "backend='threads' has no njmax"),
+        ({"pool": ["Ant"]}, "backend='threads' takes no pool: use backend='warp'"),
+        ({"njmax": 3}, "backend='threads' takes no njmax"),
     ],
 )
 def test_arguments_of_the_other_backend_are_refused(

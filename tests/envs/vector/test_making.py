@@ -54,7 +54,7 @@ def test_a_backend_of_worlds_on_a_device() -> None:
     assert isinstance(again, WarpVectorEnv)
     assert again.bodies == envs.bodies
     assert again.max_episode_steps == envs.max_episode_steps == 7
-    with pytest.raises(VectorEnvError, match="has no device: use backend='warp'"):
+    with pytest.raises(VectorEnvError, match="takes no device: use backend='warp'"):
         shapechanger.make_vec("Ant", 2, device="cpu")
     with pytest.raises(UnknownName, match=r"No backend matches 'wrap'\. Did you mean 'warp'"):
         shapechanger.make_vec("Ant", 2, backend="wrap")

@@ -22,7 +22,7 @@ from torch.overrides import TorchFunctionMode
 from torch.utils._pytree import tree_leaves
 
 from shapechanger.envs import warp
-from shapechanger.envs.warp import devices, env, noise, worlds
+from shapechanger.envs.warp import devices, env, kernels, worlds
 from shapechanger.envs.warp.devices import wp
 
 _CPU = torch.device("cpu")
@@ -178,11 +178,11 @@ def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevic
 
     monkeypatch.setattr(warp, "find_device", lambda name: "cuda:0")
     monkeypatch.setattr(worlds, "on", on)
-    monkeypatch.setattr(noise, "on", on)
+    monkeypatch.setattr(kernels, "on", on)
     # There are no streams without a GPU.
     monkeypatch.setattr(env, "Streams", lambda count, device: devices.Streams(count, "cpu"))
     monkeypatch.setattr(worlds, "as_torch", lambda array: _mark(devices.as_torch(array)))
-    monkeypatch.setattr(noise, "as_warp", as_warp)
+    monkeypatch.setattr(kernels, "as_warp", as_warp)
     monkeypatch.setattr(worlds.Worlds, "_run", run)
     with PretendedDevice() as device:
         yield device

@@ -80,7 +80,7 @@ def test_actions_are_checked_before_anything_moves(
     pendulums: WarpVectorEnv, actions: Any, sentence: str
 ) -> None:
     """No world has stepped after the error."""
-    before = pendulums.batches[0].worlds.qpos.clone()
+    before = pendulums.batches[0].qpos.clone()
     with pytest.raises(BadAction, match=sentence):
         pendulums.step(actions)
-    assert torch.equal(pendulums.batches[0].worlds.qpos, before)
+    assert torch.equal(pendulums.batches[0].qpos, before)

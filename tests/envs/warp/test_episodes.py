@@ -12,7 +12,7 @@ import torch
 
 import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
-from shapechanger.envs.warp.noise import normals, uniforms
+from shapechanger.envs.warp.kernels import normals, uniforms
 
 WORLDS = 3
 PUSH = torch.tensor([[3.0], [0.0], [0.0]])
@@ -142,7 +142,7 @@ def test_a_world_that_diverges_restarts_alone(velocity: float) -> None:
     """Its reward is 0, its number is true in `diverged`, and the others step as ever."""
     whole, broken = pendulums(), pendulums()
     still = torch.zeros(WORLDS, 1)
-    broken.batches[0].worlds.qvel[1] = velocity
+    broken.batches[0].qvel[1] = velocity
     expected, found = whole.step(still), broken.step(still)
     for one, other in zip(found[:4], expected[:4], strict=True):
         assert torch.equal(one[[0, 2]], other[[0, 2]])
@@ -169,7 +169,7 @@ def test_inference_mode_and_gradients_leave_no_trace() -> None:
     observations, rewards, *_ = envs.step(actions)
     assert not observations.requires_grad
     assert not rewards.requires_grad
-    assert not envs.batches[0].worlds.qpos.requires_grad
+    assert not envs.batches[0].qpos.requires_grad
 
 
 def test_a_closed_or_new_vector_env_does_not_step() -> None:

@@ -69,7 +69,7 @@ def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> N
     observations, infos = worlds.reset(seed=5)
     batch = worlds.batches[0]
     for i, env in enumerate(alone):
-        qpos, qvel = (x[i].double().cpu().numpy() for x in (batch.worlds.qpos, batch.worlds.qvel))
+        qpos, qvel = (x[i].double().cpu().numpy() for x in (batch.qpos, batch.qvel))
         env.reset()
         np.testing.assert_allclose(env.start_rules().feasible(qpos, env.data), qpos, atol=2e-6)
         assert np.abs(qvel).max() < 6.0 * env._reset_noise_scale

@@ -73,7 +73,7 @@ def test_a_step_does_not_wait(
         for number in range(6):
             actions = _actions(envs, number)
             if number == 2:
-                envs.batches[0].worlds.qvel[0] = torch.nan
+                envs.batches[0].qvel[0] = torch.nan
             device.forget()
             _, _, terminated, truncated, infos = envs.step(actions)
             counted = dict(device.questions), dict(device.copies), dict(device.mixed)

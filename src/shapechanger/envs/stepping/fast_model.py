@@ -18,7 +18,7 @@ either fails keeps its contact search, or has no fast model at all.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Final, cast
 
 import mujoco
@@ -53,25 +53,19 @@ def find_fast_model(
     Returns:
         The fast model; None if none is known to move equally.
     """
-    candidates = _candidates(model, make_spec)
-    return next((each for each in candidates if moves_equally(model, each)), None)
-
-
-def _candidates(
-    model: mujoco.MjModel, make_spec: Callable[[], mujoco.MjSpec]
-) -> Iterator[mujoco.MjModel]:
-    """Yield the models that the rules allow, the cheapest first."""
     # Others may have constraints in several trees, or elements that the rules do not cover.
     if (
-        model.ntree == 1
-        and not model.opt.enableflags
-        and not any(getattr(model, size) for size in _UNKNOWN)
-        and mujoco.get_mjcb_contactfilter() is None
+        model.ntree != 1
+        or model.opt.enableflags
+        or any(getattr(model, size) for size in _UNKNOWN)
+        or mujoco.get_mjcb_contactfilter() is not None
     ):
-        without_search = _without_search(model, make_spec)
-        if without_search is not None:
-            yield without_search
-        yield _disabled(copy.copy(model), _NO_ISLANDS)
+        return None
+    without_search = _without_search(model, make_spec)
+    if without_search is not None and moves_equally(model, without_search):
+        return without_search
+    without_islands = _disabled(copy.copy(model), _NO_ISLANDS)
+    return without_islands if moves_equally(model, without_islands) else None
 
 
 def _disabled(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
+import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from operator import attrgetter
 from typing import Any, ClassVar, Final, Literal, cast
 
 import mujoco
@@ -12,7 +18,6 @@ from numpy.typing import NDArray
 
 from shapechanger.envs.reshapable import BAD_STATE, Reshapable
 from shapechanger.envs.stepping.fast_model import find_fast_model
-from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
 
 # Result of `step`; Gymnasium's own steps promise that they never truncate.
@@ -23,10 +28,85 @@ NO_WARNINGS: Final = [0, 0, 0]
 
 _searching: Final = threading.Lock()
 
-
 Outcomes = tuple[NDArray[np.float64], NDArray[Any], NDArray[np.bool_], dict[str, Any]]
 """Results of one step of n envs of one kind: observations, shape (n, size); rewards and ends, shape
 (n,); and one value per env for each key of an info."""
+
+
+# Arrays closer than this in memory, bytes, are compared together with the bytes between them.
+_APART: Final = 64
+
+
+@dataclass(eq=False)
+class Shared:
+    """What all watches of models that were compiled equal share.
+
+    Attributes:
+        parts: The bytes of each watched region of memory. Sharing keeps them in a core's caches
+            while many envs compare their models with them.
+        steps: Steps that all envs with such a model have taken without a fast model.
+        searched: Whether a fast model has been looked for.
+        fast: The fast model; None if none is known to move equally.
+    """
+
+    parts: list[bytearray] | None = None
+    steps: int = 0
+    searched: bool = False
+    fast: mujoco.MjModel | None = None
+
+
+@lru_cache(maxsize=32)
+def shared_by(digest: bytes) -> Shared:
+    """Return what models of a digest share; that of the latest digests is kept."""
+    return Shared()
+
+
+class ModelWatch:
+    """Detects whether a model has changed since the watch was created.
+
+    It compares all options and statistics, and the memory of every array except the pixels of
+    textures, which do not affect the physics. So no field can be forgotten, and restoring a field
+    is detected too.
+
+    Args:
+        model: The model; the watch keeps it alive, because it reads the memory of its arrays.
+
+    Attributes:
+        model: The watched model.
+        digest: Hash of the model as it was when the watch was created.
+        shared: What equal models share.
+        timestep: Its timestep then, s.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = model
+        self.timestep = float(model.opt.timestep)
+        self._options, self._statistics = model.opt, model.stat
+        self._of_options, self._of_statistics = _readers()
+        # These come first, wherever they are in memory, so that equal models have equal digests.
+        views = [*_views(sys.maxsize, model.opt, model.stat), *_views(_APART, model)]
+        # A bytearray compares itself with any buffer by memcmp; bytes would not.
+        parts = [bytearray(view) for view in views]
+        self._numbers = self._read_numbers()
+        total = hashlib.blake2b(repr(self._numbers).encode(), digest_size=16)
+        for part in parts:
+            total.update(part)
+        self.digest = total.digest()
+        self.shared = shared_by(self.digest)
+        self.shared.parts = parts = self.shared.parts or parts
+        self._parts = list(zip(parts, views, strict=True))
+
+    def unedited(self) -> bool:
+        """Return whether every number of the model is as it was, to the last bit."""
+        if self._read_numbers() != self._numbers:
+            return False
+        for before, now in self._parts:  # noqa: SIM110  # `all` takes twice as long.
+            if before != now:
+                return False
+        return True
+
+    def _read_numbers(self) -> tuple[Any, ...]:
+        return self._of_options(self._options), self._of_statistics(self._statistics)
 
 
 class Binding:
@@ -48,19 +128,15 @@ class Binding:
     """
 
     def __init__(self, watch: ModelWatch, env: TunedStep) -> None:
-        model, data, frame_skip = watch.model, env.data, env.frame_skip
         self.watch = watch
         self.unedited = watch.unedited
-        self.model = model
-        self.data = data
-        self.stepping = model
+        self.model = self.stepping = watch.model
+        self.data = data = env.data
         self.has_fast_model: bool | None = None
-        self.shape = (int(model.nu),)
-        self.frame_skip = frame_skip
-        self.dt = watch.timestep * frame_skip
-        self.ctrl = data.ctrl
-        self.qpos = data.qpos
-        self.qvel = data.qvel
+        self.shape = (int(watch.model.nu),)
+        self.frame_skip = env.frame_skip
+        self.dt = watch.timestep * env.frame_skip
+        self.ctrl, self.qpos, self.qvel = data.ctrl, data.qpos, data.qvel
         self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
 
@@ -111,8 +187,7 @@ class TunedStep(Reshapable):
     def _follow_body(self) -> None:
         super()._follow_body()
         self._watch = ModelWatch(self.model)
-        self._rules = None
-        self._bound = None
+        self._rules = self._bound = None
 
     def start_rules(self) -> StartRules:
         """Return the rules that make a start pose feasible, for the model as it is now."""
@@ -150,18 +225,7 @@ class TunedStep(Reshapable):
             BadAction: If the action has another shape or is not finite; nothing has moved then.
         """
         bound = self._ready()
-        if bound is None:
-            return super().step(action)
-        return self._advance(bound, action, None)
-
-    def step_into(
-        self, action: Any, observation: NDArray[np.float64]
-    ) -> tuple[Any, bool, bool, dict[str, Any]]:
-        """Take one step and write the observation into an array; see `Reshapable`."""
-        bound = self._ready() if self._steps_as_written() else None
-        if bound is None:
-            return super().step_into(action, observation)
-        return self._advance(bound, action, observation)[1:]
+        return super().step(action) if bound is None else self._advance(bound, action)
 
     def ready_together(self) -> Any:
         """Return the binding for a step together with other envs; None if `step` must do it.
@@ -169,7 +233,9 @@ class TunedStep(Reshapable):
         Raises:
             ResetNeeded: If the env has not been reset.
         """
-        bound = self._ready() if self._steps_as_written() else None
+        if type(self).step is not TunedStep.step or "step" in vars(self):
+            return None  # Overridden.
+        bound = self._ready()
         if bound is None:
             return None
         if bound.kind is None:
@@ -200,8 +266,8 @@ class TunedStep(Reshapable):
         """
         raise NotImplementedError
 
-    def _advance(self, bound: Any, action: Any, out: NDArray[np.float64] | None) -> StepResult:
-        """Take one step, with the observation written to `out` if given."""
+    def _advance(self, bound: Any, action: Any) -> StepResult:
+        """Take one step."""
         raise NotImplementedError
 
     def _ready(self) -> Any:
@@ -219,36 +285,75 @@ class TunedStep(Reshapable):
         if bound.has_fast_model:
             return bound if bound.unedited() else None
         if bound.has_fast_model is None and self.fast_model:
-            snapshot = bound.watch.snapshot
-            snapshot.steps += 1
-            if snapshot.steps > self.patience and bound.unedited():
+            shared = bound.watch.shared
+            shared.steps += 1
+            if shared.steps > self.patience and bound.unedited():
                 with _searching:  # Of several threads with the same body, one searches.
-                    if not snapshot.searched:
-                        snapshot.fast = find_fast_model(self.model, self.body_spec)
-                        snapshot.searched = True
-                bound.step_with(snapshot.fast)
+                    if not shared.searched:
+                        shared.fast = find_fast_model(self.model, self.body_spec)
+                        shared.searched = True
+                bound.step_with(shared.fast)
         # Without a fast model the public one steps; only its timestep was copied.
         return bound if bound.dt == self.dt else None
 
     def _new_binding(self) -> Any:
+        """Return a new binding; None where the model or a method that it replaces is another."""
         self._require_reset("step")
         self._bound = None
-        watch = self._watch
-        if watch is None or watch.model is not self.model or not self._is_as_written():
+        watch, mine = self._watch, type(self)
+        if watch is None or watch.model is not self.model:
             return None
+        for name in self.replaced:
+            if getattr(mine, name) is not getattr(self.tuned, name) or name in vars(self):
+                return None
         bound = self._bound = self.binding(watch, self)
-        if self.fast_model and watch.snapshot.fast is not None:
-            bound.step_with(watch.snapshot.fast)
+        if self.fast_model and watch.shared.fast is not None:
+            bound.step_with(watch.shared.fast)
         return bound
 
-    def _is_as_written(self) -> bool:
-        """Return whether none of the methods that `_advance` stands for is overridden."""
-        mine, known = type(self), self.tuned
-        return all(
-            getattr(mine, name) is getattr(known, name) and name not in vars(self)
-            for name in self.replaced
-        )
 
-    def _steps_as_written(self) -> bool:
-        """Return whether `step` itself is not overridden."""
-        return type(self).step is TunedStep.step and "step" not in vars(self)
+def _views(apart: int, *owners: Any) -> list[Any]:
+    """Return views of the memory of all arrays; those closer than `apart` bytes share one."""
+    arrays = [getattr(owner, name) for owner in owners for name in _array_names(owner.__class__)]
+    # An array that owns its memory is a copy, which is gone at once.
+    spans = [
+        (int(array.ctypes.data), int(array.nbytes))
+        for array in arrays
+        if array.size and not array.flags.owndata
+    ]
+    regions: list[tuple[int, int]] = []
+    for start, size in sorted(spans):
+        if regions and start - sum(regions[-1]) < apart:
+            first, former = regions.pop()
+            start, size = first, max(former, start + size - first)
+        regions.append((start, size))
+    return [(ctypes.c_char * size).from_address(start) for start, size in regions]
+
+
+@cache
+def _array_names(kind: type[Any]) -> list[str]:
+    """Return the names of the arrays of a kind of object of MuJoCo, except `tex_data`."""
+    blank: Any = mujoco.MjSpec().compile() if kind is mujoco.MjModel else kind()
+    names = (name for name in dir(kind) if type(getattr(blank, name)) is np.ndarray)
+    return [name for name in names if name != "tex_data"]
+
+
+@cache
+def _readers() -> list[Any]:
+    """Return functions that read the options, and the statistics, outside of the watched memory.
+
+    Each number of a model is changed once, to see whether it lies within.
+    """
+    model = mujoco.MjSpec().compile()
+    (memory,) = _views(sys.maxsize, model.opt, model.stat)
+    readers: list[Any] = []
+    for part in (model.opt, model.stat):
+        outside: list[str] = []
+        for name in dir(part):
+            before, value = bytes(memory), getattr(part, name)
+            if isinstance(value, int | float):
+                setattr(part, name, value + 1)
+                if before == bytes(memory):
+                    outside.append(name)
+        readers.append(attrgetter("__class__", *outside))
+    return readers

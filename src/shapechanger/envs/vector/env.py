@@ -23,8 +23,14 @@ from shapechanger.envs.checks import (
     require_boxes,
     require_same_spaces,
 )
-from shapechanger.envs.vector.results import InfoColumns, Restart, StepResults, SubEnv
-from shapechanger.envs.vector.results import batched, in_columns
+from shapechanger.envs.vector.results import (
+    InfoColumns,
+    Restart,
+    StepResults,
+    SubEnv,
+    batched,
+    in_columns,
+)
 from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
 from shapechanger.errors import VectorEnvError
 
@@ -353,7 +359,8 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Raises:
             VectorEnvError: If there are not as many values as envs.
         """
-        each: Any = values if isinstance(values, list | tuple) else [values] * self.num_envs
+        several = isinstance(values, list | tuple)
+        each = cast("Sequence[Any]", values if several else [values] * self.num_envs)
         if len(each) != self.num_envs:
             raise VectorEnvError(f"There are {self.num_envs} envs and {len(each)} values.")
         self._of_each(lambda i: self.envs[i].set_wrapper_attr(name, each[i]))

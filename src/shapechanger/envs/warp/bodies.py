@@ -27,7 +27,14 @@ _SHARED_OPTIONS: Final = (
     *("noslip_iterations", "ccd_iterations", "disableflags", "enableflags"),
 )
 ARMS: Final = "wrap_prm"
-"""Moment arms of tendons over joints, which worlds have their own of; see `patches`."""
+"""Moment arms of tendons over joints, which worlds have their own of; see `kernels`."""
+# Arrays of which mujoco-warp asks whether all numbers are zero, or which.
+_ANY_ZERO: Final = (
+    *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
+    *("actuator_damping", "actuator_dampingpoly", "dof_frictionloss"),
+    *("tendon_frictionloss", "geom_adhesion", "geom_surfacevel"),
+)
+_EACH_ZERO: Final = ("actuator_gainprm", "actuator_biasprm", "actuator_gear", "body_mass")
 # Read by sleeping bodies and by sensors alone, which our tasks do not have.
 _UNREAD: Final = ("dof_length", "site_size")
 
@@ -59,8 +66,9 @@ def device_body(name: str, model: mujoco.MjModel, constants: Rows) -> DeviceBody
         model: The compiled model.
         constants: Numbers of the task that depend on the body.
     """
-    rows = {field: np.array(getattr(model, field)) for field in _per_world()}
-    rows |= {f"opt.{field}": np.array(getattr(model.opt, field)) for field in _OPTIONS}
+    names = [field.name for field in _fields() if _has_rows(field)]
+    rows = {name: np.array(getattr(model, name)) for name in (*names, ARMS)}
+    rows |= {f"opt.{name}": np.array(getattr(model.opt, name)) for name in _OPTIONS}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     static = static_geoms(model)
@@ -88,12 +96,6 @@ def _fields() -> list[Any]:
     return [f for f in dataclasses.fields(mjw.Model) if not f.name.startswith(_DRAWN)]
 
 
-@cache
-def _per_world() -> list[str]:
-    """Return the names of the fields that have a row per world."""
-    return [*(field.name for field in _fields() if _has_rows(field)), ARMS]
-
-
 def _has_rows(field: Any) -> bool:
     """Return whether a field is an array of which each world may have its own."""
     return isinstance(field.type, wp.array) and field.type.shape[0] == "*"
@@ -116,27 +118,12 @@ def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
             yield name, str(array.shape).encode() + (b"" if own else array.tobytes())
     for name in _SHARED_OPTIONS:
         yield f"opt.{name}", str(getattr(model.opt, name)).encode()
-    for name, pattern in _switches(model).items():
-        yield name, np.asarray(pattern).tobytes()
-
-
-def _switches(model: mujoco.MjModel) -> dict[str, Any]:
-    """Return where arrays are zero, where mujoco-warp leaves out what a zero does not need.
-
-    It decides this once for all worlds, from the model that a batch is made of (`put_model`).
-    """
-    found: dict[str, Any] = {
-        f"zeros of {name}": np.any(getattr(model, name))
-        for name in (
-            *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
-            *("actuator_damping", "actuator_dampingpoly", "dof_frictionloss"),
-            *("tendon_frictionloss", "geom_adhesion", "geom_surfacevel"),
-        )
-    }
-    for name in ("actuator_gainprm", "actuator_biasprm", "actuator_gear", "body_mass"):
-        found[f"zeros of {name}"] = np.asarray(getattr(model, name)) != 0.0
+    # Where arrays are zero, mujoco-warp leaves out what a zero does not need. It decides this once
+    # for all worlds, from the model that a batch is made of (`put_model`).
+    for name in _ANY_ZERO:
+        yield f"zeros of {name}", str(np.any(getattr(model, name))).encode()
+    for name in _EACH_ZERO:
+        yield f"zeros of {name}", (np.asarray(getattr(model, name)) != 0.0).tobytes()
     options = cast("Any", model.opt)
-    found["zeros of opt.wind, opt.density and opt.viscosity"] = bool(
-        options.wind.any() or options.density > 0.0 or options.viscosity > 0.0
-    )
-    return found
+    in_fluid = options.wind.any() or options.density > 0.0 or options.viscosity > 0.0
+    yield "zeros of opt.wind, opt.density and opt.viscosity", str(bool(in_fluid)).encode()

@@ -15,10 +15,9 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from shapechanger.envs.checks import masked_options, one_seed_each
-from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
-from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
 from shapechanger.envs.warp.devices import Streams, without_gradients
-from shapechanger.envs.warp.reader import Reader
+from shapechanger.envs.warp.reader import BodyReader, grouped
+from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
 
@@ -82,7 +81,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     @without_gradients()
     def __init__(
         self,
-        reader: Reader,
+        reader: BodyReader,
         bodies: Sequence[Any],
         num_envs: int,
         *,
@@ -97,9 +96,9 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._redraws = redraws
         self._task_infos = task_infos
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
-        groups = _grouped(reader, [reader.body(body) for body in bodies], num_envs)
         self.batches = tuple(
-            WarpBatch(*group, device, redraws=redraws, limits=limits or {}) for group in groups
+            Worlds(*group, device, redraws=redraws, limits=limits or {})
+            for group in grouped(reader, [reader.body(body) for body in bodies], num_envs)
         )
         self._streams = Streams(len(self.batches), device)
         first = self.batches[0]
@@ -110,35 +109,21 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             and batch.action_layout == first.action_layout
             for batch in self.batches
         )
-        self.single_observation_space = self._joined(
-            [b.single_observation_space for b in self.batches]
-        )
-        self.single_action_space = self._joined([b.single_action_space for b in self.batches])
-        self.observation_space = self._joined(
-            [batch_space(b.single_observation_space, self._size(b)) for b in self.batches]
-        )
-        self.action_space = self._joined(
-            [batch_space(b.single_action_space, self._size(b)) for b in self.batches]
-        )
+        for side in ("observation", "action"):
+            single: list[Any] = [getattr(batch, f"single_{side}_space") for batch in self.batches]
+            counts = [num_envs if self._flat else batch.count for batch in self.batches]
+            whole = [batch_space(*pair) for pair in zip(single, counts, strict=True)]
+            for name, spaces in ((f"single_{side}_space", single), (f"{side}_space", whole)):
+                setattr(self, name, spaces[0] if self._flat else gym.spaces.Tuple(spaces))
         self.made_from = reader.spec
         self.max_episode_steps: int | None = (
             None if reader.spec is None else reader.spec.max_episode_steps
         )
-        self._seeds = self._per_world(torch.int64)
-        self._episodes = self._per_world(torch.int64)
-        self.episode_steps = self._per_world(torch.int64)
+        self._seeds, self._episodes, self.episode_steps = torch.zeros(
+            (3, num_envs), dtype=torch.int64, device=device
+        )
         self._seeded = self._begun = False
         self._steps = 0
-
-    def _size(self, batch: WarpBatch) -> int:
-        return self.num_envs if self._flat else len(batch.numbers)
-
-    def _joined(self, spaces: list[Any]) -> gym.Space[Any]:
-        """Return the space of all worlds, or one space per batch."""
-        return spaces[0] if self._flat else gym.spaces.Tuple(spaces)
-
-    def _per_world(self, dtype: torch.dtype) -> Tensor:
-        return torch.zeros(self.num_envs, dtype=dtype, device=self.device)
 
     @property
     def bodies(self) -> list[Any]:
@@ -146,7 +131,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         found: list[Any] = [None] * self.num_envs
         for batch in self.batches:
             known = list(batch.bodies)
-            for world, chosen in zip(_numbers(batch.numbers), _numbers(batch.chosen), strict=True):
+            for world, chosen in zip(_list(batch.numbers), _list(batch.chosen), strict=True):
                 found[world] = known[chosen]
         return found
 
@@ -183,19 +168,19 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             if name not in _OPTIONS:
                 raise UnknownName("option of reset", name, _OPTIONS)
         if isinstance(options.get("reset_mask"), Tensor):
-            options["reset_mask"] = cast("Tensor", options["reset_mask"]).cpu().numpy()
-        given, options = masked_options(options, self.num_envs)
-        if given is not None and not self._begun and not given.all():
+            options["reset_mask"] = options["reset_mask"].cpu().numpy()
+        mask, _ = masked_options(options, self.num_envs)
+        if mask is None:
+            mask = np.ones(self.num_envs, np.bool_)
+        if not self._begun and not mask.all():
             raise gym.error.ResetNeeded("No episode is under way: call `reset` without a mask.")
-        chosen = np.arange(self.num_envs) if given is None else np.flatnonzero(given)
-        if (options or {}).get("bodies") is not None:
-            self._change_bodies(chosen.tolist(), cast("Any", options)["bodies"])
+        if options.get("bodies") is not None:
+            self._change_bodies(np.flatnonzero(mask).tolist(), options["bodies"])
         self._take_seeds(seeds)
-        mask = self._per_world(torch.bool)
-        mask[torch.as_tensor(chosen, device=self.device)] = True
-        observations, infos = self._start(mask)
+        starting = torch.as_tensor(mask, device=self.device)
+        observations, infos = self._start(starting)
         self._begun = True
-        return self._out(observations), _masked(infos, mask)
+        return self._out(observations), _merged((infos, starting))
 
     def _change_bodies(self, numbers: list[int], bodies: Sequence[Any]) -> None:
         """Give worlds other bodies, after all of them have been compiled and found to fit."""
@@ -208,30 +193,25 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                 "These worlds draw their bodies from a pool: make the vector env with `bodies` "
                 "instead of `pool` to choose them at a reset."
             )
-        edits = [self._reader.body(body) for body in bodies]
-        new = dict(zip(numbers, edits, strict=True))
-        read = {body: self._reader.read(body)[0] for body in dict.fromkeys(edits)}
-        homes = {world: batch for batch in self.batches for world in _numbers(batch.numbers)}
+        new = {i: self._reader.body(body) for i, body in zip(numbers, bodies, strict=True)}
+        read = {body: self._reader.read(body)[0] for body in dict.fromkeys(new.values())}
+        homes = {world: batch for batch in self.batches for world in _list(batch.numbers)}
         for world, body in new.items():
-            require_fitting(homes[world].kind, read[body])
+            homes[world].require_fitting(read[body])
         present = self.bodies
         for batch in dict.fromkeys(homes[world] for world in new):
-            each = [new.get(world, present[world]) for world in _numbers(batch.numbers)]
+            each = [new.get(world, present[world]) for world in _list(batch.numbers)]
             batch.change_bodies({body: read.get(body) or batch.bodies[body] for body in each}, each)
 
     def _take_seeds(self, seeds: list[int | None]) -> None:
         """Take new seeds; a world with a new seed begins with its first episode."""
         if not self._seeded:
-            drawn = np.random.SeedSequence().generate_state(self.num_envs, np.uint64) >> np.uint64(
-                1
-            )
+            drawn = np.random.SeedSequence().generate_state(self.num_envs, np.uint64) >> 1
             seeds = [int(drawn[i]) if seed is None else seed for i, seed in enumerate(seeds)]
             self._seeded = True
-        new = [(number, seed) for number, seed in enumerate(seeds) if seed is not None]
-        if new:
-            where = torch.tensor([number for number, _ in new], device=self.device)
-            self._seeds[where] = torch.tensor([seed for _, seed in new], device=self.device)
-            self._episodes[where] = 0
+        new = {number: seed for number, seed in enumerate(seeds) if seed is not None}
+        where, given = torch.tensor([[*new], [*new.values()]], dtype=torch.int64).to(self.device)
+        self._seeds[where], self._episodes[where] = given, 0
 
     def _start(self, mask: Tensor) -> tuple[list[Tensor], dict[str, Tensor]]:
         """Start an episode in some worlds.
@@ -243,10 +223,12 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             Observations of each batch, and infos of all worlds; rows outside the mask are of the
             present state.
         """
-        every = (mask, self._seeds, self._episodes)
-        rows = [[self._rows(batch, each) for each in every] for batch in self.batches]
+        every = mask, self._seeds, self._episodes
         starts = self._streams.run(
-            [partial(batch.start, *row) for batch, row in zip(self.batches, rows, strict=True)]
+            [
+                partial(batch.start, *[self._rows(batch, each) for each in every])
+                for batch in self.batches
+            ]
         )
         self._episodes += mask
         self.episode_steps.masked_fill_(mask, 0)
@@ -277,9 +259,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             [partial(batch.step, action) for batch, action in zip(self.batches, each, strict=True)]
         )
         observations = [seen for seen, _, _ in steps]
-        rewards = self._gathered_one([outcome.rewards for _, outcome, _ in steps])
-        terminated = self._gathered_one([outcome.terminated for _, outcome, _ in steps])
-        diverged = self._gathered_one([bad for _, _, bad in steps])
+        outcomes = [
+            {"rewards": outcome.rewards, "terminated": outcome.terminated, "diverged": bad}
+            for _, outcome, bad in steps
+        ]
+        rewards, terminated, diverged = self._gathered(outcomes).values()
         self.episode_steps += 1
         if self.max_episode_steps is None:
             truncated = torch.zeros_like(terminated)
@@ -293,10 +277,10 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             **{"diverged": diverged, "_diverged": diverged},
         }
         if self._task_infos:
-            step_infos = self._gathered([outcome.infos for _, outcome, _ in steps])
-            final_info = _masked({**step_infos, "diverged": diverged}, ended)
+            told = self._gathered([outcome.infos for _, outcome, _ in steps])
+            final_info = _merged(({**told, "diverged": diverged}, ended))
             infos |= {"final_info": final_info, "_final_info": ended}
-            infos |= _merged(_masked(step_infos, ~ended), start_infos, ended)
+            infos |= _merged((told, ~ended), (start_infos, ended))
         self._steps += 1
         if self._steps % _LOOKS_EVERY == 0:
             self._warn_of_overflows()
@@ -308,11 +292,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _warn_of_overflows(self) -> None:
         for batch in self.batches:
-            for limit, count in batch.worlds.overflows().items():
+            if count := batch.overflows():
+                limits = " and ".join(f"{name}={most}" for name, most in batch.limits.items())
                 warnings.warn(
-                    f"{count} worlds had more contacts or constraints than {limit}="
-                    f"{batch.worlds.limits[limit]} has memory for, and their physics is wrong "
-                    f"without the others: make the vector env with a larger {limit}.",
+                    f"{count} worlds had more contacts or constraints than {limits} have memory "
+                    "for, and their physics is wrong without the others: raise these numbers.",
                     stacklevel=3,
                 )
 
@@ -333,18 +317,18 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                     "because the action spaces of the batches differ."
                 )
             each = [
-                self._tensor(part, (len(batch.numbers), batch.action_layout.size), f" of batch {i}")
+                self._tensor(part, (batch.count, batch.action_layout.size), f" of batch {i}")
                 for i, (part, batch) in enumerate(zip(given, self.batches, strict=True))
             ]
         bad = [~part.isfinite().all(dim=1) for part in each]
         # The only question to the device in a step, before its physics.
-        found = _numbers(torch.stack([one.any() for one in bad]))
+        found = _list(torch.stack([one.any() for one in bad]))
         for batch, part, any_bad, one in zip(self.batches, each, found, bad, strict=True):
             if any_bad:
                 place = int(one.nonzero()[0, 0])
                 raise BadAction(
                     f"The action of world {int(batch.numbers[place])} has numbers that are not "
-                    f"finite: {_numbers(part[place])}."
+                    f"finite: {_list(part[place])}."
                 )
         return each
 
@@ -360,24 +344,25 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             )
         return tensor.to(torch.float32)
 
-    def _rows(self, batch: WarpBatch, values: Tensor) -> Tensor:
+    def _rows(self, batch: Worlds, values: Tensor) -> Tensor:
         """Return the rows of a batch; a single batch has all, in the same order."""
         return values if len(self.batches) == 1 else values[batch.numbers]
 
-    def _gathered_one(self, parts: list[Tensor]) -> Tensor:
-        """Return the rows of all batches as one tensor with a row per world."""
+    def _gathered(self, parts: list[dict[str, Tensor]]) -> dict[str, Tensor]:
+        """Return the rows of all batches as tensors with a row per world."""
         if len(parts) == 1:
             return parts[0]
-        whole = parts[0].new_empty((self.num_envs, *parts[0].shape[1:]))
-        for batch, part in zip(self.batches, parts, strict=True):
-            whole[batch.numbers] = part
-        return whole
-
-    def _gathered(self, parts: list[dict[str, Tensor]]) -> dict[str, Tensor]:
-        return {name: self._gathered_one([part[name] for part in parts]) for name in parts[0]}
+        found: dict[str, Tensor] = {}
+        for name, first in parts[0].items():
+            found[name] = first.new_empty((self.num_envs, *first.shape[1:]))
+            for batch, part in zip(self.batches, parts, strict=True):
+                found[name][batch.numbers] = part[name]
+        return found
 
     def _out(self, observations: list[Tensor]) -> Tensors:
-        return self._gathered_one(observations) if self._flat else tuple(observations)
+        if not self._flat:
+            return tuple(observations)
+        return self._gathered([{"seen": seen} for seen in observations])["seen"]
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the CPU envs that compile bodies."""
@@ -388,73 +373,21 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
 
 
-def _numbers(tensor: Tensor) -> list[Any]:
-    """Return the numbers of a tensor of one dimension."""
+def _list(tensor: Tensor) -> list[Any]:
     return cast("Any", tensor).tolist()
 
 
-def _grouped(
-    reader: Reader, bodies: Sequence[Any], num_envs: int
-) -> list[tuple[BatchKind, list[int], dict[Any, DeviceBody], list[Any]]]:
-    """Compile bodies, and group worlds that have them in turn by the shapes of their arrays.
-
-    Returns:
-        Kind, numbers of the worlds, possible bodies, and the body of each world, of each batch.
-
-    Raises:
-        VectorEnvError: If there are fewer worlds than shapes.
-    """
-    kinds: list[BatchKind] = []
-    members: list[dict[Any, DeviceBody]] = []
-    for body in dict.fromkeys(bodies):
-        read, kind = reader.read(body)
-        fitting = (i for i, one in enumerate(kinds) if not differing_arrays(one.first, read))
-        place = next(fitting, len(kinds))
-        if place == len(kinds):
-            kinds.append(kind)
-            members.append({})
-        members[place][body] = read
-    # A pool of more bodies than worlds is spread over them.
-    step = max(1, len(bodies) // num_envs)
-    each = [bodies[world * step % len(bodies)] for world in range(num_envs)]
-    groups: list[tuple[BatchKind, list[int], dict[Any, DeviceBody], list[Any]]] = []
-    for kind, known in zip(kinds, members, strict=True):
-        worlds = [world for world, body in enumerate(each) if body in known]
-        if not worlds:
-            raise VectorEnvError(
-                f"No world has bodies like {kind.first.name}: the bodies of the pool form "
-                f"{len(kinds)} batches, because their arrays differ, and there are {num_envs} "
-                "worlds, so make more."
-            )
-        groups.append((kind, worlds, known, [each[world] for world in worlds]))
-    return groups
-
-
-def _like(mask: Tensor, value: Tensor) -> Tensor:
-    """Return a mask, shape (n,), with as many dimensions as a value, shape (n, ...)."""
-    return mask.view(-1, *[1] * (value.dim() - 1))
-
-
-def _masked(infos: dict[str, Tensor], mask: Tensor) -> dict[str, Any]:
-    """Return infos, zero outside of a mask, with the mask under `_key` of each key."""
-    found: dict[str, Any] = {}
-    for name, value in infos.items():
-        found[name] = torch.where(_like(mask, value), value, torch.zeros_like(value))
-        found[f"_{name}"] = mask
-    return found
-
-
-def _merged(found: dict[str, Any], infos: dict[str, Tensor], mask: Tensor) -> dict[str, Any]:
-    """Return infos with the infos of other worlds added.
+def _merged(*parts: tuple[dict[str, Tensor], Tensor]) -> dict[str, Any]:
+    """Return infos as Gymnasium's vector envs do, with a mask under `_key` of each key.
 
     Args:
-        found: Infos with masks.
-        infos: Infos of the other worlds.
-        mask: Which worlds these are.
+        *parts: Infos, tensors of shape (n, ...), and which worlds have them, shape (n,).
     """
-    merged = dict(found)
-    for name, value in infos.items():
-        here = found.get(name, torch.zeros_like(value))
-        merged[name] = torch.where(_like(mask, value), value, here)
-        merged[f"_{name}"] = found.get(f"_{name}", torch.zeros_like(mask)) | mask
-    return merged
+    found: dict[str, Any] = {}
+    for infos, mask in parts:
+        for name, value in infos.items():
+            there = mask.view(-1, *[1] * (value.dim() - 1))
+            others = found.get(name, torch.zeros_like(value))
+            found[name] = torch.where(there, value, others)
+            found[f"_{name}"] = found[f"_{name}"] | mask if f"_{name}" in found else mask
+    return found

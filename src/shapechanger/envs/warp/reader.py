@@ -1,66 +1,99 @@
-"""Compile bodies, and read what a device needs to know about them."""
+"""Compile bodies, read what a device needs to know about them, and group those that fit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
-from typing_extensions import override
 
-from shapechanger.envs.catalogue import FINGER_ENVS
+from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, NAMESPACE
 from shapechanger.envs.checks import describe_body
-from shapechanger.envs.warp.batch import BatchKind
-from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.tasks import DeviceTask, find_device_task
-from shapechanger.errors import SpaceMismatch
+from shapechanger.envs.warp.bodies import DeviceBody, device_body, differing_arrays
+from shapechanger.envs.warp.tasks import TASKS, DeviceTask
+from shapechanger.errors import SpaceMismatch, VectorEnvError
 from shapechanger.morphology import Body
-from shapechanger.morphology.families import BodyLike
+
+_Make = Callable[[dict[str, Any]], gym.Env[Any, Any]]
 
 
-class Reader(Protocol):
-    """Compiles bodies, which compare and hash, and reads what a device needs to know about them.
+class BodyReader:
+    """Compiles bodies of a family, and reads what a device needs to know about them.
+
+    Args:
+        task: The batched functions of the task.
+        first: A CPU env of the task.
+        make: Makes a CPU env of it from arguments.
+        arguments: Arguments of the CPU env.
 
     Attributes:
         spec: The spec of the CPU env, with its time limit.
     """
 
-    spec: Any
+    def __init__(
+        self,
+        task: type[DeviceTask],
+        first: gym.Env[Any, Any],
+        make: _Make,
+        arguments: dict[str, Any],
+    ) -> None:
+        self.spec = first.spec
+        self._task, self._make, self._arguments = task, make, arguments
+        # One CPU env for each pair of spaces; it changes its body.
+        self._envs: list[Any] = [first.unwrapped]
+        self._usual: Body = self._envs[0].body
 
     def body(self, value: Any) -> Any:
-        """Return a body as it is kept, such as a tuple of edits; None gives the arguments' body."""
-        ...
+        """Return a body as it is kept, a value that hashes; None gives the arguments' body."""
+        return self._usual if value is None else self._envs[0].family.body(value)
 
-    def read(self, body: Any) -> tuple[DeviceBody, BatchKind]:
-        """Compile a body, and return it with the kind of a batch that begins with it.
+    def read(self, body: Any) -> tuple[DeviceBody, DeviceTask]:
+        """Compile a body, and return it with the task of a batch that begins with it.
 
         Raises:
             ShapechangerError: If it cannot be built, or not for a device.
         """
-        ...
+        env = self._env_with(body)
+        found = device_body(describe_body(env), env.model, self._task.constants(env))
+        return found, self._task(env, env.model, int(env.frame_skip))
+
+    def _env_with(self, body: Body) -> Any:
+        for env in self._envs:
+            try:
+                env._change_body(body)
+            except SpaceMismatch:
+                continue
+            return env
+        made: Any = self._make({**self._arguments, "body": body}).unwrapped
+        self._envs.append(made)
+        return made
 
     def close(self) -> None:
         """Close the CPU envs."""
-        ...
+        for env in self._envs:
+            env.close()
 
 
-_READERS: Final[dict[type, Callable[[gym.Env[Any, Any]], Reader]]] = {}
+# Makes the reader from a CPU env, a maker of CPU envs and their arguments.
+_MakeReader = Callable[[gym.Env[Any, Any], _Make, dict[str, Any]], BodyReader]
+_READERS: Final[dict[type, _MakeReader]] = {
+    env_class: partial(BodyReader, task) for env_class, task in TASKS.items()
+}
 
 
-def register_reader(env_class: type, reader: Callable[[gym.Env[Any, Any]], Reader]) -> None:
+def register_reader(env_class: type, reader: _MakeReader) -> None:
     """Let a device read the bodies of an env in another way than by their edits.
 
     Args:
         env_class: Class of the CPU env. Its subclasses do not count: they may change the task.
-        reader: Makes the reader from a CPU env.
+        reader: Makes the reader from a CPU env, a maker of CPU envs and their arguments.
     """
     _READERS[env_class] = reader
 
 
-def make_reader(
-    env_id: str, make: Callable[[dict[str, Any]], gym.Env[Any, Any]], arguments: dict[str, Any]
-) -> Reader:
+def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyReader:
     """Return the reader of a task's bodies.
 
     Args:
@@ -76,66 +109,63 @@ def make_reader(
         import_module(module)
     reader = _READERS.get(type(first.unwrapped))
     if reader is not None:
-        return reader(first)
-    return BodyReader(first, find_device_task(first, env_id), make, arguments)
+        return reader(first, make, arguments)
+    classes = {kind.__name__ for kind in TASKS}
+    known = [e.name for e in CATALOGUE.values() if e.entry_point.rpartition(":")[2] in classes]
+    known += [
+        name.removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+        for name, task in FINGER_ENVS.items()
+        if task.device
+    ]
+    raise VectorEnvError(
+        f"{env_id} has no batched functions, which backend='warp' needs: those exist for "
+        f"{', '.join(known)}."
+    )
 
 
-class BodyReader(Reader):
-    """Reads the bodies of a family, which CPU envs compile.
+class Group(NamedTuple):
+    """Worlds whose bodies have arrays of the same shapes; the arguments of `Worlds`.
 
-    Args:
-        first: A CPU env of the task.
-        task: Its batched functions.
-        make: Makes a CPU env of it from arguments.
-        arguments: Arguments of the CPU env.
+    Attributes:
+        task: Their task.
+        numbers: Their numbers in the vector env.
+        bodies: The bodies that they can have.
+        each: The body of each world.
     """
 
-    def __init__(
-        self,
-        first: gym.Env[Any, Any],
-        task: type[DeviceTask],
-        make: Callable[[dict[str, Any]], gym.Env[Any, Any]],
-        arguments: dict[str, Any],
-    ) -> None:
-        self._arguments = arguments
-        self._make = make
-        self._task = task
-        self.spec = first.spec
-        # One CPU env for each pair of spaces; it changes its body.
-        self._envs: list[Any] = [first.unwrapped]
-        self._usual = cast("Body", self._envs[0].body)
+    task: DeviceTask
+    numbers: list[int]
+    bodies: dict[Any, DeviceBody]
+    each: list[Any]
 
-    @override
-    def body(self, value: BodyLike | None) -> Body:
-        return self._usual if value is None else self._envs[0].family.body(value)
 
-    @override
-    def read(self, body: Body) -> tuple[DeviceBody, BatchKind]:
-        env = self._env_with(body)
-        found = device_body(describe_body(env), env.model, self._task.constants(env))
-        kind = BatchKind(
-            found,
-            env.model,
-            self._task(env),
-            int(env.frame_skip),
-            env.observation_layout,
-            env.action_layout,
-            env.action_space,
-        )
-        return found, kind
+def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[Group]:
+    """Compile bodies, and group worlds that have them in turn by the shapes of their arrays.
 
-    def _env_with(self, body: Body) -> Any:
-        for env in self._envs:
-            try:
-                env._change_body(body)
-            except SpaceMismatch:
-                continue
-            return env
-        made: Any = self._make({**self._arguments, "body": body}).unwrapped
-        self._envs.append(made)
-        return made
-
-    @override
-    def close(self) -> None:
-        for env in self._envs:
-            env.close()
+    Raises:
+        VectorEnvError: If there are fewer worlds than shapes.
+    """
+    # A pool of more bodies than worlds is spread over them.
+    step = max(1, len(bodies) // num_envs)
+    each = [bodies[world * step % len(bodies)] for world in range(num_envs)]
+    groups: list[Group] = []
+    for body in dict.fromkeys(bodies):
+        read, task = reader.read(body)
+        for group in groups:
+            if not differing_arrays(next(iter(group.bodies.values())), read):
+                break
+        else:
+            group = Group(task, [], {}, [])
+            groups.append(group)
+        group.bodies[body] = read
+    for group in groups:
+        group.numbers.extend(world for world, body in enumerate(each) if body in group.bodies)
+        group.each.extend(each[world] for world in group.numbers)
+        if not group.numbers:
+            name = next(iter(group.bodies.values())).name
+            raise VectorEnvError(
+                f"No world has bodies like {name}: the bodies of the pool form {len(groups)} "
+                f"batches, because their arrays differ, and there are {num_envs} worlds, so make "
+                "more."
+            )
+    return groups

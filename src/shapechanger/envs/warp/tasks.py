@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import partial
 from types import SimpleNamespace
-from typing import Any, ClassVar, Final, NamedTuple, cast
+from typing import Any, ClassVar, Final, cast
 
 import gymnasium as gym
 import mujoco
@@ -20,7 +20,6 @@ from torch import Tensor
 from typing_extensions import override
 
 from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
-from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, NAMESPACE
 from shapechanger.envs.humanoid import HumanoidEnv
 from shapechanger.envs.pendulum import (
     CLIPPED_AT,
@@ -29,38 +28,31 @@ from shapechanger.envs.pendulum import (
     InvertedDoublePendulumEnv,
     InvertedPendulumEnv,
 )
-from shapechanger.envs.runners import (
-    HalfCheetahEnv,
-    HopperEnv,
-    SwimmerEnv,
-    Walker2dEnv,
-)
-from shapechanger.envs.warp.starts import DeviceStarts, length
-from shapechanger.envs.warp.worlds import Worlds
+from shapechanger.envs.runners import HalfCheetahEnv, HopperEnv, SwimmerEnv, Walker2dEnv
+from shapechanger.envs.warp.kernels import normals, uniforms
+from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
 from shapechanger.errors import VectorEnvError
+from shapechanger.layout import Layout
+from shapechanger.morphology.pose import StartRules
 
-Constants = dict[str, Tensor]
-
-
-class DeviceOutcome(NamedTuple):
-    """What a step earns.
-
-    Attributes:
-        rewards: Shape (n,).
-        terminated: Shape (n,).
-        infos: Tensors of shape (n, ...).
-    """
-
-    rewards: Tensor
-    terminated: Tensor
-    infos: dict[str, Tensor]
+_G: Final = mujoco.mjtGeom
+_SHAPES: Final = ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
+# Where the numbers of a joint have its quaternion.
+_QUATERNION_AT: Final = {int(mujoco.mjtJoint.mjJNT_FREE): 3, int(mujoco.mjtJoint.mjJNT_BALL): 0}
+# Streams of random numbers.
+_POSITIONS: Final = 0
+_VELOCITIES: Final = 1
 
 
 class DeviceTask(ABC):
     """Start, action, observation, reward and end of a task in the worlds of one batch.
 
+    Starts are those of `StartRules`: noise around each body's pose, made feasible.
+
     Args:
         env: A CPU env of the task, with any body of the batch.
+        model: Its compiled model.
+        frame_skip: Physics steps of each `Worlds.simulate`.
 
     Attributes:
         normal_velocities: Whether start velocities are drawn normally, else uniformly.
@@ -74,53 +66,104 @@ class DeviceTask(ABC):
     contact_forces: ClassVar[bool] = False
     start_forces: ClassVar[bool] = False
 
-    def __init__(self, env: Any) -> None:
+    def __init__(self, env: Any, model: mujoco.MjModel, frame_skip: int) -> None:
         self._env = env
+        self.model, self.frame_skip = model, frame_skip
+        self.observation_layout: Layout = env.observation_layout
+        self.action_layout: Layout = env.action_layout
+        self.action_space: gym.spaces.Box = env.action_space
 
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
         """Return the numbers of the task that depend on the body of a CPU env."""
-        found = {**DeviceStarts.constants(env), "dt": np.array(env.dt)}
+        rules = StartRules(env.model)
+        found = {"init_qpos": env.init_qpos, "init_qvel": env.init_qvel, "dt": env.dt}
+        found |= {"lowest": rules.lowest, "highest": rules.highest}
         if hasattr(env, "healthy_z_range"):
-            low, high = env.healthy_z_range
-            found |= {"low": np.array(low), "high": np.array(high)}
-        return found
+            found["low"], found["high"] = env.healthy_z_range
+        return {name: np.array(value) for name, value in found.items()}
 
-    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+    def attach(self, worlds: Worlds) -> None:
         """Serve worlds from here on.
 
-        Args:
-            model: A body of the batch.
-            worlds: The worlds.
-
         Raises:
-            VectorEnvError: If they cannot start.
+            VectorEnvError: If the body starts above something else than planes, or a geom that can
+                touch the floor has a shape without a batched clearance.
         """
-        scale = float(self._env._reset_noise_scale)
-        self._starts = DeviceStarts(model, worlds, scale, self.normal_velocities)
+        model, rules = self.model, StartRules(self.model)
+        self._limited = torch.as_tensor(rules.limited_places, device=worlds.device)
+        self._quaternions = [
+            int(address) + _QUATERNION_AT[int(kind)]
+            for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
+            if int(kind) in _QUATERNION_AT
+        ]
+        self._lift = rules.lift
+        # Each floor with geoms of one shape.
+        touching: dict[tuple[int, str], list[int]] = {}
+        for floor, geom in rules.floor_pairs if rules.lift is not None else ():
+            below, shape = (
+                _G(int(model.geom_type[each])).name.removeprefix("mjGEOM_")
+                for each in (floor, geom)
+            )
+            if below != "PLANE" or shape not in _SHAPES:
+                raise VectorEnvError(
+                    "Bodies of backend='warp' start above planes, with spheres, capsules, "
+                    f"ellipsoids, cylinders and boxes; here a {below} meets a {shape}."
+                )
+            touching.setdefault((floor, shape), []).append(geom)
+        self._touching = {
+            pair: torch.tensor(geoms, device=worlds.device) for pair, geoms in touching.items()
+        }
 
-    def start(
-        self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
-    ) -> None:
+    def start(self, worlds: Worlds, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
         """Put some worlds, whose state is clear, into start states.
 
+        Joints are moved inside their limits, orientations normalised, and a trunk whose feet are in
+        the floor is lifted.
+
         Args:
             worlds: The worlds.
-            constants: Numbers of each world's body.
             mask: Which worlds, shape (n,).
             seeds: The seed of each world, shape (n,).
             episodes: How many episodes each world has begun, shape (n,).
         """
-        qpos, qvel = self._starts.draw(constants, seeds, episodes)
-        chosen = mask[:, None]
-        worlds.qpos.copy_(torch.where(chosen, qpos, worlds.qpos))
-        worlds.qvel.copy_(torch.where(chosen, qvel, worlds.qvel))
-        self._starts.settle(mask, constants)
+        constants, scale = worlds.constants, float(self._env._reset_noise_scale)
+        qpos, qvel = constants["init_qpos"], constants["init_qvel"]
+        moved = 2.0 * uniforms(seeds, episodes, _POSITIONS, qpos.shape[1]) - 1.0
+        if self.normal_velocities:
+            pushed = normals(seeds, episodes, _VELOCITIES, qvel.shape[1])
+        else:
+            pushed = 2.0 * uniforms(seeds, episodes, _VELOCITIES, qvel.shape[1]) - 1.0
+        qpos, qvel = qpos + (scale * moved).to(qpos.dtype), qvel + (scale * pushed).to(qvel.dtype)
+        limits = constants["lowest"], constants["highest"]
+        qpos[:, self._limited] = qpos[:, self._limited].clamp(*limits)
+        for place in self._quaternions:
+            part = slice(place, place + 4)
+            qpos[:, part] = torch.nn.functional.normalize(qpos[:, part], dim=1)
+        worlds.qpos.copy_(torch.where(mask[:, None], qpos, worlds.qpos))
+        worlds.qvel.copy_(torch.where(mask[:, None], qvel, worlds.qvel))
+        if self._lift is not None:
+            worlds.kinematics()
+            lack = (-self._clearance(worlds)).clamp_min(0.0).masked_fill(~mask, 0.0)
+            worlds.qpos[:, self._lift.place] += self._lift.up * lack
 
-    def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
+    def _clearance(self, worlds: Worlds) -> Tensor:
+        """Return how far each body's lowest point is above the floor, m, shape (n,)."""
+        gap = worlds.qpos.new_full((worlds.count,), torch.inf)
+        for (floor, shape), geoms in self._touching.items():
+            up = worlds.geom_xmat[:, floor, :, 2]
+            above = worlds.geom_xpos[:, geoms] - worlds.geom_xpos[:, floor, None]
+            height = torch.einsum("ngi,ni->ng", above, up)
+            # The plane's normal as each geom sees it.
+            seen = torch.einsum("ngij,ni->ngj", worlds.geom_xmat[:, geoms], up)
+            reach = _reach(shape, worlds.row("geom_size")[:, geoms], seen)
+            gap = torch.minimum(gap, (height - reach).amin(dim=1))
+        return gap
+
+    def act(self, worlds: Worlds, actions: Tensor) -> None:
         """Apply actions, shape (n, nu), and step the physics."""
         worlds.ctrl[:] = actions
-        worlds.step()
+        worlds.simulate()
 
     def place(self, worlds: Worlds) -> Tensor:
         """Return the state from before the physics that the reward needs (a view)."""
@@ -131,21 +174,43 @@ class DeviceTask(ABC):
         """Return the observations, shape (n, size)."""
 
     @abstractmethod
-    def outcome(
-        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
-    ) -> DeviceOutcome:
+    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
         """Return rewards, ends and infos of a step.
 
         Args:
             worlds: The worlds after the physics.
             before: What `place` returned before.
             actions: Shape (n, nu).
-            constants: Numbers of each world's body.
         """
 
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         """Return the infos of a reset, tensors of shape (n, ...)."""
         return {}
+
+
+def length(vectors: Tensor) -> Tensor:
+    """Return the lengths of vectors, shape (..., k), as shape (...)."""
+    return vectors.square().sum(dim=-1).sqrt()
+
+
+def _reach(shape: str, size: Tensor, towards: Tensor) -> Tensor:
+    """Return how far geoms of one shape reach from their middle in a direction, m, shape (n, k).
+
+    Args:
+        shape: Their shape.
+        size: Their sizes as MuJoCo has them, m, shape (n or 1, k, 3).
+        towards: The direction in each geom's own axes, shape (n, k, 3).
+    """
+    radius, half = size[..., 0], size[..., 1]
+    if shape == "SPHERE":
+        return radius.expand(towards.shape[:2])
+    if shape == "CAPSULE":
+        return radius + half * towards[..., 2].abs()
+    if shape == "ELLIPSOID":
+        return length(size * towards)
+    if shape == "CYLINDER":
+        return radius * length(towards[..., :2]) + half * towards[..., 2].abs()
+    return (size * towards.abs()).sum(dim=-1)
 
 
 def _place_infos(worlds: Worlds) -> dict[str, Tensor]:
@@ -168,8 +233,8 @@ class DeviceAnt(DeviceTask):
     normal_velocities = True
     contact_forces = True
 
-    def __init__(self, env: Any) -> None:
-        super().__init__(env)
+    def __init__(self, env: Any, model: mujoco.MjModel, frame_skip: int) -> None:
+        super().__init__(env, model, frame_skip)
         self._main = int(env.model.body(env.main_body).id)
 
     def place(self, worlds: Worlds) -> Tensor:
@@ -187,18 +252,15 @@ class DeviceAnt(DeviceTask):
         return torch.cat(parts, dim=1)
 
     @override
-    def outcome(
-        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
-    ) -> DeviceOutcome:
+    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
         env, qpos = self._env, worlds.qpos
-        velocity = (self.place(worlds) - before) / constants["dt"][:, None]
-        upright = is_upright(
-            qpos[:, 2], qpos[:, 4], qpos[:, 5], constants["low"], constants["high"]
-        )
+        velocity = (self.place(worlds) - before) / worlds.constants["dt"][:, None]
+        limits = worlds.constants["low"], worlds.constants["high"]
+        upright = is_upright(qpos[:, 2], qpos[:, 4], qpos[:, 5], *limits)
         finite = qpos.isfinite().all(dim=1) & worlds.qvel.isfinite().all(dim=1)
         healthy = upright & finite
         rewards, infos = env._reward(
-            self.start_infos(worlds, constants).values(),
+            self.start_infos(worlds).values(),
             velocity.T,
             _cost(env._ctrl_cost_weight, actions),
             _cost(env._contact_cost_weight, self._forces(worlds)),
@@ -207,7 +269,7 @@ class DeviceAnt(DeviceTask):
         return DeviceOutcome(rewards, ~healthy & bool(env._terminate_when_unhealthy), infos)
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         return _place_infos(worlds)
 
 
@@ -219,9 +281,7 @@ class DevicePendulum(DeviceTask):
         return torch.cat([worlds.qpos, worlds.qvel], dim=1)
 
     @override
-    def outcome(
-        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
-    ) -> DeviceOutcome:
+    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
         finite = self.observations(worlds).isfinite().all(dim=1)
         up = finite & (worlds.qpos[:, 1].abs() <= FALLEN_RAD)
         rewards = up.to(worlds.qpos.dtype)
@@ -250,10 +310,9 @@ class DeviceDoublePendulum(DeviceTask):
         return torch.cat([qpos[:, :1], hinges.sin(), hinges.cos(), velocities, force], dim=1)
 
     @override
-    def outcome(
-        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
-    ) -> DeviceOutcome:
+    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
         env, tip = self._env, worlds.site_xpos[:, 0]
+        constants = worlds.constants
         part = tip[:, 2] - constants["foot_m"]
         height = part * (constants["plain_length_m"] / constants["length_m"])
         height = height + constants["plain_foot_m"]
@@ -271,6 +330,8 @@ class DeviceRunner(DeviceTask):
     """Runners that never end."""
 
     place_size: ClassVar[int] = 1
+    # Where the height of the trunk is in `qpos`.
+    height_at: ClassVar[int] = 1
 
     def place(self, worlds: Worlds) -> Tensor:
         """Return the place of the trunk, m, shape (n, place_size)."""
@@ -283,22 +344,22 @@ class DeviceRunner(DeviceTask):
         velocities = worlds.qvel.clamp(-env.velocity_limit, env.velocity_limit)
         return torch.cat([worlds.qpos[:, hidden:], velocities], dim=1)
 
-    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
-        """Return whether each body is healthy, shape (n,)."""
-        return torch.ones(worlds.count, dtype=torch.bool, device=worlds.qpos.device)
+    def healthy(self, worlds: Worlds) -> Tensor:
+        """Return whether each body is healthy, within heights where it has any, shape (n,)."""
+        height, constants = worlds.qpos[:, self.height_at], worlds.constants
+        if "low" not in constants:
+            return torch.ones_like(height, dtype=torch.bool)
+        return (constants["low"] < height) & (height < constants["high"])
 
     def contact_cost(self, worlds: Worlds) -> Tensor | float:
         """Return the cost of contact forces, shape (n,), or 0 for a task that has none."""
-        del worlds
         return 0.0
 
     @override
-    def outcome(
-        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
-    ) -> DeviceOutcome:
+    def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
         env = self._env
-        velocity = (self.place(worlds) - before) / constants["dt"][:, None]
-        healthy = self.healthy(worlds, constants)
+        velocity = (self.place(worlds) - before) / worlds.constants["dt"][:, None]
+        healthy = self.healthy(worlds)
         # What Gymnasium's formula asks its env for.
         there = SimpleNamespace(
             _forward_reward_weight=env._forward_reward_weight,
@@ -307,15 +368,14 @@ class DeviceRunner(DeviceTask):
             contact_cost=self.contact_cost(worlds),
         )
         rewards, terms = _base(env)._get_rew(there, velocity[:, 0], actions)
-        infos = self.start_infos(worlds, constants)
-        infos |= {
-            f"{axis}_velocity": velocity[:, i] for i, axis in enumerate("xy"[: self.place_size])
-        }
+        axes = "xy"[: self.place_size]
+        speeds = {f"{axis}_velocity": velocity[:, i] for i, axis in enumerate(axes)}
         ends = bool(getattr(env, "_terminate_when_unhealthy", False))
-        return DeviceOutcome(rewards, ~healthy & ends, {**infos, **terms})
+        infos = {**self.start_infos(worlds), **speeds, **terms}
+        return DeviceOutcome(rewards, ~healthy & ends, infos)
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         return {"x_position": worlds.qpos[:, 0].clone()}
 
 
@@ -325,7 +385,7 @@ class DeviceSwimmer(DeviceRunner):
     place_size = 2
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         return _place_infos(worlds)
 
 
@@ -338,16 +398,15 @@ class DeviceCheetah(DeviceRunner):
 class DeviceWalker(DeviceRunner):
     """Walkers, which are healthy within heights and leans."""
 
-    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
+    def healthy(self, worlds: Worlds) -> Tensor:
         """Return whether each body is healthy, shape (n,)."""
-        height, lean = worlds.qpos[:, 1], worlds.qpos[:, 2]
+        lean = worlds.qpos[:, 2]
         low, high = self._env._healthy_angle_range
-        upright = (low < lean) & (lean < high)
-        return upright & (constants["low"] < height) & (height < constants["high"])
+        return super().healthy(worlds) & (low < lean) & (lean < high)
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        qpos, start = worlds.qpos, constants["init_qpos"]
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
+        qpos, start = worlds.qpos, worlds.constants["init_qpos"]
         return {
             "x_position": qpos[:, 0].clone(),
             "z_distance_from_origin": qpos[:, 1] - start[:, 1],
@@ -357,12 +416,12 @@ class DeviceWalker(DeviceRunner):
 class DeviceHopper(DeviceWalker):
     """Hoppers, which are healthy within heights, leans and states."""
 
-    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
+    def healthy(self, worlds: Worlds) -> Tensor:
         """Return whether each body is healthy, shape (n,)."""
         low, high = self._env._healthy_state_range
         state = torch.cat([worlds.qpos[:, 2:], worlds.qvel], dim=1)
         within = ((low < state) & (state < high)).all(dim=1)
-        return super().healthy(worlds, constants) & within
+        return super().healthy(worlds) & within
 
 
 # Blocks of numbers that a humanoid observes, each without the world's or the trunk's first rows.
@@ -372,12 +431,12 @@ _BLOCKS: Final = {"cinert": 1, "cvel": 1, "qfrc_actuator": 6, "cfrc_ext": 1}
 class DeviceHumanoid(DeviceRunner):
     """Humanoids, which are rewarded for the speed of their mass and healthy within heights."""
 
-    place_size = 2
+    place_size = height_at = 2
     contact_forces = True
     start_forces = True
 
-    def __init__(self, env: Any) -> None:
-        super().__init__(env)
+    def __init__(self, env: Any, model: mujoco.MjModel, frame_skip: int) -> None:
+        super().__init__(env, model, frame_skip)
         self._blocks = [
             (name, first)
             for name, first in _BLOCKS.items()
@@ -394,11 +453,6 @@ class DeviceHumanoid(DeviceRunner):
         blocks = [getattr(worlds, name)[:, first:].flatten(1) for name, first in self._blocks]
         return torch.cat([super().observations(worlds), *blocks], dim=1)
 
-    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
-        """Return whether each body is healthy, shape (n,)."""
-        height = worlds.qpos[:, 2]
-        return (constants["low"] < height) & (height < constants["high"])
-
     def contact_cost(self, worlds: Worlds) -> Tensor:
         """Return the cost of contact forces within the range of the task, shape (n,)."""
         env = self._env
@@ -406,7 +460,7 @@ class DeviceHumanoid(DeviceRunner):
         return cost.clamp(*env._contact_cost_range)
 
     @override
-    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+    def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
         return {
             **_place_infos(worlds),
             "tendon_length": worlds.ten_length.clone(),
@@ -414,7 +468,7 @@ class DeviceHumanoid(DeviceRunner):
         }
 
 
-_TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
+TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     AntEnv: DeviceAnt,
     ExtendedAntEnv: DeviceAnt,
     InvertedPendulumEnv: DevicePendulum,
@@ -425,35 +479,7 @@ _TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     SwimmerEnv: DeviceSwimmer,
     HumanoidEnv: DeviceHumanoid,
 }
-
-
-def find_device_task(env: gym.Env[Any, Any], env_id: str) -> type[DeviceTask]:
-    """Return the batched functions of an env's task.
-
-    Args:
-        env: The CPU env; a subclass of ours may have changed the task, so it has none.
-        env_id: Its id, for messages.
-
-    Raises:
-        VectorEnvError: If the task has no batched functions.
-    """
-    found = _TASKS.get(type(env.unwrapped))
-    if found is None:
-        known = [
-            entry.name
-            for entry in CATALOGUE.values()
-            if entry.entry_point.rpartition(":")[2] in {kind.__name__ for kind in _TASKS}
-        ]
-        *own, last = (
-            name.removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
-            for name, task in FINGER_ENVS.items()
-            if task.device
-        )
-        raise VectorEnvError(
-            f"{env_id} has no batched functions, which backend='warp' needs: those exist for "
-            f"{', '.join((*known, *own))} and {last}."
-        )
-    return found
+"""Batched functions of bodies by the class of their CPU env."""
 
 
 def _base(env: Any) -> Any:

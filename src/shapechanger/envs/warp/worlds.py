@@ -1,61 +1,71 @@
-"""The physics of many worlds of one shape on a device."""
+"""Worlds of one batch: bodies whose arrays have the same shapes, their physics and their task."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+import gymnasium as gym
 import mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shapechanger.envs.warp.bodies import ARMS, DeviceBody, static_geoms
-from shapechanger.envs.warp.devices import as_torch, mjw, on, wp
-from shapechanger.envs.warp.patches import follow_mujoco
+from shapechanger.envs.warp.bodies import ARMS, DeviceBody, differing_arrays, static_geoms
+from shapechanger.envs.warp.devices import as_torch, mjw, on, without_gradients, wp
+from shapechanger.envs.warp.kernels import follow_mujoco, uniforms
+from shapechanger.errors import VectorEnvError
 
-_G: Final = mujoco.mjtGeom
-
-
-def _pair(one: Any, other: Any) -> frozenset[int]:
-    """Return the types of two geoms, in any order."""
-    return frozenset((int(one), int(other)))
-
-
-# The most contacts that MuJoCo makes of two geoms; 8 for all other pairs.
-_CONTACTS: Final = {
-    _pair(_G.mjGEOM_PLANE, _G.mjGEOM_SPHERE): 1,
-    _pair(_G.mjGEOM_PLANE, _G.mjGEOM_CAPSULE): 2,
-    _pair(_G.mjGEOM_PLANE, _G.mjGEOM_ELLIPSOID): 1,
-    _pair(_G.mjGEOM_PLANE, _G.mjGEOM_CYLINDER): 4,
-    _pair(_G.mjGEOM_PLANE, _G.mjGEOM_BOX): 4,
-    _pair(_G.mjGEOM_SPHERE, _G.mjGEOM_SPHERE): 1,
-    _pair(_G.mjGEOM_SPHERE, _G.mjGEOM_CAPSULE): 1,
-    _pair(_G.mjGEOM_SPHERE, _G.mjGEOM_CYLINDER): 1,
-    _pair(_G.mjGEOM_SPHERE, _G.mjGEOM_BOX): 1,
-    _pair(_G.mjGEOM_CAPSULE, _G.mjGEOM_CAPSULE): 2,
-    _pair(_G.mjGEOM_CAPSULE, _G.mjGEOM_BOX): 2,
-}
-_MOST_CONTACTS: Final = 8
+_MOST_LISTED: Final = 4
+# Stream of the random numbers that choose bodies; tasks use those from 0 on.
+_BODIES: Final = -1
 # Arrays of the data that are attributes of `Worlds`.
 _ARRAYS: Final = (
     *("qpos", "qvel", "qacc", "qfrc_actuator", "qfrc_constraint", "ctrl", "actuator_force", "act"),
     *("history", "time", "xpos", "xipos", "cinert", "cvel", "cfrc_ext", "ten_length"),
     *("ten_velocity", "site_xpos", "geom_xpos", "geom_xmat"),
 )
+# What of the state a restart clears, besides the positions.
+_CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
+# Overflows of the memory for contacts and constraints, by which results are wrong.
+_OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
+# The most contacts that MuJoCo makes of two geoms; 8 for all other pairs.
+_CONTACTS: Final = {
+    ("PLANE", "SPHERE"): 1,
+    ("PLANE", "CAPSULE"): 2,
+    ("PLANE", "ELLIPSOID"): 1,
+    ("PLANE", "CYLINDER"): 4,
+    ("PLANE", "BOX"): 4,
+    ("SPHERE", "SPHERE"): 1,
+    ("SPHERE", "CAPSULE"): 1,
+    ("SPHERE", "CYLINDER"): 1,
+    ("SPHERE", "BOX"): 1,
+    ("CAPSULE", "CAPSULE"): 2,
+    ("CAPSULE", "BOX"): 2,
+}
+_MOST_CONTACTS: Final = 8
 # Most rows of one equality.
 _ROWS_PER_EQUALITY: Final = 6
-# Overflows of the memory for contacts and constraints, by which results are wrong.
-_OVERFLOWS: Final = {
-    "njmax": ("NEFC", "NJMAX_NNZ"),
-    "nconmax": ("BROADPHASE", "NARROWPHASE", "CCD"),
-}
+
+
+class DeviceOutcome(NamedTuple):
+    """What a step earns.
+
+    Attributes:
+        rewards: Shape (n,).
+        terminated: Shape (n,).
+        infos: Tensors of shape (n, ...).
+    """
+
+    rewards: Tensor
+    terminated: Tensor
+    infos: dict[str, Tensor]
 
 
 class Worlds:
-    """Models and data of worlds whose bodies have arrays of the same shapes.
+    """Worlds whose bodies have arrays of the same shapes, which are stepped together.
 
     Arrays of MuJoCo's data are attributes with its names and units, as views with a row per world:
     `qpos` (n, nq), `qvel`, `qacc`, `qfrc_actuator` and `qfrc_constraint` (n, nv), `ctrl` and
@@ -65,36 +75,50 @@ class Worlds:
     (n, ngeom, 3) and `geom_xmat` (n, ngeom, 3, 3).
 
     Args:
-        model: A body of the batch.
-        bodies: The bodies that worlds can have.
-        numbers: The body of each world, an index of `bodies`, shape (n,).
-        frame_skip: Physics steps of each `step`.
+        task: Their `DeviceTask`.
+        numbers: The number of each world in the vector env.
+        bodies: The bodies that the worlds can have, keyed by their edits.
+        each: The edits of each world's body.
         device: Name of the device.
-        contact_forces: Whether `cfrc_ext` is computed after each step.
+        redraws: Whether each start of an episode draws one of the bodies.
         limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
             for; as many as it can ever have where a number is missing.
 
     Attributes:
+        count: How many worlds there are.
+        bodies: The bodies that the worlds can have, keyed by their edits.
+        chosen: The body of each world, an index of `bodies`, shape (n,).
+        constants: Numbers of the task of each world's body, shape (n, ...).
         limits: How many contacts and rows of constraints a world has memory for.
+        observation_layout: Name, unit and range of each number of an observation.
+        action_layout: Name, unit and range of each number of an action.
+        single_observation_space: Space of one world's observations, float32.
+        single_action_space: Space of one world's actions.
     """
 
     def __init__(
         self,
-        model: mujoco.MjModel,
-        bodies: Sequence[DeviceBody],
-        numbers: Tensor,
-        frame_skip: int,
+        task: Any,
+        numbers: Sequence[int],
+        bodies: Mapping[Any, DeviceBody],
+        each: Sequence[Any],
         device: str,
-        contact_forces: bool,
+        *,
+        redraws: bool,
         limits: Mapping[str, int],
     ) -> None:
-        self.count = len(numbers)
-        self.device = device
-        self._frame_skip = frame_skip
-        self._contact_forces = contact_forces
+        self.task = task
+        self.numbers = torch.tensor(numbers, device=device)
+        self.count, self.device = len(numbers), device
+        self.observation_layout, self.action_layout = task.observation_layout, task.action_layout
+        size = (task.observation_layout.size,)
+        self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, size, np.float32)
+        self.single_action_space = task.action_space
+        self._redraws = redraws
         # The graph of each function, and the functions whose kernels are loaded.
         self._graphs: dict[str, Any] = {}
         self._warm: set[str] = set()
+        model = task.model
         self._static = torch.as_tensor(static_geoms(model), device=device)
         follow_mujoco()
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
@@ -104,38 +128,35 @@ class Worlds:
         with on(device):
             self._model = mjw.put_model(model)
             self._model.opt.warn_overflow = 0  # `overflows` reports them without printing.
-            most = _room(model, self._model.nxn_geom_pair_filtered.numpy())
-            self.limits = {**most, **limits}
+            self.limits = _room(model, self._model.nxn_geom_pair_filtered.numpy()) | {**limits}
             self._data: Any = mjw.make_data(model, nworld=self.count, **self.limits)
-        data = self._data
-        self._overflow = as_torch(data.overflow)
         for name in _ARRAYS:
-            setattr(self, name, as_torch(getattr(data, name)))
-        # What else of the state a restart clears.
-        self._cleared = [
-            as_torch(array)
-            for array in (
-                *(data.act, data.qacc_warmstart, data.ctrl, data.qvel, data.cfrc_ext),
-                data.time,
-            )
-            if array.size
-        ]
-        # Fields with a row per world, and for each the rows of the bodies that worlds can have.
+            setattr(self, name, as_torch(getattr(self._data, name)))
+        self._overflow = as_torch(self._data.overflow)
+        cleared = [getattr(self._data, name) for name in _CLEARED]
+        self._cleared = [as_torch(array) for array in cleared if array.size]
+        # Fields of the model with a row per world.
         self._rows: dict[str, Tensor] = {}
+        # The rows of each body for these and the constants; and for the places of static geoms.
         self._tables: dict[str, Tensor] = {}
+        self._constant_tables: dict[str, Tensor] = {}
         self._static_tables: dict[str, Tensor] = {}
-        self.hold(bodies)
-        self.choose(numbers)
+        self._hold(bodies)
+        self.chosen = self._places(each)
+        self.constants = {name: table[self.chosen] for name, table in self._constant_tables.items()}
+        self._choose(self.chosen)
+        task.attach(self)
+        self._before = task.place(self).clone()
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Tensor: ...
 
     def row(self, name: str) -> Tensor:
-        """Return an array of the model, shape (n or 1, ...), as of each world.
+        """Return an array of the model, such as `geom_size`, shape (n or 1, ...), as of each world.
 
         Args:
-            name: Name of a field of the model, such as `geom_size`.
+            name: Name of the field.
         """
         return self._rows.get(name, self._by_world(name, self._array(name)))
 
@@ -148,20 +169,49 @@ class Worlds:
         owner, _, field = name.rpartition(".")
         return getattr(self._model.opt if owner else self._model, field)
 
-    def hold(self, bodies: Sequence[DeviceBody]) -> None:
-        """Keep the numbers of bodies on the device, from which `choose` gathers.
+    def require_fitting(self, body: DeviceBody) -> None:
+        """Require that a body has the arrays of these worlds.
 
-        A field of the model gets a row per world as soon as two bodies differ in it.
+        Raises:
+            VectorEnvError: If it has not.
+        """
+        first = next(iter(self.bodies.values()))
+        if arrays := differing_arrays(first, body):
+            more = f" and {len(arrays) - _MOST_LISTED} more" if len(arrays) > _MOST_LISTED else ""
+            raise VectorEnvError(
+                f"{body.name} cannot join the batch of {first.name}, because "
+                f"{', '.join(arrays[:_MOST_LISTED])}{more} differ: worlds of one batch share these "
+                "arrays, so make the vector env with both bodies, which gives it a batch of each."
+            )
+
+    def change_bodies(self, bodies: Mapping[Any, DeviceBody], each: Sequence[Any]) -> None:
+        """Replace the bodies that worlds can have; worlds with another one must start again.
 
         Args:
-            bodies: The bodies, with the shared arrays of this batch.
+            bodies: The bodies, keyed by their edits.
+            each: The edits of each world's body.
         """
-        for name in bodies[0].rows:
+        self._hold(bodies)
+        self._choose(self._places(each))
+
+    def _places(self, each: Sequence[Any]) -> Tensor:
+        """Return the place of each world's body among the bodies, shape (n,)."""
+        place = {body: i for i, body in enumerate(self.bodies)}
+        return torch.tensor([place[body] for body in each], device=self.device)
+
+    def _hold(self, bodies: Mapping[Any, DeviceBody]) -> None:
+        """Keep the numbers of bodies on the device, from which `_choose` gathers.
+
+        A field of the model gets a row per world as soon as two bodies differ in it.
+        """
+        self.bodies = bodies
+        held = [*bodies.values()]
+        for name in held[0].rows:
             array = self._array(name)
             if not array.size:
                 continue
             row = self._by_world(name, array)[0]
-            table = _stacked([body.rows[name] for body in bodies], row)
+            table = _stacked([body.rows[name] for body in held], row)
             if name not in self._rows:
                 if bool((table == row).all()):
                     continue
@@ -170,30 +220,22 @@ class Worlds:
         if self._static.numel():
             for name, view in (("geom_xpos", self.geom_xpos), ("geom_xmat", self.geom_xmat)):
                 like = view[0, self._static]
-                self._static_tables[name] = _stacked([body.static[name] for body in bodies], like)
+                self._static_tables[name] = _stacked([body.static[name] for body in held], like)
+        for name in held[0].constants:
+            rows = np.stack([body.constants[name] for body in held])
+            self._constant_tables[name] = torch.as_tensor(
+                rows, dtype=self.task.precision, device=self.device
+            )
 
-    def choose(self, numbers: Tensor) -> None:
-        """Give each world one of the held bodies, without asking the device anything.
-
-        Args:
-            numbers: Indices of the held bodies, shape (n,).
-        """
+    def _choose(self, chosen: Tensor) -> None:
+        """Give each world one of the held bodies, without asking the device anything."""
+        self.chosen = chosen
         for name, table in self._tables.items():
-            self._rows[name].copy_(table[numbers])
+            self._rows[name].copy_(table[chosen])
         for name, table in self._static_tables.items():
-            getattr(self, name)[:, self._static] = table[numbers]
-
-    def overflows(self) -> dict[str, int]:
-        """Return in how many worlds the memory was too small since the last call, by limit."""
-        flags = self._overflow.clone()
-        self._overflow.zero_()
-        found: dict[str, int] = {}
-        for limit, names in _OVERFLOWS.items():
-            bits = sum(int(getattr(mjw.OverflowType, name)) for name in names)
-            count = int((flags & bits != 0).sum())
-            if count:
-                found[limit] = count
-        return found
+            getattr(self, name)[:, self._static] = table[chosen]
+        for name, table in self._constant_tables.items():
+            self.constants[name].copy_(table[chosen])
 
     def _widen(self, name: str, array: Any) -> None:
         """Give a field of the model one row per world."""
@@ -209,18 +251,97 @@ class Worlds:
         self._graphs.clear()  # They hold the former array.
         self._warm.clear()  # Some kernels depend on which arrays are wide.
 
-    def clear(self, mask: Tensor) -> None:
-        """Clear velocities, controls, warm starts and forces, as MuJoCo's own reset does.
+    def step(self, actions: Tensor) -> tuple[Tensor, DeviceOutcome, Tensor]:
+        """Take one step of the task in each world.
+
+        A world whose simulation has diverged is terminated with the reward 0, and put back to its
+        pose at rest at once, so that nothing but its own results is lost.
+
+        Args:
+            actions: Shape (n, nu).
+
+        Returns:
+            Observations, shape (n, size); rewards, ends and infos; and which worlds have diverged,
+            shape (n,).
+        """
+        task, actions = self.task, actions.detach()
+        task.act(self, actions)
+        outcome = task.outcome(self, self._before, actions)
+        observations = task.observations(self)
+        self._before = task.place(self).clone()
+        state = torch.cat([self.qpos, self.qvel, self.qacc], dim=1)
+        # Also where a number is not one.
+        bounded = (state.abs() <= mujoco.mjMAXVAL).all(dim=1)
+        diverged = ~(bounded & observations.isfinite().all(dim=1))
+        observations = observations.masked_fill(~observations.isfinite(), 0.0)
+        self._clear(diverged)
+        poses = self.constants["init_qpos"].to(self.qpos.dtype)
+        self.qpos.copy_(torch.where(diverged[:, None], poses, self.qpos))
+        rewards = outcome.rewards.masked_fill(diverged, 0.0)
+        terminated = outcome.terminated | diverged
+        return observations, outcome._replace(rewards=rewards, terminated=terminated), diverged
+
+    def start(
+        self, mask: Tensor, seeds: Tensor, episodes: Tensor
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Start an episode in some worlds.
 
         Args:
             mask: Which worlds, shape (n,).
+            seeds: The seed of each world, shape (n,).
+            episodes: How many episodes each world has begun, shape (n,).
+
+        Returns:
+            Observations, shape (n, size), and infos; only the rows of `mask` are of the start.
         """
+        self._clear(mask)
+        if self._redraws:
+            drawn = uniforms(seeds, episodes, _BODIES, 1)[:, 0] * len(self.bodies)
+            self._choose(torch.where(mask, drawn.to(torch.int64), self.chosen))
+        self.task.start(self, mask, seeds, episodes)
+        return self._started(mask)
+
+    @without_gradients()
+    def set_state(self, qpos: Tensor, qvel: Tensor) -> None:
+        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else.
+
+        Fingers have more than that: start them with `start`.
+        """
+        everywhere = torch.ones(self.count, dtype=torch.bool, device=qpos.device)
+        self._clear(everywhere)
+        self.qpos[:], self.qvel[:] = qpos, qvel
+        self._started(everywhere)
+
+    def _started(self, mask: Tensor) -> tuple[Tensor, dict[str, Tensor]]:
+        if self.task.start_forces:
+            self.forward()
+        else:
+            self.kinematics()
+        self._before = torch.where(mask[:, None], self.task.place(self), self._before)
+        return self.task.observations(self), self.task.start_infos(self)
+
+    def _clear(self, mask: Tensor) -> None:
+        """Clear velocities, controls, warm starts and forces, as MuJoCo's own reset does."""
         for view in self._cleared:
             view.masked_fill_(mask.view(-1, *[1] * (view.dim() - 1)), 0.0)
 
-    def step(self) -> None:
-        """Step the physics of an action."""
-        self._run("step", self._step)
+    def simulate(self) -> None:
+        """Step the physics `frame_skip` times."""
+        self._run("simulate", self._simulate)
+
+    def _simulate(self) -> None:
+        for _ in range(self.task.frame_skip):
+            mjw.step(self._model, self._data)
+        if self.task.contact_forces:
+            mjw.rne_postconstraint(self._model, self._data)
+
+    def kinematics(self) -> None:
+        """Compute the places of bodies, geoms and sites from `qpos`."""
+        self._run("kinematics", lambda: mjw.kinematics(self._model, self._data))
+
+    def forward(self) -> None:
+        """Compute all that follows from the state, forces included."""
+        self._run("forward", lambda: mjw.forward(self._model, self._data))
 
     def _run(self, name: str, function: Callable[[], None]) -> None:
         """Run a function of the device, as a graph from the second time on."""
@@ -238,19 +359,12 @@ class Worlds:
                 self._graphs[name] = capture.graph
             wp.capture_launch(self._graphs[name])
 
-    def _step(self) -> None:
-        for _ in range(self._frame_skip):
-            mjw.step(self._model, self._data)
-        if self._contact_forces:
-            mjw.rne_postconstraint(self._model, self._data)
-
-    def kinematics(self) -> None:
-        """Compute the places of bodies, geoms and sites from `qpos`."""
-        self._run("kinematics", lambda: mjw.kinematics(self._model, self._data))
-
-    def forward(self) -> None:
-        """Compute all that follows from the state, forces included."""
-        self._run("forward", lambda: mjw.forward(self._model, self._data))
+    def overflows(self) -> int:
+        """Return in how many worlds the memory was too small since the last call."""
+        bits = sum(int(getattr(mjw.OverflowType, name)) for name in _OVERFLOWS)
+        count = int((self._overflow & bits != 0).sum())
+        self._overflow.zero_()
+        return count
 
 
 def _stacked(arrays: Sequence[NDArray[Any]], like: Tensor) -> Tensor:
@@ -268,12 +382,12 @@ def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> dict[str, int]:
     """
     contacts = rows = 0
     for pair in pairs.tolist():
-        kinds = _pair(*(model.geom_type[geom] for geom in pair))
-        count = _CONTACTS.get(kinds, _MOST_CONTACTS)
-        condim = max(int(model.geom_condim[geom]) for geom in pair)
-        condim = max([condim, *model.pair_dim.tolist()])
+        kinds = sorted(int(model.geom_type[geom]) for geom in pair)
+        first, second = (mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_") for kind in kinds)
+        count = _CONTACTS.get((first, second), _MOST_CONTACTS)
+        condim = max([*(model.geom_condim[geom] for geom in pair), *model.pair_dim])
         contacts += count
-        rows += count * max(1, 2 * (condim - 1))
+        rows += count * max(1, 2 * (int(condim) - 1))
     rows += int(model.jnt_limited.sum()) + 2 * int(model.ntendon)
     rows += int(np.count_nonzero(model.dof_frictionloss)) and int(model.nv)
     rows += _ROWS_PER_EQUALITY * int(model.neq)

@@ -1,4 +1,11 @@
-"""Replacements of functions in mujoco-warp 4.0 that differ from MuJoCo or ignore differing bodies.
+"""Warp kernels: random numbers of worlds, and replacements of functions of mujoco-warp.
+
+A world's random numbers are a function of its seed and episode alone, not of its place in a batch
+or of the number of worlds, and a GPU draws the numbers of the CPU, up to the rounding of its
+logarithm and cosine. They come from SplitMix64 as a function of a counter (Steele, Lea and Flood,
+OOPSLA 2014), with 53 bits each.
+
+Two private functions of mujoco-warp 4.0 differ from MuJoCo or ignore differing bodies:
 
 - **Contacts of capsules with planes.** MuJoCo turns the pyramid of friction of such a contact along
   the capsule. mujoco-warp does so only where the capsule leans by more than 30 degrees from the
@@ -7,17 +14,21 @@
   With elliptic cones, whose friction has no direction, both agree to 1e-5, so nothing else differs.
 - **Moment arms.** mujoco-warp keeps the arms of fixed tendons, `wrap_prm`, once for all worlds.
 
-Both replace private functions, and so only of the version whose code they were written for;
-`tests/envs/warp/test_patches.py` fails as soon as a version needs one no longer.
+Both are replaced only in the version whose code ours was written for; a test in
+`tests/envs/warp/test_kernels.py` fails as soon as a version needs one no longer.
 """
 
 # Warp reads the annotations, so they must not become strings.
 # pyright: basic, reportInvalidTypeForm=false
 
+import math
 from importlib.metadata import version
 from typing import Any, Final
 
-from shapechanger.envs.warp.devices import mjw, wp
+import torch
+from torch import Tensor
+
+from shapechanger.envs.warp.devices import as_warp, mjw, on, wp
 from shapechanger.errors import VectorEnvError
 
 VERSION: Final = "4.0."
@@ -28,6 +39,79 @@ plane_sphere: Any = _core.plane_sphere
 normalize_with_norm: Any = _core.normalize_with_norm
 mat23f: Any = mjw._src.types.mat23f
 _theirs: Any = mjw._src.smooth.tendon
+
+_STEP: Any = wp.constant(wp.uint64(0x9E3779B97F4A7C15))
+_FIRST: Any = wp.constant(wp.uint64(0xBF58476D1CE4E5B9))
+_SECOND: Any = wp.constant(wp.uint64(0x94D049BB133111EB))
+_UNIT: Any = wp.constant(wp.float64(2.0**-53))
+_TURN: Any = wp.constant(wp.float64(2.0 * math.pi))
+
+
+@wp.func
+def _mixed(bits: wp.uint64):
+    """Return the bits of a counter, mixed by SplitMix64."""
+    bits = (bits ^ (bits >> wp.uint64(30))) * _FIRST
+    bits = (bits ^ (bits >> wp.uint64(27))) * _SECOND
+    return bits ^ (bits >> wp.uint64(31))
+
+
+@wp.func
+def _uniform(key: wp.uint64, place: int):
+    """Return number `place` of a key, in [0, 1)."""
+    bits = _mixed(key + wp.uint64(place + 1) * _STEP)
+    return wp.float64(bits >> wp.uint64(11)) * _UNIT
+
+
+@wp.kernel
+def _draw(
+    seeds: wp.array[wp.int64],
+    episodes: wp.array[wp.int64],
+    streams: wp.array[wp.int64],
+    normal: bool,
+    numbers: wp.array2d[wp.float64],
+):
+    """Write one number of one world; normal ones by Box and Muller."""
+    world, place = wp.tid()
+    stream = wp.uint64(streams[world % streams.shape[0]])
+    key = _mixed(_mixed(wp.uint64(seeds[world])) + wp.uint64(episodes[world]) * _STEP)
+    key = _mixed(key + stream * _STEP)
+    number = _uniform(key, place)
+    if normal:
+        radius = wp.sqrt(wp.float64(-2.0) * wp.log(wp.float64(1.0) - number))
+        number = radius * wp.cos(_TURN * _uniform(key, numbers.shape[1] + place))
+    numbers[world, place] = number
+
+
+def uniforms(
+    seeds: Tensor, episodes: Tensor, stream: int | Tensor, count: int, *, normal: bool = False
+) -> Tensor:
+    """Return numbers in [0, 1), shape (n, count), float64.
+
+    Args:
+        seeds: The seed of each world, shape (n,), int64.
+        episodes: How many episodes each world has begun, shape (n,), int64.
+        stream: Which numbers of the episode, also one per world, shape (n,), int64; other streams
+            are independent.
+        count: How many numbers a world gets.
+        normal: Whether they are normally distributed (Box and Muller) instead.
+    """
+    numbers = torch.empty((len(seeds), count), dtype=torch.float64, device=seeds.device)
+    if isinstance(stream, int):
+        # Filled on the device, so that no number is copied there.
+        stream = torch.full((1,), stream, dtype=torch.int64, device=seeds.device)
+    with on(str(seeds.device)):
+        wp.launch(
+            _draw,
+            dim=(len(seeds), count),
+            inputs=[*(as_warp(each, wp.int64) for each in (seeds, episodes, stream)), normal],
+            outputs=[as_warp(numbers, wp.float64)],
+        )
+    return numbers
+
+
+def normals(seeds: Tensor, episodes: Tensor, stream: int | Tensor, count: int) -> Tensor:
+    """Return normally distributed numbers, shape (n, count), float64; see `uniforms`."""
+    return uniforms(seeds, episodes, stream, count, normal=True)
 
 
 def follow_mujoco() -> None:
