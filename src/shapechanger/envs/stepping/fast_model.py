@@ -107,18 +107,13 @@ def _without_search(
     for parameter, values in mixed_parameters(result, joined).items():
         getattr(result, f"pair_{parameter}")[:] = values
     # Leave no geom to the search, neither by its own bits nor by its body's.
-    for bits in (
-        result.geom_contype,
-        result.geom_conaffinity,
-        result.body_contype,
-        result.body_conaffinity,
-    ):
-        bits[:] = 0
+    result.geom_contype[:] = result.geom_conaffinity[:] = 0
+    result.body_contype[:] = result.body_conaffinity[:] = 0
     return _disabled(result, _NO_ISLANDS | _NO_SEARCH)
 
 
 def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
-    """Return whether each pair joins the only fixed geom with the only geom of a body.
+    """Return whether each pair joins one fixed geom with the only geom of a body.
 
     The order of the pairs then follows from the order of the bodies.
     """

@@ -13,7 +13,7 @@ from typing import Any, cast
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
 from shapechanger.envs.actions import check_actions
@@ -25,7 +25,6 @@ from shapechanger.envs.checks import (
 )
 from shapechanger.envs.vector.results import (
     InfoColumns,
-    Restart,
     StepResults,
     SubEnv,
     batched,
@@ -104,11 +103,8 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._action_shape = cast("tuple[int, ...]", self.single_action_space.shape)
-        space = self.observation_space
-        self._observations = np.zeros(cast("tuple[int, ...]", space.shape), space.dtype)
-        self._subs = [
-            SubEnv(env, row) for env, row in zip(self.envs, self._observations, strict=True)
-        ]
+        self._observations = cast("Any", create_empty_array)(first.observation_space, self.num_envs)
+        self._subs = [*map(SubEnv, self.envs, self._observations)]
         self._ended = np.zeros(self.num_envs, np.bool_)
         self._awaits_reset = True
         self.threads = 1 if self.render_mode == "human" else min(threads, self.num_envs)
@@ -285,7 +281,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
             def restart(i: int) -> None:
                 sub = self._subs[i]
-                results.restarts[i] = Restart(sub.row.copy(), sub.reset())
+                results.restarts[i] = sub.row.copy(), sub.reset()
 
             ended = np.flatnonzero(results.terminated | results.truncated).tolist()
             self._threads.do(restart, ended)
@@ -293,13 +289,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     def _conclude(
         self, numbers: list[int], moved: list[Any], actions: NDArray[Any], results: StepResults
     ) -> list[int]:
-        """Compute the results of envs of one kind whose physics has stepped.
-
-        Args:
-            numbers: Numbers of the envs.
-            moved: Binding, and state from before the physics, of each env.
-            actions: The action of each env.
-            results: Takes the results.
+        """Compute the results of envs of one kind whose physics has stepped; see `_advance`.
 
         Returns:
             Numbers of the envs whose simulation has diverged.

@@ -71,18 +71,6 @@ def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dic
     return batch
 
 
-class Restart(NamedTuple):
-    """A reset that followed the end of an episode within the same step.
-
-    Attributes:
-        final_observation: The last observation of the episode.
-        info: The info of the reset.
-    """
-
-    final_observation: NDArray[Any]
-    info: dict[str, Any]
-
-
 class StepResults:
     """Results of one step of all envs; threads may fill in different envs at the same time.
 
@@ -95,14 +83,15 @@ class StepResults:
         rewards: Shape (n,).
         terminated: Whether the step ended each episode, shape (n,).
         truncated: Whether each episode was cut off, shape (n,).
-        restarts: The envs that were reset within the step, by number.
+        restarts: Of the envs that were reset within the step, by number: the last observation of
+            the episode, and the info of the reset.
     """
 
     def __init__(self, num_envs: int) -> None:
         self.rewards = np.zeros(num_envs, np.float64)
         self.terminated = np.zeros(num_envs, np.bool_)
         self.truncated = np.zeros(num_envs, np.bool_)
-        self.restarts: dict[int, Restart] = {}
+        self.restarts: dict[int, tuple[NDArray[Any], dict[str, Any]]] = {}
         self._infos: dict[int, dict[str, Any]] = {}
         self._columns: list[InfoColumns] = []
 
@@ -112,16 +101,11 @@ class StepResults:
         self._infos[number] = info
 
     def put_columns(
-        self,
-        infos: InfoColumns,
-        rewards: NDArray[Any],
-        terminated: NDArray[np.bool_],
-        truncated: list[bool],
+        self, infos: InfoColumns, rewards: Any, terminated: Any, truncated: Any
     ) -> None:
-        """Set the results of several envs, whose numbers come with their infos."""
+        """Set the results of several envs, an array each; their numbers come with their infos."""
         where = infos.numbers
-        self.rewards[where] = rewards
-        self.terminated[where] = terminated
+        self.rewards[where], self.terminated[where] = rewards, terminated
         self.truncated[where] = truncated
         self._columns.append(infos)
 
@@ -192,18 +176,12 @@ class SubEnv:
 
     def tick(self) -> bool:
         """Count one more step; return whether the episode's time limit is reached."""
-        clock = self._clock
-        if clock is None:
+        if self._clock is None:
             return False
-        clock._elapsed_steps += 1
-        return clock._elapsed_steps >= clock._max_episode_steps
+        self._clock._elapsed_steps += 1
+        return self._clock._elapsed_steps >= self._clock._max_episode_steps
 
     def diverged(self, truncated: Any, info: dict[str, Any]) -> Step:
-        """Return the result of a step whose simulation has diverged.
-
-        Args:
-            truncated: Whether the step was truncated.
-            info: Info of the step.
-        """
+        """Return the result of a step with this end and info whose simulation has diverged."""
         self.row[~np.isfinite(self.row)] = 0.0
         return 0.0, True, truncated, {**info, "diverged": True}

@@ -30,7 +30,6 @@ class _Worker(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        """Run the tasks."""
         while (task := self.inbox.get()) is not None:
             job, answers = task
             answer: BaseException | None = None
@@ -137,7 +136,7 @@ class EnvThreads:
     def _settle(self) -> None:
         """Wait until all threads have finished their tasks.
 
-        After an interruption it is unknown which tasks were handed over, so each thread gets
+        After an interruption it is unknown which of them were handed over, so each thread gets
         another one that does nothing. A second interruption ends the wait.
         """
         answers = _Answers()

@@ -84,6 +84,11 @@ def static_geoms(model: mujoco.MjModel) -> NDArray[np.intp]:
     return np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
 
 
+def geom_type(model: mujoco.MjModel, geom: int) -> str:
+    """Return the name of a geom's shape, such as `CAPSULE`."""
+    return mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_")
+
+
 def differing_arrays(one: DeviceBody, other: DeviceBody) -> list[str]:
     """Return the names of the arrays that keep two bodies from sharing a batch."""
     names = {**one.shared, **other.shared}

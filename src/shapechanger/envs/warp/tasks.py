@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import partial
 from types import SimpleNamespace
-from typing import Any, ClassVar, Final, cast
+from typing import Any, ClassVar, Final
 
 import gymnasium as gym
 import mujoco
@@ -29,13 +29,13 @@ from shapechanger.envs.pendulum import (
     InvertedPendulumEnv,
 )
 from shapechanger.envs.runners import HalfCheetahEnv, HopperEnv, SwimmerEnv, Walker2dEnv
+from shapechanger.envs.warp.bodies import geom_type
 from shapechanger.envs.warp.kernels import normals, uniforms
 from shapechanger.envs.warp.worlds import DeviceOutcome, Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.layout import Layout
 from shapechanger.morphology.pose import StartRules
 
-_G: Final = mujoco.mjtGeom
 _SHAPES: Final = ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
 # Where the numbers of a joint have its quaternion.
 _QUATERNION_AT: Final = {int(mujoco.mjtJoint.mjJNT_FREE): 3, int(mujoco.mjtJoint.mjJNT_BALL): 0}
@@ -93,18 +93,15 @@ class DeviceTask(ABC):
         model, rules = self.model, StartRules(self.model)
         self._limited = torch.as_tensor(rules.limited_places, device=worlds.device)
         self._quaternions = [
-            int(address) + _QUATERNION_AT[int(kind)]
-            for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
-            if int(kind) in _QUATERNION_AT
+            int(address) + _QUATERNION_AT[kind]
+            for address, kind in zip(model.jnt_qposadr, model.jnt_type.tolist(), strict=True)
+            if kind in _QUATERNION_AT
         ]
         self._lift = rules.lift
         # Each floor with geoms of one shape.
         touching: dict[tuple[int, str], list[int]] = {}
         for floor, geom in rules.floor_pairs if rules.lift is not None else ():
-            below, shape = (
-                _G(int(model.geom_type[each])).name.removeprefix("mjGEOM_")
-                for each in (floor, geom)
-            )
+            below, shape = geom_type(model, floor), geom_type(model, geom)
             if below != "PLANE" or shape not in _SHAPES:
                 raise VectorEnvError(
                     "Bodies of backend='warp' start above planes, with spheres, capsules, "
@@ -344,14 +341,14 @@ class DeviceRunner(DeviceTask):
         velocities = worlds.qvel.clamp(-env.velocity_limit, env.velocity_limit)
         return torch.cat([worlds.qpos[:, hidden:], velocities], dim=1)
 
-    def healthy(self, worlds: Worlds) -> Tensor:
+    def _healthy(self, worlds: Worlds) -> Tensor:
         """Return whether each body is healthy, within heights where it has any, shape (n,)."""
         height, constants = worlds.qpos[:, self.height_at], worlds.constants
         if "low" not in constants:
             return torch.ones_like(height, dtype=torch.bool)
         return (constants["low"] < height) & (height < constants["high"])
 
-    def contact_cost(self, worlds: Worlds) -> Tensor | float:
+    def _contact_cost(self, worlds: Worlds) -> Tensor | float:
         """Return the cost of contact forces, shape (n,), or 0 for a task that has none."""
         return 0.0
 
@@ -359,13 +356,13 @@ class DeviceRunner(DeviceTask):
     def outcome(self, worlds: Worlds, before: Tensor, actions: Tensor) -> DeviceOutcome:
         env = self._env
         velocity = (self.place(worlds) - before) / worlds.constants["dt"][:, None]
-        healthy = self.healthy(worlds)
+        healthy = self._healthy(worlds)
         # What Gymnasium's formula asks its env for.
         there = SimpleNamespace(
             _forward_reward_weight=env._forward_reward_weight,
             healthy_reward=healthy * getattr(env, "_healthy_reward", 0.0),
             control_cost=partial(_cost, env._ctrl_cost_weight),
-            contact_cost=self.contact_cost(worlds),
+            contact_cost=self._contact_cost(worlds),
         )
         rewards, terms = _base(env)._get_rew(there, velocity[:, 0], actions)
         axes = "xy"[: self.place_size]
@@ -398,11 +395,10 @@ class DeviceCheetah(DeviceRunner):
 class DeviceWalker(DeviceRunner):
     """Walkers, which are healthy within heights and leans."""
 
-    def healthy(self, worlds: Worlds) -> Tensor:
-        """Return whether each body is healthy, shape (n,)."""
+    def _healthy(self, worlds: Worlds) -> Tensor:
         lean = worlds.qpos[:, 2]
         low, high = self._env._healthy_angle_range
-        return super().healthy(worlds) & (low < lean) & (lean < high)
+        return super()._healthy(worlds) & (low < lean) & (lean < high)
 
     @override
     def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
@@ -416,12 +412,11 @@ class DeviceWalker(DeviceRunner):
 class DeviceHopper(DeviceWalker):
     """Hoppers, which are healthy within heights, leans and states."""
 
-    def healthy(self, worlds: Worlds) -> Tensor:
-        """Return whether each body is healthy, shape (n,)."""
+    def _healthy(self, worlds: Worlds) -> Tensor:
         low, high = self._env._healthy_state_range
         state = torch.cat([worlds.qpos[:, 2:], worlds.qvel], dim=1)
         within = ((low < state) & (state < high)).all(dim=1)
-        return super().healthy(worlds) & within
+        return super()._healthy(worlds) & within
 
 
 # Blocks of numbers that a humanoid observes, each without the world's or the trunk's first rows.
@@ -437,11 +432,8 @@ class DeviceHumanoid(DeviceRunner):
 
     def __init__(self, env: Any, model: mujoco.MjModel, frame_skip: int) -> None:
         super().__init__(env, model, frame_skip)
-        self._blocks = [
-            (name, first)
-            for name, first in _BLOCKS.items()
-            if getattr(env, f"_include_{name}_in_observation") is True
-        ]
+        included = {name: getattr(env, f"_include_{name}_in_observation") for name in _BLOCKS}
+        self._blocks = [(name, first) for name, first in _BLOCKS.items() if included[name] is True]
 
     def place(self, worlds: Worlds) -> Tensor:
         """Return the place of the centre of mass, m, shape (n, 2)."""
@@ -453,11 +445,9 @@ class DeviceHumanoid(DeviceRunner):
         blocks = [getattr(worlds, name)[:, first:].flatten(1) for name, first in self._blocks]
         return torch.cat([super().observations(worlds), *blocks], dim=1)
 
-    def contact_cost(self, worlds: Worlds) -> Tensor:
-        """Return the cost of contact forces within the range of the task, shape (n,)."""
-        env = self._env
-        cost = _cost(env._contact_cost_weight, worlds.cfrc_ext)
-        return cost.clamp(*env._contact_cost_range)
+    def _contact_cost(self, worlds: Worlds) -> Tensor:
+        cost = _cost(self._env._contact_cost_weight, worlds.cfrc_ext)
+        return cost.clamp(*self._env._contact_cost_range)
 
     @override
     def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
@@ -484,6 +474,4 @@ TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
 
 def _base(env: Any) -> Any:
     """Return Gymnasium's class of an env."""
-    return cast(
-        "Any", next(each for each in type(env).__mro__ if each.__module__.startswith("gymnasium."))
-    )
+    return next(base for base in type(env).__mro__ if base.__module__.startswith("gymnasium."))

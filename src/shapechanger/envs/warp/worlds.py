@@ -13,7 +13,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shapechanger.envs.warp.bodies import ARMS, DeviceBody, differing_arrays, static_geoms
+from shapechanger.envs.warp.bodies import (
+    ARMS,
+    DeviceBody,
+    differing_arrays,
+    geom_type,
+    static_geoms,
+)
 from shapechanger.envs.warp.devices import as_torch, mjw, on, without_gradients, wp
 from shapechanger.envs.warp.kernels import follow_mujoco, uniforms
 from shapechanger.errors import VectorEnvError
@@ -33,17 +39,13 @@ _CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
 _OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
 # The most contacts that MuJoCo makes of two geoms; 8 for all other pairs.
 _CONTACTS: Final = {
-    ("PLANE", "SPHERE"): 1,
-    ("PLANE", "CAPSULE"): 2,
-    ("PLANE", "ELLIPSOID"): 1,
-    ("PLANE", "CYLINDER"): 4,
-    ("PLANE", "BOX"): 4,
-    ("SPHERE", "SPHERE"): 1,
-    ("SPHERE", "CAPSULE"): 1,
-    ("SPHERE", "CYLINDER"): 1,
-    ("SPHERE", "BOX"): 1,
-    ("CAPSULE", "CAPSULE"): 2,
-    ("CAPSULE", "BOX"): 2,
+    frozenset(kinds.split()): count
+    for count, pairs in {
+        1: "PLANE SPHERE, PLANE ELLIPSOID, SPHERE, SPHERE CAPSULE, SPHERE CYLINDER, SPHERE BOX",
+        2: "PLANE CAPSULE, CAPSULE, CAPSULE BOX",
+        4: "PLANE CYLINDER, PLANE BOX",
+    }.items()
+    for kinds in pairs.split(", ")
 }
 _MOST_CONTACTS: Final = 8
 # Most rows of one equality.
@@ -382,12 +384,11 @@ def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> dict[str, int]:
     """
     contacts = rows = 0
     for pair in pairs.tolist():
-        kinds = sorted(int(model.geom_type[geom]) for geom in pair)
-        first, second = (mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_") for kind in kinds)
-        count = _CONTACTS.get((first, second), _MOST_CONTACTS)
-        condim = max([*(model.geom_condim[geom] for geom in pair), *model.pair_dim])
+        kinds = frozenset(geom_type(model, geom) for geom in pair)
+        count = _CONTACTS.get(kinds, _MOST_CONTACTS)
+        condim = int(max([*model.geom_condim[pair], *model.pair_dim]))
         contacts += count
-        rows += count * max(1, 2 * (int(condim) - 1))
+        rows += count * max(1, 2 * (condim - 1))
     rows += int(model.jnt_limited.sum()) + 2 * int(model.ntendon)
     rows += int(np.count_nonzero(model.dof_frictionloss)) and int(model.nv)
     rows += _ROWS_PER_EQUALITY * int(model.neq)

@@ -70,9 +70,9 @@ class ThreadVecEnv(DummyVecEnv):
         cut_off = results.truncated & ~results.terminated
         for info, cut in zip(infos, cut_off.tolist(), strict=True):
             info["TimeLimit.truncated"] = cut
-        for i, restart in results.restarts.items():
-            infos[i]["terminal_observation"] = restart.final_observation
-            self.reset_infos[i] = restart.info
+        for i, (last, info) in results.restarts.items():
+            infos[i]["terminal_observation"] = last
+            self.reset_infos[i] = info
         ends = results.terminated | results.truncated
         return observations, results.rewards.astype(np.float32), ends, infos
 
