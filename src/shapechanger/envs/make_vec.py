@@ -184,23 +184,18 @@ def _cores() -> int:
 
 
 def _at_least_one(what: str, number: int) -> int:
-    try:
-        count = operator.index(number)
-    except TypeError:
-        count = 0
-    if count < 1:
+    if not hasattr(number, "__index__") or operator.index(number) < 1:
         raise VectorEnvError(f"A vector env needs at least one {what}, got {number!r}.")
-    return count
+    return operator.index(number)
 
 
 def _mode(mode: AutoresetMode | str | None, backend: str) -> AutoresetMode:
     if mode is None:
         return AutoresetMode.SAME_STEP if backend == "warp" else AutoresetMode.NEXT_STEP
-    try:
-        wanted = AutoresetMode(mode)
-    except ValueError:
-        known = [known.value for known in AutoresetMode]
-        raise UnknownName("autoreset mode", str(mode), known) from None
+    known = {known.value: known for known in AutoresetMode}
+    wanted = known.get(mode.value if isinstance(mode, AutoresetMode) else mode)
+    if wanted is None:
+        raise UnknownName("autoreset mode", str(mode), known)
     if backend == "warp" and wanted is not AutoresetMode.SAME_STEP:
         raise VectorEnvError(
             f"backend='warp' has no autoreset mode {wanted.value}: its worlds start again in the "

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import chdir
+
 import pytest
 
 from shapechanger.envs.stepping.tuned import TunedStep
@@ -11,3 +14,10 @@ from shapechanger.envs.stepping.tuned import TunedStep
 def no_patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Search for the fast model at the first step of a body."""
     monkeypatch.setattr(TunedStep, "patience", 0)
+
+
+@pytest.fixture(scope="module")
+def log_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Change to a temporary folder, since MuJoCo writes a log file."""
+    with chdir(tmp_path_factory.mktemp("log")):
+        yield

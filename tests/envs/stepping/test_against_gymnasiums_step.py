@@ -98,26 +98,6 @@ def test_pendulums(seed: int | str) -> None:
     assert _steps_fast(ours)
 
 
-def test_the_fast_model_is_shared() -> None:
-    """All envs of a body use one fast model."""
-    envs = [AntEnv("BigAnt") for _ in range(3)]
-    for env in envs:
-        env.reset(seed=0)
-        env.step(np.zeros(8))
-    assert len({id(env._bound.stepping) for env in envs}) == 1
-
-
-def test_a_new_body_has_its_own_fast_model() -> None:
-    ours, theirs = _ants("Ant")
-    for body in ("Ant", "BigAnt", "AmputatedAnt", "Ant"):
-        for env in (ours, theirs):
-            env.reset(seed=1, options={"body": body})
-        for _ in range(20):
-            action = np.full(8, 0.5, np.float32)
-            assert same(ours.step(action), theirs.step(action))
-        assert _steps_fast(ours)
-
-
 def test_steps_start_from_a_set_state() -> None:
     """`set_state` and writes to the public data take effect."""
     ours, theirs = _ants("Ant")

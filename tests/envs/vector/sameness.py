@@ -36,6 +36,9 @@ def require_same(ours: Any, theirs: Any, where: str = "") -> None:
 
 def play_side_by_side(ours: Any, theirs: Any, steps: int, mode: str, seed: int = 0) -> int:
     """Step two vector envs with the same random actions; return the number of ended episodes."""
+    for name in ("observation_space", "action_space"):
+        for whole in (name, f"single_{name}"):
+            assert getattr(ours, whole) == getattr(theirs, whole)
     rng = np.random.default_rng(seed)
     space = ours.single_action_space
     require_same(ours.reset(seed=seed), theirs.reset(seed=seed), "reset")

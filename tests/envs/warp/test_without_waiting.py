@@ -27,23 +27,6 @@ def _actions(envs: Any, number: int) -> Any:
     return moved if isinstance(envs.action_space, gym.spaces.Tuple) else moved[0]
 
 
-def test_the_pretended_device_notices(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Questions, copies, NumPy and mixtures of devices are counted or fail as on a GPU."""
-    with pretended_device(monkeypatch) as device:
-        there = torch.arange(3.0, device="cuda:0")
-        assert there.device.type == "cuda"
-        assert bool((there > 1.0).any())
-        there[there > 1.0] = there[:1]
-        there[[0, 1]] = 5.0
-        assert len(there + torch.ones(3)) == 3
-        assert sum(device.questions.values()) == 2
-        assert sum(device.copies.values()) == 1
-        assert sum(device.mixed.values()) == 1
-        with pytest.raises(TypeError, match="to NumPy"):
-            there.numpy()
-        assert there.cpu().numpy().shape == (3,)
-
-
 @pytest.mark.parametrize(
     ("name", "questions", "copies", "arguments"),
     [

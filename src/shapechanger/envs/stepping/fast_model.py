@@ -134,14 +134,9 @@ def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
 
 def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     """Return whether two models have the same numbers, except names and pairs."""
-    for name in dir(model):
-        mine: Any = getattr(model, name)
-        if type(mine) is not np.ndarray or name.startswith(("pair_", "name", "_")):
-            continue
-        its: Any = getattr(other, name)
-        if its.dtype != mine.dtype or not np.array_equal(its, mine):
-            return False
-    return True
+    own = [name for name in dir(model) if not name.startswith(("pair_", "name", "_"))]
+    names = [name for name in own if type(getattr(model, name)) is np.ndarray]
+    return all(np.array_equal(getattr(model, name), getattr(other, name)) for name in names)
 
 
 # Fields that must be equal after every step; they include everything that the next step uses.

@@ -106,7 +106,17 @@ class EnvThreads:
             first()
             errors = [answers.get() for _ in workers]
         except BaseException:
-            self._settle()
+            # It is unknown which jobs were handed over, so wait until each thread has done another
+            # one, which does nothing.
+            settled = _Answers()
+            try:
+                for worker in workers:
+                    worker.inbox.put((lambda: None, settled))
+                for _ in workers:
+                    settled.get()
+            except BaseException:  # A second interruption ends the wait.
+                self.lost = True
+                raise
             raise
         for error in errors:
             if error is not None:
@@ -132,25 +142,6 @@ class EnvThreads:
         while len(self._workers) < len(self.parts) - 1:
             self._workers.append(_Worker())
         return self._workers
-
-    def _settle(self) -> None:
-        """Wait until all threads have finished their tasks.
-
-        After an interruption it is unknown which of them were handed over, so each thread gets
-        another one that does nothing. A second interruption ends the wait.
-        """
-        answers = _Answers()
-        try:
-            for worker in self._workers:
-                worker.inbox.put((lambda: None, answers))
-            for _ in self._workers:
-                answers.get()
-        except BaseException:
-            self.lost = True
-            for worker in self._workers:
-                worker.inbox.put(None)
-            self._workers = []
-            raise
 
 
 def attempt(work: Callable[[int], object], number: int, failures: Failures) -> None:

@@ -58,9 +58,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         num_envs: How many worlds there are.
         device: Name of the device.
         redraws: Whether `bodies` is a pool, of which each start of an episode draws one.
-        limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
-            for; as many as it can ever have where a number is missing.
-        task_infos: Whether steps and resets return the infos of the CPU env.
+        limits: `nconmax` and `njmax` of `make_vec`.
+        task_infos: As in `make_vec`.
 
     Attributes:
         device: Name of the device.
@@ -116,9 +115,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             for name, spaces in ((f"single_{side}_space", single), (f"{side}_space", whole)):
                 setattr(self, name, spaces[0] if self._flat else gym.spaces.Tuple(spaces))
         self.made_from = reader.spec
-        self.max_episode_steps: int | None = (
-            None if reader.spec is None else reader.spec.max_episode_steps
-        )
+        self.max_episode_steps: int | None = getattr(reader.spec, "max_episode_steps", None)
         self._seeds, self._episodes, self.episode_steps = torch.zeros(
             (3, num_envs), dtype=torch.int64, device=device
         )
@@ -214,10 +211,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._seeds[where], self._episodes[where] = given, 0
 
     def _start(self, mask: Tensor) -> tuple[list[Tensor], dict[str, Tensor]]:
-        """Start an episode in some worlds.
-
-        Args:
-            mask: Which worlds, shape (n,).
+        """Start an episode in the worlds of a mask, shape (n,).
 
         Returns:
             Observations of each batch, and infos of all worlds; rows outside the mask are of the
@@ -284,11 +278,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._steps += 1
         if self._steps % _LOOKS_EVERY == 0:
             self._warn_of_overflows()
-        observations = [
+        present = [
             torch.where(self._rows(batch, ended)[:, None], start, seen)
             for batch, start, seen in zip(self.batches, starts, observations, strict=True)
         ]
-        return self._out(observations), rewards, terminated, truncated, infos
+        return self._out(present), rewards, terminated, truncated, infos
 
     def _warn_of_overflows(self) -> None:
         for batch in self.batches:
@@ -301,11 +295,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                 )
 
     def _checked(self, actions: Any) -> list[Tensor]:
-        """Return the actions of each batch, on the device.
-
-        Raises:
-            BadAction: If they have another shape or are not finite.
-        """
+        """Return the actions of each batch, on the device, or refuse them."""
         if self._flat:
             whole = self._tensor(actions, (self.num_envs, self.action_layout.size), "")
             each = [self._rows(batch, whole) for batch in self.batches]
@@ -378,11 +368,7 @@ def _list(tensor: Tensor) -> list[Any]:
 
 
 def _merged(*parts: tuple[dict[str, Tensor], Tensor]) -> dict[str, Any]:
-    """Return infos as Gymnasium's vector envs do, with a mask under `_key` of each key.
-
-    Args:
-        *parts: Infos, tensors of shape (n, ...), and which worlds have them, shape (n,).
-    """
+    """Return pairs of infos and a mask as Gymnasium's infos, with a mask under `_key` of each."""
     found: dict[str, Any] = {}
     for infos, mask in parts:
         for name, value in infos.items():

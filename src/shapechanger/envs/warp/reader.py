@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import gymnasium as gym
 
@@ -84,12 +84,7 @@ _READERS: Final[dict[type, _MakeReader]] = {
 
 
 def register_reader(env_class: type, reader: _MakeReader) -> None:
-    """Let a device read the bodies of an env in another way than by their edits.
-
-    Args:
-        env_class: Class of the CPU env. Its subclasses do not count: they may change the task.
-        reader: Makes the reader from a CPU env, a maker of CPU envs and their arguments.
-    """
+    """Let a device read the bodies of a class of envs, without its subclasses, in another way."""
     _READERS[env_class] = reader
 
 
@@ -123,49 +118,37 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
     )
 
 
-class Group(NamedTuple):
-    """Worlds whose bodies have arrays of the same shapes; the arguments of `Worlds`.
-
-    Attributes:
-        task: Their task.
-        numbers: Their numbers in the vector env.
-        bodies: The bodies that they can have.
-        each: The body of each world.
-    """
-
-    task: DeviceTask
-    numbers: list[int]
-    bodies: dict[Any, DeviceBody]
-    each: list[Any]
-
-
-def grouped(reader: BodyReader, bodies: Sequence[Any], num_envs: int) -> list[Group]:
+def grouped(
+    reader: BodyReader, bodies: Sequence[Any], num_envs: int
+) -> list[tuple[DeviceTask, list[int], dict[Any, DeviceBody], list[Any]]]:
     """Compile bodies, and group worlds that have them in turn by the shapes of their arrays.
+
+    Returns:
+        The first arguments of each group's `Worlds`.
 
     Raises:
         VectorEnvError: If there are fewer worlds than shapes.
     """
+    kinds: list[tuple[DeviceTask, dict[Any, DeviceBody]]] = []
+    for body in dict.fromkeys(bodies):
+        read, task = reader.read(body)
+        for _, known in kinds:
+            if not differing_arrays(next(iter(known.values())), read):
+                known[body] = read
+                break
+        else:
+            kinds.append((task, {body: read}))
     # A pool of more bodies than worlds is spread over them.
     step = max(1, len(bodies) // num_envs)
     each = [bodies[world * step % len(bodies)] for world in range(num_envs)]
-    groups: list[Group] = []
-    for body in dict.fromkeys(bodies):
-        read, task = reader.read(body)
-        for group in groups:
-            if not differing_arrays(next(iter(group.bodies.values())), read):
-                break
-        else:
-            group = Group(task, [], {}, [])
-            groups.append(group)
-        group.bodies[body] = read
-    for group in groups:
-        group.numbers.extend(world for world, body in enumerate(each) if body in group.bodies)
-        group.each.extend(each[world] for world in group.numbers)
-        if not group.numbers:
-            name = next(iter(group.bodies.values())).name
+    groups: list[tuple[DeviceTask, list[int], dict[Any, DeviceBody], list[Any]]] = []
+    for task, known in kinds:
+        worlds = [world for world, body in enumerate(each) if body in known]
+        if not worlds:
             raise VectorEnvError(
-                f"No world has bodies like {name}: the bodies of the pool form {len(groups)} "
-                f"batches, because their arrays differ, and there are {num_envs} worlds, so make "
-                "more."
+                f"No world has bodies like {next(iter(known.values())).name}: the bodies of the "
+                f"pool form {len(kinds)} batches, because their arrays differ, and there are "
+                f"{num_envs} worlds, so make more."
             )
+        groups.append((task, worlds, known, [each[world] for world in worlds]))
     return groups

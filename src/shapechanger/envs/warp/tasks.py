@@ -193,10 +193,8 @@ def length(vectors: Tensor) -> Tensor:
 def _reach(shape: str, size: Tensor, towards: Tensor) -> Tensor:
     """Return how far geoms of one shape reach from their middle in a direction, m, shape (n, k).
 
-    Args:
-        shape: Their shape.
-        size: Their sizes as MuJoCo has them, m, shape (n or 1, k, 3).
-        towards: The direction in each geom's own axes, shape (n, k, 3).
+    The sizes, shape (n or 1, k, 3), are MuJoCo's, m; the direction, shape (n, k, 3), is in each
+    geom's own axes.
     """
     radius, half = size[..., 0], size[..., 1]
     if shape == "SPHERE":

@@ -155,11 +155,7 @@ class Worlds:
         def __getattr__(self, name: str) -> Tensor: ...
 
     def row(self, name: str) -> Tensor:
-        """Return an array of the model, such as `geom_size`, shape (n or 1, ...), as of each world.
-
-        Args:
-            name: Name of the field.
-        """
+        """Return a field of the model, such as `geom_size`, as of each world, (n or 1, ...)."""
         return self._rows.get(name, self._by_world(name, self._array(name)))
 
     def _by_world(self, name: str, array: Any) -> Tensor:
@@ -172,11 +168,7 @@ class Worlds:
         return getattr(self._model.opt if owner else self._model, field)
 
     def require_fitting(self, body: DeviceBody) -> None:
-        """Require that a body has the arrays of these worlds.
-
-        Raises:
-            VectorEnvError: If it has not.
-        """
+        """Raise a VectorEnvError unless a body has the arrays of these worlds."""
         first = next(iter(self.bodies.values()))
         if arrays := differing_arrays(first, body):
             more = f" and {len(arrays) - _MOST_LISTED} more" if len(arrays) > _MOST_LISTED else ""
@@ -376,12 +368,7 @@ def _stacked(arrays: Sequence[NDArray[Any]], like: Tensor) -> Tensor:
 
 
 def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> dict[str, int]:
-    """Return the most contacts (`nconmax`) and rows of constraints (`njmax`) of a world.
-
-    Args:
-        model: The model.
-        pairs: Geoms that can touch, shape (k, 2).
-    """
+    """Return the most contacts and rows of constraints where pairs, (k, 2), of geoms can touch."""
     contacts = rows = 0
     for pair in pairs.tolist():
         kinds = frozenset(geom_type(model, geom) for geom in pair)
