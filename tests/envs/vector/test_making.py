@@ -85,6 +85,9 @@ def test_each_env_may_have_a_body_of_its_own() -> None:
         plain = lengths[0][0]
         parts = np.array(lengths) / plain
         np.testing.assert_allclose(parts, [[1.0, 1.0], [2.0, 2.0], [1.3, 1.0], [1.0, 0.5]])
+        for given, expected in (("fair", ("fair",) * 4), (list("abcd"), tuple("abcd"))):
+            envs.set_attr("mood", given)
+            assert envs.get_attr("mood") == expected
         envs.close()
 
 

@@ -29,17 +29,8 @@ _CPU = torch.device("cpu")
 _DEVICE = torch.device("cuda:0")
 _QUESTIONS = frozenset(
     [
-        "item",
-        "tolist",
-        "__bool__",
-        "__float__",
-        "__int__",
-        "__index__",
-        "nonzero",
-        "equal",
-        "allclose",
-        "unique",
-        "masked_select",
+        *("item", "tolist", "__bool__", "__float__", "__int__", "__index__", "nonzero", "equal"),
+        *("allclose", "unique", "masked_select"),
     ]
 )
 _TO_NUMPY = frozenset({"numpy", "__array__"})
@@ -47,7 +38,7 @@ _MAKES = frozenset({"to", "as_tensor", "tensor", "asarray"})
 _READS = frozenset({"__setitem__", "index_put_", "index_put", "__getitem__"})
 # Functions that take tensors of two devices, or tell nothing of one.
 _FREE = frozenset(
-    {"copy_", "__repr__", "__format__", "__hash__", "__len__", "size", "dim", "as_tensor"}
+    ["copy_", "__repr__", "__format__", "__hash__", "__len__", "size", "dim", "as_tensor"]
 )
 
 
@@ -79,14 +70,13 @@ class PretendedDevice(TorchFunctionMode):
 
     def __init__(self) -> None:
         super().__init__()
-        self.questions: Counter[str] = Counter()
-        self.copies: Counter[str] = Counter()
-        self.mixed: Counter[str] = Counter()
+        self.forget()
 
     def forget(self) -> None:
         """Start counting from zero."""
-        for counter in (self.questions, self.copies, self.mixed):
-            counter.clear()
+        self.questions: Counter[str] = Counter()
+        self.copies: Counter[str] = Counter()
+        self.mixed: Counter[str] = Counter()
 
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         """Call a function of torch, and note what a GPU would do."""

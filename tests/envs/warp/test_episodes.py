@@ -63,16 +63,14 @@ def test_infos_of_a_restart_join_those_of_steps() -> None:
     assert not infos["_x_velocity"].any()
 
 
-def test_ends_and_divergence_are_always_in_the_infos() -> None:
+@pytest.mark.parametrize("task_infos", [True, False])
+def test_ends_and_divergence_are_always_in_the_infos(task_infos: bool) -> None:
     """A learner reads them without asking whether they are there; task infos can be left out."""
-    for task_infos in (True, False):
-        envs = pendulums(task_infos=task_infos)
-        infos = envs.step(torch.zeros(WORLDS, 1))[-1]
-        for name in ("final_obs", "_final_obs", "diverged", "_diverged"):
-            assert len(infos[name]) == WORLDS
-        assert not infos["_final_obs"].any()
-        assert not infos["diverged"].any()
-        assert ("reward_survive" in infos) == task_infos
+    infos = pendulums(task_infos=task_infos).step(torch.zeros(WORLDS, 1))[-1]
+    always = ("final_obs", "_final_obs", "diverged", "_diverged")
+    assert all(len(infos[name]) == WORLDS for name in always)
+    assert not (infos["_final_obs"] | infos["diverged"]).any()
+    assert ("reward_survive" in infos) == task_infos
 
 
 def test_time_limits_are_those_of_the_id() -> None:

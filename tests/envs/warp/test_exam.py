@@ -64,9 +64,13 @@ def test_a_step_from_the_same_state_has_the_same_results(
 
 
 def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
-    """A start state is feasible by the CPU env's rules, and observed as there."""
+    """A start state is feasible by the CPU env's rules, and observed and named as there."""
     worlds, alone = pair
     observations, infos = worlds.reset(seed=5)
+    assert worlds.observation_layout == alone[0].observation_layout
+    assert worlds.action_layout == alone[0].action_layout
+    assert worlds.observation_space.contains(observations.cpu().numpy())
+    assert worlds.action_space.shape == (WORLDS, worlds.action_layout.size)
     batch = worlds.batches[0]
     for i, env in enumerate(alone):
         qpos, qvel = (x[i].double().cpu().numpy() for x in (batch.qpos, batch.qvel))
@@ -78,14 +82,3 @@ def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> N
         assert apart(observations[i], env._get_obs()) < OBSERVATION_TOLERANCE
         for name, value in env._get_reset_info().items():
             assert apart(infos[name][i], value) < OBSERVATION_TOLERANCE, name
-
-
-def test_layouts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
-    """Each number has the CPU env's name, and the spaces fit the tensors."""
-    worlds, alone = pair
-    assert worlds.observation_layout == alone[0].observation_layout
-    assert worlds.action_layout == alone[0].action_layout
-    observations, _ = worlds.reset(seed=0)
-    assert observations.shape == worlds.observation_space.shape
-    assert worlds.observation_space.contains(observations.cpu().numpy())
-    assert worlds.action_space.shape == (WORLDS, worlds.action_layout.size)

@@ -6,7 +6,7 @@ import threading
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from functools import partial
 from typing import Any, cast
 
@@ -163,19 +163,16 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self._require_open()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         numbers = list(range(self.num_envs) if chosen is None else chosen)
-        compiling = threading.Lock()
+        changes_bodies = any(given and "body" in given for given in options)
+        # One thread at a time compiles a body, and its renderer is replaced.
+        compiling = threading.Lock() if changes_bodies else nullcontext()
 
         def start(i: int) -> None:
-            infos[i] = self._subs[i].reset(seeds[i], options[i])
+            with compiling:
+                infos[i] = self._subs[i].reset(seeds[i], options[i])
 
-        def start_alone(i: int) -> None:
-            with compiling:  # One thread at a time compiles a body, and its renderer is replaced.
-                start(i)
-
-        if any(given and "body" in given for given in options):
-            self._guarded(lambda: self._at_home(start_alone, numbers))
-        else:
-            self._guarded(lambda: self._threads.do(start, numbers))
+        run = self._at_home if changes_bodies else self._threads.do
+        self._guarded(lambda: run(start, numbers))
         self._ended[numbers] = False
         return self._present_observations(), infos
 
