@@ -104,7 +104,8 @@ class StepResults:
         self, infos: InfoColumns, rewards: Any, terminated: Any, truncated: Any
     ) -> None:
         """Set the results of several envs, an array each; their numbers come with their infos."""
-        where = infos.numbers
+        everyone = len(infos.numbers) == self.rewards.size
+        where: Any = slice(None) if everyone else infos.numbers
         self.rewards[where], self.terminated[where] = rewards, terminated
         self.truncated[where] = truncated
         self._columns.append(infos)

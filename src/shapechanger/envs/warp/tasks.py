@@ -47,7 +47,7 @@ _VELOCITIES: Final = 1
 class DeviceTask(ABC):
     """Start, action, observation, reward and end of a task in the worlds of one batch.
 
-    Starts are those of `StartRules`: noise around each body's pose, made feasible.
+    Starts follow `StartRules`: noise around each body's pose, made feasible.
 
     Args:
         env: A CPU env of the task, with any body of the batch.

@@ -139,14 +139,12 @@ class Worlds:
         self._cleared = [as_torch(array) for array in cleared if array.size]
         # Fields of the model with a row per world.
         self._rows: dict[str, Tensor] = {}
-        # The rows of each body for these and the constants; and for the places of static geoms.
+        self.constants: dict[str, Tensor] = {}
+        # The rows of each body for these, and for the places of static geoms.
         self._tables: dict[str, Tensor] = {}
         self._constant_tables: dict[str, Tensor] = {}
         self._static_tables: dict[str, Tensor] = {}
-        self._hold(bodies)
-        self.chosen = self._places(each)
-        self.constants = {name: table[self.chosen] for name, table in self._constant_tables.items()}
-        self._choose(self.chosen)
+        self.change_bodies(bodies, each)
         task.attach(self)
         self._before = task.place(self).clone()
 
@@ -186,12 +184,8 @@ class Worlds:
             each: The edits of each world's body.
         """
         self._hold(bodies)
-        self._choose(self._places(each))
-
-    def _places(self, each: Sequence[Any]) -> Tensor:
-        """Return the place of each world's body among the bodies, shape (n,)."""
-        place = {body: i for i, body in enumerate(self.bodies)}
-        return torch.tensor([place[body] for body in each], device=self.device)
+        place = {body: i for i, body in enumerate(bodies)}
+        self._choose(torch.tensor([place[body] for body in each], device=self.device))
 
     def _hold(self, bodies: Mapping[Any, DeviceBody]) -> None:
         """Keep the numbers of bodies on the device, from which `_choose` gathers.
@@ -217,9 +211,10 @@ class Worlds:
                 self._static_tables[name] = _stacked([body.static[name] for body in held], like)
         for name in held[0].constants:
             rows = np.stack([body.constants[name] for body in held])
-            self._constant_tables[name] = torch.as_tensor(
-                rows, dtype=self.task.precision, device=self.device
-            )
+            table = torch.as_tensor(rows, dtype=self.task.precision, device=self.device)
+            self._constant_tables[name] = table
+            if name not in self.constants:
+                self.constants[name] = table.new_empty((self.count, *table.shape[1:]))
 
     def _choose(self, chosen: Tensor) -> None:
         """Give each world one of the held bodies, without asking the device anything."""
