@@ -8,7 +8,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
+from shapechanger.policy import load_policy
 from shapechanger.vehicles.envs.demonstrators import CLONES
 
 _SIZE: Final = (120, 160, 3)
@@ -17,7 +18,7 @@ _SIZE: Final = (120, 160, 3)
 def find_clone(vehicle: str) -> CameraPolicy | None:
     """Return the shipped policy of a vehicle; None if none ships."""
     path = CLONES.get(vehicle)
-    return None if path is None or not path.exists() else CameraPolicy.load(path)
+    return None if path is None or not path.exists() else load_policy(path)
 
 
 def sighted(policy: CameraPolicy) -> Callable[[Any], NDArray[np.float32]]:

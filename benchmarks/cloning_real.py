@@ -6,7 +6,7 @@ the key that was held, from the start of a drive of 2017.
 **Trained on them.** Five splits train on the earlier frames and test on the next segment, with five
 seeds each (SEEDS overrides the number): our clone and a plain network. Both train on the same
 frames; our clone takes its held-out steps for early stopping from them. Its settings
-(`shapechanger.demos.cloning.settings.DEMOS`) were chosen on these splits, so the rows are slightly
+(`shapechanger.demos.cloning.clone.DEMOS`) were chosen on these splits, so the rows are slightly
 optimistic. They were chosen by accuracy, with one to three seeds each:
 
 - Inputs, with kernel ridge regression instead of a network: pixels (grey or coloured, 8 to 32
@@ -48,14 +48,19 @@ from torch.nn import functional
 
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.cloning.card import class_numbers
+from shapechanger.demos.cloning.clone import (
+    DEMOS,
+    Augmentation,
+    CloneSettings,
+    class_numbers,
+    prepare,
+)
 from shapechanger.demos.cloning.evaluation import macro_f1, output_fields
 from shapechanger.demos.cloning.learn import learn
-from shapechanger.demos.cloning.pictures import Framing, prepare
-from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.settings import DEMOS, Augmentation, CloneSettings
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.layout import Feature, Layout
+from shapechanger.policy import Framing, load_policy
 from shapechanger.vehicles.cloning import record_demonstrations
 from shapechanger.vehicles.envs.demonstrators import CLONES
 
@@ -295,7 +300,7 @@ def held_out() -> list[Row]:
                 ]
                 seen = _pictures(data)[future]
                 outputs = np.mean([each.outputs(seen, None) for each in policies], axis=0)
-                known = class_numbers(np.array(policies[0].card.classes, np.float32), classes)
+                known = class_numbers(np.array(policies[0].net.classes, np.float32), classes)
                 reached[name][i, seed] = (known[outputs.argmax(axis=1)] == truth[future]).mean()
     base = reached[_BASE]
     found: list[Row] = []
@@ -325,7 +330,7 @@ def _from_simulation(data: Dataset) -> list[Row]:
     keys = np.stack((right.astype(np.float32) - left, np.ones(len(truth), np.float32)), axis=1)
     steered = replace(data, actions=keys, action_layout=_STEERING)
     later = np.arange(len(truth)) >= FEW
-    sources = {"as shipped": CameraPolicy.load(CLONES["car"]), "randomised": _randomised()}
+    sources = {"as shipped": load_policy(CLONES["car"]), "randomised": _randomised()}
     found: list[Row] = []
     for name, source in sources.items():
         steering = source.predict_many(pictures)[:, 0]
@@ -363,7 +368,7 @@ def _from_simulation(data: Dataset) -> list[Row]:
 def _randomised() -> CameraPolicy:
     """Return a clone of the expert in corridors with random light, colours and camera poses."""
     if KEPT.exists():
-        return CameraPolicy.load(KEPT)
+        return load_policy(KEPT)
     settings = CloneSettings(held_out=0.0)
     shown = record_demonstrations(
         EnvRef("shapechanger/Car-v1", {"randomise": True}), STEPS, 200, 0, settings.framing

@@ -23,7 +23,7 @@ from benchmarks.driving import DriveResult, DriveScore, drive
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from shapechanger.cli import main
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.policy import load_policy
 from shapechanger.vehicles.envs import VehicleEnv
 
 LAYOUTS: Final = 100
@@ -96,7 +96,7 @@ class _Round:
         """Drive on held-out courses and cache the results next to the policy."""
         kept = policy.with_suffix(f".{len(self._courses)}.drives")
         if not kept.exists():
-            act = sighted(CameraPolicy.load(policy))
+            act = sighted(load_policy(policy))
             with closing(VehicleEnv(self._vehicle, courses="held-out", put_back=True)) as env:
                 drives = [drive(env, act, course=course) for course in self._courses]
             kept.write_text(json.dumps([asdict(each) for each in drives]))

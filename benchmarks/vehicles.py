@@ -20,7 +20,6 @@ from benchmarks.clones import blind, find_clone, sighted
 from benchmarks.driving import LIMIT_S, METRES, Act, DriveScore, drive
 from benchmarks.row import Row, asked
 from shapechanger.cli.train import Train
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.vehicles.bodies import VEHICLES
@@ -214,7 +213,7 @@ def students() -> list[Row]:
         with closing(RangesEnv("car", courses="held-out", put_back=True)) as env:
             knows = _score(env, _alone(load_policy(teacher)), layouts(STUDENT_LAYOUTS))
         with closing(_env("car", image=True)) as env:
-            score = _score(env, sighted(CameraPolicy.load(student)), layouts(STUDENT_LAYOUTS))
+            score = _score(env, sighted(load_policy(student)), layouts(STUDENT_LAYOUTS))
         for name, one in (("teacher", knows), ("student", score)):
             rows += [
                 Row(

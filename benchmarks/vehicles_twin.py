@@ -20,9 +20,10 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from benchmarks.waypoints import taught_source
-from shapechanger.demos.cloning.card import OnnxClone
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.clone import OnnxClone
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.layout import Layout
+from shapechanger.policy import load_policy
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
@@ -118,7 +119,7 @@ def on_board(vehicle: str = "car") -> list[Row]:
             file = Path(place, "policy.onnx")
             policy.export(file, control_hz=1e3 / _PERIOD_MS)
             if policy is clone:
-                rows.append(_inference_row(vehicle, OnnxClone(file)))
+                rows.append(_inference_row(vehicle, load_policy(file)))
             here = DriveScore.of([drive(env, policy.predict, course=c) for c in courses])
             drives: list[DriveResult] = []
             for course in courses:

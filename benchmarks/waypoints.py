@@ -28,12 +28,13 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
 from shapechanger.contract.env_ref import EnvRef
+from shapechanger.demos.cloning.clone import ShrunkFrames
 from shapechanger.demos.cloning.learn import learn
-from shapechanger.demos.cloning.pictures import ShrunkFrames
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset, merged
 from shapechanger.demos.drivers import DriverDecision, Pilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
+from shapechanger.policy import load_policy
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
 from shapechanger.transfer.executor import use_one_thread
@@ -334,7 +335,7 @@ def _steered(pair: tuple[str, str]) -> list[DriveResult]:
     kept = OUT / f"steering-{source}-{target}.json"
     if kept.exists():
         return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
-    policy = CameraPolicy.load(CLONES[source])
+    policy = load_policy(CLONES[source])
     with closing(VehicleEnv(target, courses="held-out", put_back=True)) as env:
         drives = [drive(env, policy.predict, course=course) for course in STEERED_COURSES]
     kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
@@ -369,7 +370,7 @@ def taught_source(name: str, seed: int) -> CameraPolicy:
     """
     path = OUT / f"{name}-{seed}.safetensors"
     if path.exists():
-        return CameraPolicy.load(path)
+        return load_policy(path)
     source = SOURCES.get(name) or BY_STEERING[name]
     settings = cast("CloningSettings", LEARNERS["waypoint"])
     if source.labels != "path":

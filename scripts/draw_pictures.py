@@ -22,7 +22,6 @@ from PIL import Image
 
 from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.study_films import film_study, median_index, view_distance
 from shapechanger.files import read_json
 from shapechanger.finger.task import POLICIES
@@ -209,7 +208,7 @@ def _driving(
 ) -> list[tuple[Picture, Picture]]:
     """Frames from outside and through the camera of a vehicle that a shipped clone drives."""
     env = cast("Any", EnvRef(f"shapechanger/{name}-v1", {"courses": "held-out"}).make())
-    policy = CameraPolicy.load(CLONES[driver])
+    policy = load_policy(CLONES[driver])
     picture, _ = env.reset(seed=_COURSE)
     world = env.unwrapped.world
     frames: list[tuple[Picture, Picture]] = []

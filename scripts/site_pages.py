@@ -314,7 +314,6 @@ MODULES: Final = (
     "shapechanger.robot.client.known_robots",
     "shapechanger.robot.link.messages",
     "shapechanger.transfer.study",
-    "shapechanger.transfer.learners.card",
     "shapechanger.transfer.learners.policy_file",
     "shapechanger.robot.twin.operator",
     "shapechanger.robot.twin.robot",

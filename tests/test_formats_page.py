@@ -12,7 +12,7 @@ import pytest
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.episodes.records import StepPicture
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.learners.card import PolicyCard
+from shapechanger.policy import PolicyCard
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.plan import Plan
 from shapechanger.transfer.runs import RunResult

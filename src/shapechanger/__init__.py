@@ -183,10 +183,10 @@ LEARNERS.ship(
 MODELS.ship({"mujoco": "morphology.certificate.changes:ModelNumbers"})
 POLICIES.ship(
     {
-        "trained": "transfer.learners.policy_file:TrainedPolicy.load",
-        "trained-onnx": "transfer.learners.card:OnnxPolicy",
-        "clone": "demos.cloning.policy:CameraPolicy.load",
-        "clone-onnx": "demos.cloning.card:OnnxClone",
+        "trained": "transfer.learners.policy_file:TrainedPolicy.of_file",
+        "trained-onnx": "policy:OnnxPolicy",
+        "clone": "demos.cloning.network:CameraPolicy.of_file",
+        "clone-onnx": "demos.cloning.clone:OnnxClone",
     }
 )
 ROBOTS.ship({"profile": "vehicles.twin:read_robot"})

@@ -17,6 +17,7 @@ ShapechangerError
 ├── PathError (ValueError)          fingertip path that cannot be made as requested
 ├── MapError (ValueError)           body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    policy whose weights cannot be transplanted
+├── PolicyError (ValueError)        file that is no policy, or a policy that does not fit
 ├── StudyError (ValueError)         study that cannot start
 │   ├── FailedRuns                  runs that failed, while all others ended
 │   ├── ForeignStudy                output folder of something else
@@ -140,6 +141,10 @@ class MapError(ShapechangerError, ValueError):
 
 class TransplantError(ShapechangerError, ValueError):
     """Policy whose weights cannot be transplanted to the target's shapes."""
+
+
+class PolicyError(ShapechangerError, ValueError):
+    """File that is no policy, or a policy that does not fit its use."""
 
 
 class StudyError(ShapechangerError, ValueError):

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 # Files that a compiled model holds the meaning of, comments left out.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
-_OF_A_NAME: Final = ("", ".toml")  # `my-car` stands for my-car.toml.
 _MOST_CHANGES: Final = 4  # Named in a message.
 
 
@@ -59,32 +58,25 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
             other: The other version, which is the newer one.
             numbers: The differences of the models, if they are known.
         """
+
+        def changed(what: str, old: str, new: str) -> Iterator[str]:
+            if old and new and old != new:
+                yield f"{what} has changed from {old} to {new}"
+            elif old != new:
+                yield f"{what} is gone (was {old})" if old else f"{what} is new ({new})"
+
         found: list[str] = []
-        known = list(numbers)
-        listed = "; ".join(known[:_MOST_CHANGES]) + ("; ..." if known[_MOST_CHANGES:] else "")
-        if not (self.model and other.model):
-            pass
-        elif self.model != other.model:
-            found.append(f"its model {_from_to(self.model, other.model)}")
-        elif self.sensed != other.sensed:
-            found.append(
-                f"what is sensed of its model {_from_to(self.sensed, other.sensed)}, and its "
-                "motion is the same"
-            )
-        if found and listed:
-            found[0] += f" ({listed})"
-        found += [
-            f"{name} {_from_to(self.files.get(name, ''), other.files.get(name, ''))}"
-            for name in sorted(self.files.keys() | other.files.keys())
-            if self.files.get(name) != other.files.get(name)
-        ]
+        if self.model and other.model:
+            found += changed("its model", self.model, other.model)
+            if not found:
+                found += changed("what is sensed of its model", self.sensed, other.sensed)
+                found = [f"{text}, and its motion is the same" for text in found]
+        if found and (known := list(numbers)):
+            more = "; ..." if known[_MOST_CHANGES:] else ""
+            found[0] += f" ({'; '.join(known[:_MOST_CHANGES])}{more})"
+        for name in sorted(self.files.keys() | other.files.keys()):
+            found += changed(name, self.files.get(name, ""), other.files.get(name, ""))
         return ", and ".join(found)
-
-
-def _from_to(old: str, new: str) -> str:
-    if not (old and new):
-        return f"is gone (was {old})" if old else f"is new ({new})"
-    return f"has changed from {old} to {new}"
 
 
 class IdentifiedEnv(NamedTuple):
@@ -143,15 +135,13 @@ def model_changes(old: bytes, new: bytes) -> tuple[str, ...]:
 
 def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     """Yield name and hash of each file that an argument names, such as a robot's profile."""
-    for text in texts_in(arguments):
-        for suffix in _OF_A_NAME:
+    for text in filter(None, texts_in(arguments)):
+        for place in (text, f"{text}.toml"):  # `my-car` stands for my-car.toml.
             # Unlike `Path.is_file`, this is false for texts that are too long for a path, such as
             # the JSON of a body.
-            if text and os.path.isfile(place := f"{text}{suffix}"):
-                path = Path(place)
-                if not path.name.endswith(without or ("\0",)):
-                    content = b"\n".join(path.read_bytes().splitlines())
-                    yield path.name, hashlib.sha256(content).hexdigest()[:HASH_DIGITS]
+            if os.path.isfile(place) and not place.endswith(without):
+                content = b"\n".join(Path(place).read_bytes().splitlines())
+                yield Path(place).name, hashlib.sha256(content).hexdigest()[:HASH_DIGITS]
 
 
 def _sees(space: gym.Space[Any]) -> bool:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import episodes_of, read_episode
+from shapechanger.policy import load_policy
 
 
 @pytest.mark.gl
@@ -35,8 +35,6 @@ def test_corrections_improve_the_policy(tmp_path: Path) -> None:
     data = load_dataset(Path(both))
     assert data.pictures is not None
     assert len(data) > len(load_dataset(Path(shown)))
-    before, after = (
-        CameraPolicy.load(Path(p)).predict_many(data.pictures) for p in (first, second)
-    )
+    before, after = (load_policy(Path(p)).predict_many(data.pictures) for p in (first, second))
     errors = [float(np.abs(done - data.actions).mean()) for done in (before, after)]
     assert errors[1] < errors[0]

@@ -9,7 +9,6 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
-from shapechanger.transfer.learners.card import OnnxPolicy
 from tests.cli.running import Cli
 
 _TINY = [
@@ -64,7 +63,7 @@ def test_it_is_evaluated_in_any_body(policy: Path, cli: Cli) -> None:
 def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
     out = tmp_path / "ant.onnx"
     main(["policies", "export", str(policy), "--env", "ExtendedAnt", "--out", str(out)])
-    card = OnnxPolicy(out).card
+    card = load_policy(out).card
     assert card.action.size == 12
     assert card.env.id == "shapechanger/ExtendedAnt-v1"
 

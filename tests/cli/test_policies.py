@@ -197,6 +197,7 @@ def test_a_policy_of_ones_own_learner_is_evaluated_when_it_is_named(
 ) -> None:
     """The policy's file alone does not import the user's module."""
     (tmp_path / "own_a2c.py").write_text(OWN)
+    monkeypatch.delitem(sys.modules, "own_a2c", raising=False)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
     small = ["steps_per_update=64", "eval_every=64", "eval_episodes=1"]

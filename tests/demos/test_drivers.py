@@ -8,23 +8,21 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import Framing, PolicyError
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.drivers import Act, Pilot, pilot_of, record_steps
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.demos.recording import RecordEpisodes
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, PolicyError
 from shapechanger.layout import Feature, Layout
 from shapechanger.vehicles.envs import RangesEnv
 from shapechanger.vehicles.envs.demonstrators import CLONES
+from tests.demos.cloning.data import clone_card
 from tests.demos.corridor_env import AlwaysForward, CorridorEnv, Shows
 
 AWAY = np.array([-1.0, 0.5], np.float32)
@@ -128,21 +126,12 @@ def test_faster_backward_and_aside_are_corrected(wanted: tuple[float, float]) ->
     assert "the policy is off by" in [one.decide(wanted)[1] for _ in range(3)][-1]
 
 
-def clone(path: Path, **changes: Any) -> str:
+def clone(path: Path, observation: Layout | None = None) -> str:
     """Save an untrained policy for the state of the corridor, and return its path."""
     env = CorridorEnv("state")
-    card = CloneCard(
-        framing=Framing(),
-        channels=(4,),
-        features=8,
-        eyes="none",
-        nerves=(8,),
-        action_layout=env.action_layout,
-        state_layout=env.observation_layout,
-        low=(-1.0, -1.0),
-        high=(1.0, 1.0),
-    )
-    CameraPolicy.blank(msgspec.structs.replace(card, **changes), 0).save(path)
+    net = {"eyes": "none", "nerves": (8,), "low": (-1.0, -1.0), "high": (1.0, 1.0)}
+    card = clone_card(env.action_layout, observation or env.observation_layout, **net)
+    CameraPolicy.blank(card, 0).save(path)
     return str(path)
 
 
@@ -193,7 +182,7 @@ def test_danger_and_standing_are_corrected_and_slowness_is_not(
 
 def test_a_policy_with_other_inputs_is_refused(tmp_path: Path) -> None:
     other = Layout((Feature("way", "m"), Feature("heat", "K")))
-    policy = clone(tmp_path / "other.safetensors", state_layout=other)
+    policy = clone(tmp_path / "other.safetensors", other)
     with pytest.raises(PolicyError, match=r"heat.*battery"):
         pilot_of(CorridorEnv("both"), policy, "", 0)
     with pytest.raises(PolicyError, match=r"battery.*gets none"):

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.cloning.pictures import Framing
-from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.demos.cloning.clone import CloneSettings
 from shapechanger.layout import Element, Feature, Layout
+from shapechanger.policy import Framing
 from shapechanger.vehicles.cloning import CloningSettings
 
 _ROWS, _COLUMNS = 12, 20

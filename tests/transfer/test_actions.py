@@ -21,7 +21,6 @@ from shapechanger.transfer.actions import ActionScale, learners_space, require_r
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.export import export_onnx
 from shapechanger.transfer.learners.algorithms import SpacesOnly
-from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -109,7 +108,7 @@ def test_a_policy_acts_in_the_units_of_the_env(tmp_path: Path, name: str) -> Non
     np.testing.assert_array_equal(loaded.act(seen), expected)
     assert loaded.card.action.high.tolist() == [255.0]
     export_onnx(loaded, tmp_path / "p.onnx")
-    np.testing.assert_allclose(OnnxPolicy(tmp_path / "p.onnx").act(seen), expected, rtol=1e-5)
+    np.testing.assert_allclose(load_policy(tmp_path / "p.onnx").act(seen), expected, rtol=1e-5)
 
 
 def test_a_transplant_keeps_the_units_of_the_map(tmp_path: Path) -> None:

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import StudyError
 from shapechanger.files import from_builtins
+from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners import PolicyOrigin, SharedFile
+from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
@@ -132,7 +133,7 @@ def test_rehearsal_starts_from_the_source_and_learns_from_both(
             120,
             first.seed,
             demonstrations=SharedFile(shown / "scratch-0.npz", 0),
-            start=CameraPolicy.load(folder / "runs" / "source-0" / "policy.safetensors"),
+            start=load_policy(folder / "runs" / "source-0" / "policy.safetensors"),
             rehearsed=rehearsed,
             on_evaluation=found.append,
         )
@@ -184,7 +185,7 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
         assert unchanged.curve[0].mean_return == tuned.curve[0].mean_return
     assert [e.steps for e in study.of("source")[0].curve] == [0, 60]
     assert set(study.summaries) == {"zero-shot", "fine-tune"}
-    policy = CameraPolicy.load(out / "runs" / "scratch-0" / "policy.safetensors")
+    policy = load_policy(out / "runs" / "scratch-0" / "policy.safetensors")
     again = _LEARNER.evaluate(SLIPPERY, policy).mean_return
     assert again == study.of("scratch")[0].curve[-1].mean_return
 
@@ -250,4 +251,4 @@ def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
     assert isinstance(settings, CloningSettings)
     env = EnvRef(f"shapechanger/{vehicle.capitalize()}-v1", {"put_back": True})
     origin = CloneLearner("cloning", settings).origin(CLONES[vehicle])
-    assert origin == PolicyOrigin(env, 12_000, {})
+    assert (origin.env, origin.steps) == (env, 12_000)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,10 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import MlpPolicy
 
-from shapechanger.errors import CorruptStudy, StudyError, UnknownName
+from shapechanger.errors import PolicyError, StudyError, UnknownName
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_onnx
-from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import resolve_learner
@@ -119,7 +117,7 @@ def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
     policy, _, _ = trained(f"{HERE}:narrow_sac")
     path = tmp_path / "policy.safetensors"
     save_policy(policy, path)
-    with pytest.raises(CorruptStudy, match="a function, which a file may not call"):
+    with pytest.raises(PolicyError, match="a function, which a file may not call"):
         load_policy(path)
 
 
@@ -131,10 +129,9 @@ def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.syspath_prepend(str(tmp_path))
     policy, _, settings = trained("stable_baselines3:A2C")
     own = msgspec.structs.replace(settings, algorithm="own_a2c:Own")
-    card = msgspec.structs.replace(policy.card, settings=own)
     path = tmp_path / "policy.safetensors"
-    save_policy(replace(policy, card=card), path)
-    with pytest.raises(CorruptStudy, match=r"^A policy of own_a2c:Own needs the module own_a2c"):
+    save_policy(policy.carded(settings=own), path)
+    with pytest.raises(PolicyError, match=r"^A policy of own_a2c:Own needs the module own_a2c"):
         load_policy(path)
     assert "own_a2c" not in sys.modules
     assert type(load_policy(path, "own_a2c:Own").model).__name__ == "Own"
@@ -179,7 +176,7 @@ def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
     export_onnx(policy, tmp_path / "policy.onnx")
     observations = np.random.default_rng(0).normal(size=(20, 4))
     np.testing.assert_allclose(
-        OnnxPolicy(tmp_path / "policy.onnx").act(observations), policy.act(observations), atol=1e-5
+        load_policy(tmp_path / "policy.onnx").act(observations), policy.act(observations), atol=1e-5
     )
 
 

@@ -12,10 +12,9 @@ import numpy as np
 import onnx
 import pytest
 
-from shapechanger.errors import CorruptStudy, StudyError
-from shapechanger.policy import load_policy, save_policy
+from shapechanger.errors import PolicyError
+from shapechanger.policy import OnnxPolicy, load_policy, save_policy
 from shapechanger.transfer.export import export_onnx
-from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from tests.transfer.studies import SMALL, TINY_NORMALISED
 
@@ -57,8 +56,8 @@ def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
     """OnnxPolicy works where torch cannot be imported."""
     code = (
         "import sys; sys.modules['torch'] = None; import numpy as np; from pathlib import Path; "
-        "from shapechanger.transfer.learners.card import OnnxPolicy; "
-        f"print(OnnxPolicy(Path({str(files[1])!r})).act(np.zeros((1, 4))).shape)"
+        "from shapechanger.policy import load_policy; "
+        f"print(load_policy(Path({str(files[1])!r})).act(np.zeros((1, 4))).shape)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
@@ -67,8 +66,8 @@ def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
 
 
 def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
-    with pytest.raises(StudyError, match=r"shape \(n, 4\), got \(1, 5\)"):
-        OnnxPolicy(files[1]).act(np.zeros((1, 5)))
+    with pytest.raises(PolicyError, match=r"shape \(n, 4\), got \(1, 5\)"):
+        load_policy(files[1]).act(np.zeros((1, 5)))
 
 
 def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: Path) -> None:
@@ -80,5 +79,5 @@ def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: P
             entry.value = json.dumps(card)
     (tmp_path / "mine.onnx").write_bytes(model.SerializeToString())
     for name, text in (("mine.onnx", "its card says"), ("none.onnx", "There is no policy file")):
-        with pytest.raises(CorruptStudy, match=text):
-            OnnxPolicy(tmp_path / name)
+        with pytest.raises(PolicyError, match=text):
+            load_policy(tmp_path / name)

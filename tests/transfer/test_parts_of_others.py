@@ -19,7 +19,7 @@ from tests.transfer.studies import BIG, SMALL, files_of
 _LEARNER = '''
 import msgspec, numpy as np
 from shapechanger.transfer.body_map import MappedEnv
-from shapechanger.transfer.learners import Learner, LearnerSettings, PolicyOrigin, ignore
+from shapechanger.transfer.learners import Learner, LearnerSettings, ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 
 class Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True, tag="constant"):

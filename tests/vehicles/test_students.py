@@ -10,9 +10,8 @@ import pytest
 
 from shapechanger.cli.main import main
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.policy import save_policy
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
@@ -52,9 +51,9 @@ def test_a_student_sees_images_only(teacher: TrainedPolicy, tmp_path: Path) -> N
     policy = train_student(_CAR, teacher, 24, 3, settings=quick, on_steps=done.append)
     assert done == [8, 16, 24]
     assert policy.card.data["teacher"] == "shapechanger/CarRanges-v1"
-    assert policy.card.data["demonstrated_steps"] == 24
+    assert policy.card.steps == 24
     policy.save(tmp_path / "student.safetensors")
-    again = CameraPolicy.load(tmp_path / "student.safetensors")
+    again = load_policy(tmp_path / "student.safetensors")
     action = again.predict(np.zeros((120, 160, 3), np.uint8))
     assert action.shape == (2,)
     assert abs(action[0]) < 0.5

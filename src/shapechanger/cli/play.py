@@ -16,7 +16,7 @@ from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.naming import allow_own_modules, env_ref
 from shapechanger.errors import StudyError, check_seed
 from shapechanger.identity import identify_env
-from shapechanger.policy import load_policy
+from shapechanger.policy import PolicyCard, load_policy
 from shapechanger.rendering import has_screen
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
@@ -24,7 +24,6 @@ from shapechanger.transfer.identities import ENV, require_same_env
 from shapechanger.transfer.learners.evaluation import random_actions
 
 if TYPE_CHECKING:
-    from shapechanger.transfer.learners.card import PolicyCard
     from shapechanger.transfer.learners.evaluation import Act
 
 
@@ -98,7 +97,7 @@ def acting_in(
 ) -> tuple[gym.Env[Any, Any], Act]:
     """Return an env as a policy senses it, and the policy."""
     policy = load_any_policy(file, learner)
-    card: Any = policy.card
+    card: PolicyCard = policy.card
     if trained_in is not None and ENV in card.identity:
         remedy = (
             "Train it again, or give the present one with --env, as another env that the policy "
@@ -106,10 +105,10 @@ def acting_in(
         )
         now = identify_env(env, trained_in.id).identity
         require_same_env(card.identity, trained_in, now, file, remedy)
-    if hasattr(card, "observation"):
+    if card.clone is None:
         return _fitting(env, card), policy.act
     if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
-        card.require_layouts(layout, card.state_layout)
+        card.require_layouts(layout, card.observation)
     return env, policy.act
 
 
@@ -125,11 +124,11 @@ def _fitting(env: gym.Env[Any, Any], card: PolicyCard) -> gym.Env[Any, Any]:
     if settings is not None and "many bodies" in settings.takes:
         from shapechanger.transfer.limbs.envs import fitted  # PyTorch.
 
-        return fitted(env, card.observation, settings.room)
-    observation, action = layouts_of(env)
-    if (observation, action) == (card.observation, card.action):
+        return fitted(env, card.layouts[0], settings.room)
+    (observation, action), mine = layouts_of(env), card.layouts
+    if (observation, action) == mine:
         return env
-    body_map = BodyMap.between(card.observation, observation, card.action, action)
+    body_map = BodyMap.between(mine[0], observation, mine[1], action)
     entries = (*body_map.observation, *body_map.action)
     filled = [entry.feature for entry in entries if not isinstance(entry.rule, Copy)]
     if filled:

@@ -6,7 +6,7 @@ import math
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 import tyro
@@ -20,19 +20,15 @@ from shapechanger.cli.play import Watching, acting_in, load_any_policy
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.envs.naming import allow_own_modules, driven, env_ref
-from shapechanger.errors import HubError, ShapechangerError, StudyError
+from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyError
 from shapechanger.files import require_file, write_atomic
 from shapechanger.identity import identify_env
-from shapechanger.layout import Layout
 from shapechanger.own_modules import texts_in
-from shapechanger.policy import kind_of, load_policy
+from shapechanger.policy import MAX_BYTES, STEERING, CloneNetwork, PolicyCard, load_policy
 from shapechanger.transfer.identities import ENV, known, single_body
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.references import load_references
 from shapechanger.vehicles.expert import PERIOD_S
-
-if TYPE_CHECKING:
-    from shapechanger.demos.cloning.card import CloneCard
 
 _FILE_WIDTH: Final = 160
 
@@ -59,12 +55,11 @@ class _InEnv(_OfPolicy):
         """Return the env that is named, else the one in which the policy was trained."""
         if self.env:
             return driven(env_ref(self.env, self.body))
-        card: Any = load_any_policy(self.file, self.learner).card
-        env = card.data.get("env") if is_clone(card) else card.env
+        env = load_any_policy(self.file, self.learner).card.env
         if env is None:
             raise StudyError(f"{self.file} learned from recordings of no env: name one with --env.")
         # A policy of many bodies is seen in the family's own.
-        trained_in = single_body(env_ref(env) if isinstance(env, str) else env)
+        trained_in = single_body(env)
         # The env of a policy may be of the user's own, or have a task that is.
         allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
         if self.body and "path" not in trained_in.kwargs:
@@ -79,63 +74,38 @@ class PoliciesShow(_OfPolicy):
     """Print where a policy comes from, and what it senses and does."""
 
     def run(self) -> None:
-        from shapechanger.transfer.learners.policy_file import TrainedPolicy  # PyTorch.
-
-        policy: Any = load_any_policy(self.file, self.learner)
-        card = policy.card
-        lines = origin_of(card)
-        if not lines["command"]:
-            del lines["command"]
-        if explored := getattr(card, "start_log_std", None):
+        policy = load_any_policy(self.file, self.learner)
+        card: PolicyCard = policy.card
+        lines = {**origin_of(card), "command": card.command or "not in this file"}
+        if explored := card.start_log_std:
             low, high = math.exp(min(explored)), math.exp(max(explored))
             lines["explored"] = f"standard deviations of {low:.2f} to {high:.2f} at the start"
-        if isinstance(policy, TrainedPolicy):
-            lines["command"] = card.command or "not in this file"
+        if hasattr(policy, "normalisation"):
             lines["normalised"] = "no" if policy.normalisation is None else "yes"
-        sensed, done = layouts_in(card)
-        if is_clone(card):
-            lines |= {"picture": card.eyes, "state": ", ".join(sensed.names) if sensed else "none"}
-        else:
-            lines["observation"] = ", ".join(card.observation.names)
-        lines["action"] = ", ".join(done.names) if done else STEERING
+        if card.clone is not None:
+            lines["picture"] = card.clone.eyes
+        lines["observation"] = ", ".join(card.observation.names) if card.observation else "none"
+        lines["action"] = ", ".join(card.action.names if card.action else STEERING)
         for part, identity in card.identity.items():
             made_of = {"model": identity.model, **identity.files}
             shown = ", ".join(f"{name} {digest}" for name, digest in made_of.items() if digest)
             lines[f"{part} is of"] = shown
         for name, text in lines.items():
             say(f"{name:12} {text}")
-        if (settings := getattr(card, "settings", None)) is not None:
-            for name, value in msgspec.structs.asdict(settings).items():
+        if card.settings is not None:
+            for name, value in msgspec.structs.asdict(card.settings).items():
                 say(f"  {name:16} {value}")
 
 
-STEERING: Final = "steering, throttle"
-"""Action of a clone whose card has no layout of it."""
-
-
-def is_clone(card: Any) -> bool:
-    """Return whether a card is one of a policy that was learned from demonstrations."""
-    return hasattr(card, "state_layout")
-
-
-def origin_of(card: Any) -> dict[str, str]:
+def origin_of(card: PolicyCard) -> dict[str, str]:
     """Return the facts of a policy's origin from its card, keyed by name."""
-    cloned = is_clone(card)
     return {
-        "env": str(card.data.get("env", "recorded") if cloned else card.env),
-        "learner": "cloning" if cloned else card.learner,
+        "env": str(card.env or "recorded"),
+        "learner": card.learner,
         "steps": f"{card.steps:,}",
-        "seed": ", ".join(map(str, card.seeds)) if cloned else str(card.seed),
+        "seed": str(card.seed),
         "version": card.version,
-        "command": getattr(card, "command", ""),
     }
-
-
-def layouts_in(card: Any) -> tuple[Layout | None, Layout | None]:
-    """Return the layouts of what a policy senses, besides images, and does."""
-    if is_clone(card):
-        return card.state_layout, card.action_layout
-    return card.observation, card.action
 
 
 @dataclass(frozen=True)
@@ -230,11 +200,10 @@ class PoliciesExport(_InEnv):
 
     def run(self) -> None:
         policy = load_any_policy(self.file, self.learner)
-        kind = kind_of(self.file)
-        if kind.endswith("onnx"):
+        if self.file.suffix == ".onnx":
             raise StudyError(f"{self.file} has been exported already.")
-        if kind == "clone":
-            body, control_hz = _learned_with(policy.card)
+        if policy.card.clone is not None:
+            body, control_hz = _learned_with(policy.card, policy.card.clone)
             policy.export(self.out, body=body, control_hz=control_hz)
         else:
             from shapechanger.transfer.export import export_limbs, export_onnx  # PyTorch.
@@ -253,14 +222,13 @@ class PoliciesExport(_InEnv):
         say(f"wrote {self.out}")
 
 
-def _learned_with(card: CloneCard) -> tuple[str, float | None]:
+def _learned_with(card: PolicyCard, net: CloneNetwork) -> tuple[str, float | None]:
     """Return the body and the rate of a clone's demonstrations, as far as its card tells."""
-    env = card.data.get("env")
-    if env is None:
-        return str(card.data.get("body", "")), card.data.get("control_hz")
+    if card.env is None:
+        return net.body, net.control_hz
     # Waypoints are the same in all bodies.
-    body, _ = VEHICLE_ENVS.get(str(env), ("", ""))
-    return body, 1.0 / PERIOD_S if body or env in WAYPOINT_ENVS else None
+    body, _ = VEHICLE_ENVS.get(card.env.id, ("", ""))
+    return body, 1.0 / PERIOD_S if body or card.env.id in WAYPOINT_ENVS else None
 
 
 @dataclass(frozen=True)
@@ -291,9 +259,6 @@ class PoliciesConvert:
             layouts, identity = layouts_of(made), known({ENV: identify_env(made, env.id).identity})
         convert_zip(self.file, env, layouts, identity, command_line()).save(self.out)
         say(f"wrote {self.out}")
-
-
-_MAX_BYTES: Final = 256 << 20  # As for the files of policies.
 
 
 @dataclass(frozen=True)
@@ -333,12 +298,12 @@ class PoliciesPull:
                 "policy",
                 Path(folder),
                 revision=self.revision,
-                max_bytes=_MAX_BYTES,
+                max_bytes=MAX_BYTES,
             )
             path = Path(folder) / hub.POLICY
             try:
                 env = origin_of(load_policy(path).card)["env"]
-            except StudyError as error:
+            except PolicyError as error:
                 raise HubError(
                     str(error).replace(str(path), f"{path.name} of {self.repo}")
                 ) from error
@@ -351,16 +316,18 @@ def _policy_card(file: Path, repo: str) -> str:
     """Return the README of a policy, after checking its hash."""
     card = load_policy(file).card
     rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
-    command = str(rows.pop("command"))
-    sensed, done = layouts_in(card)
-    seen = f"picture ({card.eyes})" if is_clone(card) else ""
+    seen = "" if card.clone is None else f"picture ({card.clone.eyes})"
+    done = ", ".join(STEERING)
     return readme(
         repo,
         ["reinforcement-learning"],
         f"A policy of Shapechanger for `{rows['env']}`.",
         rows,
-        {"Observation": features_text(sensed, seen), "Action": features_text(done, STEERING)},
-        command,
+        {
+            "Observation": features_text(card.observation, seen),
+            "Action": features_text(card.action, done),
+        },
+        card.command,
         f"shapechanger policies pull {repo} --out policy.safetensors\n"
         "shapechanger policies play policy.safetensors",
     )

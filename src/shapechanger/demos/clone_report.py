@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from shapechanger.demos.cloning.evaluation import Bin, EvaluationResult, named, outlook
+from shapechanger.demos.cloning.evaluation import Bin, EvaluationResult, named
 from shapechanger.files import write_atomic, write_json
+from shapechanger.policy import PolicyCard
 from shapechanger.reports.charts import BLUE, GREEN, GREY, ORANGE, PINK, SQUARE, WIDE, svg_chart
 from shapechanger.reports.page import png_uri, render, svg_uri
 
@@ -17,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from shapechanger.demos.cloning.clone import Clone
     from shapechanger.demos.cloning.learn import Training
-    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.dataset import Dataset
 
 _MAX_SCATTERS: Final = 4
@@ -28,7 +30,7 @@ _MAGNIFICATION: Final = 3
 def write_report(
     page: Path,
     name: str,
-    policy: CameraPolicy,
+    policy: Clone,
     data: Dataset,
     evaluation: EvaluationResult,
     training: Training | None,
@@ -52,7 +54,7 @@ def write_report(
         MissingExtra: If matplotlib or Jinja2 is not installed.
         OutputError: If a file cannot be written.
     """
-    card = policy.card
+    card, net = policy.card, policy.net
     by_class = evaluation.head == "class"
     ahead = outlook(card)
     html = render(
@@ -82,10 +84,7 @@ def write_report(
         training_chart="" if training is None else svg_uri(training_chart(training)),
         card=card,
         observes=_observes(policy),
-        outputs=", ".join(
-            card.class_names or (card.action_layout.names if card.action_layout else ())
-        ),
-        weights=sum(p.numel() for p in policy.network.parameters()),
+        outputs=", ".join(net.class_names or (card.action.names if card.action else ())),
     )
     write_atomic(page, html.encode())
     numbers = page.with_suffix(".json")
@@ -103,9 +102,7 @@ def _cards(evaluation: EvaluationResult) -> list[tuple[str, str]]:
     return [*shown, ("Most frequent action", f"{evaluation.majority_baseline:.3f}")]
 
 
-def _worst(
-    policy: CameraPolicy, data: Dataset, evaluation: EvaluationResult
-) -> list[dict[str, Any]]:
+def _worst(policy: Clone, data: Dataset, evaluation: EvaluationResult) -> list[dict[str, Any]]:
     """The steps with the largest errors: what the driver did, and what the policy did."""
     chosen = list(evaluation.worst)
     pictures = None if data.pictures is None else data.pictures[chosen]
@@ -114,9 +111,9 @@ def _worst(
     actions = policy.predict_many(pictures, states)
     frames: list[dict[str, Any]] = []
     for i, step in enumerate(chosen):
-        if policy.card.classes:
+        if policy.net.classes:
             driver = named(data.actions[step], data.action_layout)
-            did = f"{policy.card.class_names[int(outputs[i].argmax())]} ({outputs[i].max():.0%})"
+            did = f"{policy.net.class_names[int(outputs[i].argmax())]} ({outputs[i].max():.0%})"
         else:
             driver = ", ".join(f"{value:.2f}" for value in data.actions[step])
             did = ", ".join(f"{value:.2f}" for value in actions[i])
@@ -132,14 +129,68 @@ def _worst(
     return frames
 
 
-def _observes(policy: CameraPolicy) -> str:
-    card = policy.card
+def _observes(policy: Clone) -> str:
+    net, layout = policy.net, policy.card.observation
     parts: list[str] = []
-    if card.eyes != "none":
-        parts.append(f"images of {card.framing.width} x {card.framing.height}, by {card.eyes}")
-    if card.state_layout is not None:
-        parts.append(", ".join(n for n in card.state_layout.names if n not in card.unseen))
+    if net.eyes != "none":
+        parts.append(f"images of {net.framing.width} x {net.framing.height}, by {net.eyes}")
+    if layout is not None:
+        parts.append(", ".join(name for name in layout.names if name not in net.unseen))
     return "; ".join(parts)
+
+
+# Collisions per 100 m of clones of a car's simulated expert in corridors that they had not seen, by
+# the minutes of its driving: of all clones, and of the worst seed where there were three. Measured
+# over 9 km each by `python -m benchmarks.run corrections`.
+EXPERT: Final = {2: (3.52, 5.89), 4: (1.06, 1.63), 10: (0.84, None)}
+# The same after half of the minutes were corrections of a clone's own driving.
+CORRECTED: Final = {4: 0.91, 20: 0.38}
+_MINUTE_S: Final = 60.0
+
+
+def outlook(card: PolicyCard) -> str:
+    """Return sentences on the collisions to expect of a cloned driver, and on the next step.
+
+    Returns:
+        "" if the policy does not steer by images, or its card has no `learned_s`. The rates are
+        those of a car in corridors; no other clones were measured in this way.
+    """
+    learned_s = card.data.get("learned_s", 0.0)
+    names = () if card.action is None else card.action.names
+    steers = "steering" in names or {"left", "right"} <= set(names)
+    known = isinstance(learned_s, int | float) and math.isfinite(learned_s) and learned_s > 0.0
+    if not (steers and known) or card.clone is None or card.clone.eyes == "none":
+        return ""
+    minutes = round(learned_s / _MINUTE_S, 1)
+    rates = {
+        length: f"{rate:.1f}" + (f" ({worst:.1f} for the worst of 3 seeds)" if worst else "")
+        for length, (rate, worst) in EXPERT.items()
+    }
+    less = [length for length in EXPERT if length <= minutes]
+    more = [length for length in EXPERT if length > minutes]
+    if not less:
+        expected = f"more than {rates[more[0]]} collisions"
+    elif not more:
+        expected = f"about {rates[less[-1]]} collisions or fewer"
+    else:
+        expected = f"{EXPERT[more[0]][0]:.1f} to {rates[less[-1]]} collisions"
+    length = next((length for length in CORRECTED if length > minutes), max(CORRECTED))
+    # The rate of the shortest length is too high to aim at.
+    longer = next((length for length in more if length > min(EXPERT)), None)
+    record = (
+        ""
+        if longer is None
+        else (f"record more ({EXPERT[longer][0]:.1f} per 100 m after {longer} minutes), or ")
+    )
+    return (
+        f"It learned from {minutes:.1f} minutes of driving, so expect {expected} per 100 m where "
+        "it has not driven. That is what clones of a car's simulated expert had in corridors "
+        "(docs/cloning.md); a person with keys is less steady, so expect more of its clone. "
+        f"Next: {record}let it drive and correct it (`demos record ENV --driver POLICY "
+        "--corrected-by expert`, or take over at the console of a robot), merge, and train again: "
+        f"{CORRECTED[length]:.1f} per 100 m after {length // 2} minutes of driving and "
+        f"{length // 2} of corrections."
+    )
 
 
 _MEMBER_COLOURS: Final = (BLUE, ORANGE, GREEN, PINK, GREY)

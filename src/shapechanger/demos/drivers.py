@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import HasDemonstrator, TaskDemonstrator, layouts_of
+from shapechanger.demos.cloning.clone import Clone
 from shapechanger.demos.episodes import Driver
 from shapechanger.demos.recording import QUALITY, ObservationEncoder, RecordEpisodes, name_of
 from shapechanger.errors import DemosError
-from shapechanger.policy import kind_of, load_policy
+from shapechanger.policy import load_policy
 
 EXPERT: Final = "expert"
 """Name of the expert of an env as a driver."""
@@ -205,10 +206,10 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     def fitting(actions: NDArray[Any]) -> NDArray[np.float32]:
         return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
 
-    if kind_of(path).startswith("clone"):
-        clone = _clone(path, env)
-        return lambda seen: fitting(clone(seen))
     policy = load_policy(path)
+    if policy.card.clone is not None:
+        acts = _clone(policy, path, env)
+        return lambda seen: fitting(acts(seen))
     if (policy.card.observation, policy.card.action) != layouts_of(env):
         raise DemosError(
             f"{path} was trained in {policy.card.env}, which senses or moves something else than "
@@ -217,11 +218,10 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))
 
 
-def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
-    """Load a clone, and check that it fits the env's frames, state and actions."""
-    clone = load_policy(path)
+def _clone(clone: Clone, path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
+    """Check that a clone fits the env's frames, state and actions."""
     encoder = ObservationEncoder(env, QUALITY)
-    needs = {"image": clone.card.eyes != "none", "state": clone.card.state_layout is not None}
+    needs = {"image": clone.net.eyes != "none", "state": clone.card.observation is not None}
     if needs["image"] and not encoder.has_picture:
         raise DemosError(f"{path} drives by images, and {name_of(env)} shows none.")
     clone.card.require_layouts(encoder.action_layout, encoder.state_layout)

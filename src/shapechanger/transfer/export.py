@@ -11,17 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import msgspec
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError, TransplantError
-from shapechanger.onnx_file import CARD, export_network
+from shapechanger.onnx_file import export_network
+from shapechanger.policy import PolicyCard
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.identities import identities_in
-from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.limbs.envs import fitted
 from shapechanger.transfer.limbs.rows import LimbRows
@@ -67,30 +66,26 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
         OutputError: If the file cannot be written.
     """
     settings: Any = policy.card.settings
-    rows = fitted(env, policy.card.observation, settings.room).rows
+    rows = fitted(env, policy.card.layouts[0], settings.room).rows
     observation, action = layouts_of(env)
-    card = msgspec.structs.replace(
-        policy.card,
+    exported = policy.carded(
         env=ref,
         observation=observation,
         action=action,
         identity=identities_in(ref, env, settings),
     )
-    _write(_LimbActions(policy.model.policy, rows), card, path)
+    _write(_LimbActions(policy.model.policy, rows), exported.card, path)
 
 
 def _write(network: nn.Module, card: PolicyCard, path: Path) -> None:
-    card = msgspec.structs.replace(card, settings=None)
-    names = {
-        "observation_names": json.dumps(card.observation.names),
-        "action_names": json.dumps(card.action.names),
-    }
+    observation, action = card.layouts
     export_network(
         network,
-        {"observation": torch.zeros((2, card.observation.size), dtype=torch.float64)},
-        "action",
+        {"observation": torch.zeros((2, observation.size), dtype=torch.float64)},
+        card,
         path,
-        {**names, CARD: msgspec.json.encode(card).decode()},
+        observation_names=json.dumps(observation.names),
+        action_names=json.dumps(action.names),
     )
 
 
@@ -121,14 +116,14 @@ class _MeanActions(nn.Module):
         _constant(self, low=space.low.astype(np.float32), high=space.high.astype(np.float32))
         scale = {
             name: side.astype(np.float32)
-            for name, side in ActionScale.between(space, policy.card.action)._asdict().items()
+            for name, side in ActionScale.between(space, policy.card.layouts[1])._asdict().items()
         }
         _constant(self, **{f"env_{name}": side for name, side in scale.items()})
 
-    def forward(self, observation: Tensor) -> Tensor:
-        """Return actions, shape (n, actions), in the units of the env."""
+    def forward(self, *given: Tensor) -> Tensor:
+        """Return actions, shape (n, actions), in the units of the env, for observations."""
         known: Any = self
-        seen = observation
+        (seen,) = given
         if self.normalises:
             seen = ((seen - known.mean) / known.deviation).clamp(-CLIP, CLIP)
         action = self.network(seen.float())
@@ -158,9 +153,10 @@ class _LimbActions(nn.Module):
             reach=(0.5 * (rows.high - rows.low)).astype(np.float32),
         )
 
-    def forward(self, observation: Tensor) -> Tensor:
-        """Return actions, shape (n, actions), in the units of the env."""
+    def forward(self, *given: Tensor) -> Tensor:
+        """Return actions, shape (n, actions), in the units of the env, for observations."""
         known: Any = self
+        (observation,) = given
         rows = (observation * known.scale + known.offset) @ known.selection + known.constant
         limbs = self.network(rows.float().reshape(self.shape)).clamp(-1.0, 1.0)
         return (limbs[:, known.actuators] + 1.0) * known.reach + known.low

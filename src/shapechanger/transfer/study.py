@@ -195,7 +195,7 @@ def make_plan(
         MapError: If the spaces cannot be mapped.
         StudyError: If the budget or the number of seeds is too small, the given policy is of
             another kind of learner, or an env lacks what the learner needs.
-        CorruptStudy: If the given policy is missing, corrupt or refused.
+        PolicyError: If the given policy is missing, corrupt or refused.
         SpaceMismatch: If the given policy belongs to another body, or a layout does not fit its
             space.
     """

@@ -31,21 +31,19 @@ from shapechanger.contract.env_ref import (
     TaskDemonstrator,
     layouts_of,
 )
+from shapechanger.demos.cloning.clone import CloneSettings, load_clone, prepare
 from shapechanger.demos.cloning.learn import learn
-from shapechanger.demos.cloning.pictures import Framing, prepare
-from shapechanger.demos.cloning.policy import KIND, CameraPolicy
-from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import Dataset, merged
-from shapechanger.errors import StudyError
+from shapechanger.errors import PolicyError, StudyError
 from shapechanger.files import make_folder
 from shapechanger.layout import Layout
-from shapechanger.policy import kind_of, load_policy
+from shapechanger.policy import Framing, PolicyCard
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.identities import ENV, identify, known, require_same_env
 from shapechanger.transfer.learners import (
     Learner,
     LearnerSettings,
-    PolicyOrigin,
     SharedFile,
     Takes,
     ignore,
@@ -221,14 +219,6 @@ def _first(data: Dataset, steps: int) -> Dataset:
     return data.part(np.arange(len(data)) < steps)
 
 
-class _CardData(msgspec.Struct):
-    """Provenance in the card of a clone that a study or `shapechanger train` wrote."""
-
-    env: str
-    arguments: dict[str, Any]
-    demonstrated_steps: int
-
-
 class CloneLearner(Learner[CloningSettings]):
     """Behavioural cloning of an env's demonstrator.
 
@@ -302,7 +292,7 @@ class CloneLearner(Learner[CloningSettings]):
             )
             on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
             on_steps(budget)
-        return stated(policy, env, demonstrated_steps=steps, seed=seed)
+        return stated(policy, env, steps, seed)
 
     def evaluate(
         self, env: EnvRef, policy: CameraPolicy, body_map: BodyMap | None = None
@@ -318,40 +308,33 @@ class CloneLearner(Learner[CloningSettings]):
 
     def load(self, path: Path) -> CameraPolicy:
         """Load a clone."""
-        return CameraPolicy.load(path)
+        policy = load_clone(path)
+        if not isinstance(policy, CameraPolicy):
+            raise PolicyError(f"{path} has been exported: give the clone that it was made from.")
+        return policy
 
-    def origin(self, path: Path) -> PolicyOrigin:
-        """Read where a clone comes from."""
-        if kind_of(path) != KIND:
-            card = load_policy(path).card
-            raise StudyError(
-                f"{path} was trained with {card.learner}, and {self.name} starts from "
-                f"demonstrations: give --learner {card.learner}, or a clone."
+    def origin(self, path: Path) -> PolicyCard:
+        """Read the card of a clone that this learner can start from."""
+        policy = self.load(path)
+        found, wanted = policy.net.framing, self.settings.clone.framing
+        if found != wanted:
+            raise PolicyError(
+                f"{path} takes images of {found.height} x {found.width} pixels from {found.top:g} "
+                f"of their height on, and {self.name} {wanted.height} x {wanted.width} from "
+                f"{wanted.top:g}: give a clone that takes the same images."
             )
-        card = CameraPolicy.load(path).card
-        wanted = self.settings.clone.framing
-        if card.framing != wanted:
-            raise StudyError(
-                f"{path} takes images of {card.framing.height} x {card.framing.width} pixels "
-                f"from {card.framing.top:g} of their height on, and {self.name} "
-                f"{wanted.height} x {wanted.width} from {wanted.top:g}: give a clone that takes "
-                "the same images."
+        if policy.card.env is None:
+            raise PolicyError(
+                f"{path} learned from recordings of no env: give a clone that `shapechanger train` "
+                "or a study has written."
             )
-        try:
-            data = msgspec.convert(card.data, _CardData)
-        except msgspec.ValidationError as error:
-            raise StudyError(
-                f"The card of {path} lacks the demonstrations that it was cloned from ({error}): "
-                "give a clone that `shapechanger train` or a study has written."
-            ) from error
-        env = EnvRef(data.env, data.arguments)
-        return PolicyOrigin(env, data.demonstrated_steps, card.identity)
+        return policy.card
 
 
-def stated(policy: CameraPolicy, env: EnvRef, **data: Any) -> CameraPolicy:
-    """State in a clone's card the env that it learned in."""
+def stated(policy: CameraPolicy, env: EnvRef, steps: int, seed: int, **data: Any) -> CameraPolicy:
+    """State in a clone's card the env, and the steps and seed of all of its training."""
     identity = known({ENV: identify(env).identity})
-    return policy.described(identity=identity, env=env.id, arguments=env.kwargs, **data)
+    return policy.carded(env=env, steps=steps, seed=seed).described(identity=identity, **data)
 
 
 STUDENT_STEPS: Final = 7200
@@ -401,7 +384,8 @@ def train_student(
             raise StudyError(
                 f"{env} has no teachers: choose an env of a vehicle's camera, such as Car."
             )
-        wanted, taught = inner.teacher_env, teacher.card.env.id
+        learned_in = teacher.card.trained_in
+        wanted, taught = inner.teacher_env, learned_in.id
         if taught != wanted:
             name = wanted.rpartition("/")[2].removesuffix("-v1")
             raise StudyError(
@@ -409,9 +393,9 @@ def train_student(
                 f"train one by `shapechanger train {name}`."
             )
         if ENV in teacher.card.identity:
-            now = identify(teacher.card.env).identity
+            now = identify(learned_in).identity
             remedy = "Train the teacher again."
-            require_same_env(teacher.card.identity, teacher.card.env, now, "the teacher", remedy)
+            require_same_env(teacher.card.identity, learned_in, now, "the teacher", remedy)
         driver = inner.taught_by(teacher.act, seed)
 
         def lesson(steps: int, before: int = 0, student: CameraPolicy | None = None) -> Dataset:
@@ -431,7 +415,7 @@ def train_student(
             student = _student(shown, settings, seed, min(_BETWEEN, settings.most_steps))
             shown.append(lesson(each, sum(map(len, shown)), student))
     policy = _student(shown, settings, seed, settings.most_steps)
-    return stated(policy, env, demonstrated_steps=steps, teacher=taught)
+    return stated(policy, env, steps, seed, teacher=taught)
 
 
 def _moving(action: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -458,5 +442,5 @@ def _student(
     start = CameraPolicy.fresh(settings, seed, data.action_layout)
     data = replace(data, actions=actions)
     policy, _ = learn(data, settings=settings, seed=seed, start=start, symmetric=True)
-    card = msgspec.structs.replace(policy.card, low=(-1.0, LEAST_THROTTLE), high=(1.0, 1.0))
-    return CameraPolicy(policy.network, card)
+    net = msgspec.structs.replace(policy.net, low=(-1.0, LEAST_THROTTLE), high=(1.0, 1.0))
+    return policy.carded(clone=net)

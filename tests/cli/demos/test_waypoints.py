@@ -15,11 +15,11 @@ import simplejpeg
 from shapechanger.cli import main
 from shapechanger.cli.demos import train
 from shapechanger.cli.demos.train import DemosEvaluate, DemosTrain
-from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import DemosError, WorldError
 from shapechanger.layout import Feature, Layout
+from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.vehicles.cameras.rectify import CanonicalView
 from shapechanger.vehicles.cloning import CloningSettings
@@ -96,8 +96,8 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     """
     data, out = _record(tmp_path / "drive"), tmp_path / "policy.safetensors"
     DemosTrain(data, out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
-    card = CameraPolicy.load(out).card
-    assert card.action_layout == ACTION_LAYOUT
+    card = load_policy(out).card
+    assert card.action == ACTION_LAYOUT
     assert card.data["response"] == pytest.approx([_PER_METRE, 0.0], abs=0.01)
     assert card.data["steps"] == 50
     printed = " ".join(capsys.readouterr().out.split())
@@ -228,7 +228,7 @@ def test_a_recorded_car_teaches_a_policy_for_a_tank(
     main(["demos", "record", "Car", "--out", str(data), "--minutes", "0.1"])
     main(["demos", "train", str(data), "--out", str(out), "--waypoints"])
     assert "looks 0 degrees down" in capsys.readouterr().out
-    policy = CameraPolicy.load(out)
+    policy = load_policy(out)
     with closing(WaypointEnv("tank", put_back=True)) as env:
         policy.card.require_layouts(env.action_layout)
         seen, _ = env.reset(options={"course": 2, "start": 2})

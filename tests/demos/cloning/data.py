@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.pictures import Framing
-from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.settings import DEMOS, Augmentation, CloneSettings
+from shapechanger.demos.cloning.clone import DEMOS, Augmentation, CloneSettings
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import Dataset
 from shapechanger.layout import Feature, Layout
+from shapechanger.policy import CloneNetwork, Framing, PolicyCard
 
 KEYS: Final = Layout(
     tuple(Feature(name, "1", 0.0, 1.0) for name in ("forward", "backward", "right", "left"))
@@ -38,6 +38,20 @@ QUICK: Final = msgspec.structs.replace(
     weight_decay=1e-3,
     augmentation=Augmentation(shift=1, noisy=0.0),
 )
+
+
+def clone_card(
+    action: Layout | None = None,
+    observation: Layout | None = None,
+    data: dict[str, Any] | None = None,
+    **net: Any,
+) -> PolicyCard:
+    """Return the card of a small clone, with other values of its network."""
+    small = {"framing": Framing(height=24, width=32), "channels": (4, 6), "features": 8}
+    clone = CloneNetwork(**{**small, **net})
+    return PolicyCard(
+        learner="cloning", action=action, observation=observation, clone=clone, data=data or {}
+    )
 
 
 def stripes(n: int, seed: int, layout: Layout = KEYS, size: tuple[int, int] = (33, 50)) -> Dataset:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import CloneCard, class_numbers
+from shapechanger.demos.cloning.clone import class_numbers, clone_of, targets
 from shapechanger.demos.cloning.evaluation import (
     AskedHead,
     evaluate,
@@ -22,10 +22,11 @@ from shapechanger.demos.cloning.evaluation import (
     tercile_classes,
 )
 from shapechanger.demos.cloning.learn import best_temperature, learn
-from shapechanger.demos.cloning.pictures import CloningError, Framing
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
+from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
-from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
+from shapechanger.policy import CloneNetwork
+from tests.demos.cloning.data import KEYS, QUICK, STEERS, clone_card, stripes
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def test_only_the_chosen_steps_are_evaluated(keys: CameraPolicy) -> None:
     report = evaluate(keys, data, np.arange(60) >= 40)
     assert report.steps == 20
     assert min(report.worst) >= 40
-    with pytest.raises(CloningError, match="no step to evaluate"):
+    with pytest.raises(DemosError, match="no step to evaluate"):
         evaluate(keys, data, np.zeros(60, np.bool_))
 
 
@@ -83,7 +84,8 @@ class Answers:
 
     def __init__(self, done: NDArray[np.float64]) -> None:
         self._done = done
-        self.card = SimpleNamespace(require_layouts=lambda *_: None, classes=(), head="regression")
+        self.card = SimpleNamespace(require_layouts=lambda *_: None)
+        self.net = SimpleNamespace(classes=())
 
     def outputs(self, *_: object) -> NDArray[np.float64]:
         """Return the outputs, which the metrics of regression do not use."""
@@ -170,15 +172,15 @@ def _keys(text: str) -> np.ndarray:
 
 def _card(
     actions: np.ndarray, layout: Layout, asked: AskedHead, mirrored: np.ndarray | None = None
-) -> CloneCard:
+) -> CloneNetwork:
     fields = output_fields(actions, layout, asked, mirrored)
-    return CloneCard(framing=Framing(), channels=(8,), features=8, action_layout=layout, **fields)
+    return clone_of(clone_card(layout, **fields))
 
 
 def test_keys_become_classes_with_names() -> None:
     card = _card(_keys("FFFFFFFFFFLLLLLLNNNN"), KEYS, "auto")
-    assert (card.head, card.class_names) == ("class", ("forward", "left", "none"))
-    assert card.targets(_keys("LFNB")).tolist() == [1, 0, 2, -1]
+    assert card.class_names == ("forward", "left", "none")
+    assert targets(card, _keys("LFNB")).tolist() == [1, 0, 2, -1]
 
 
 def test_mirrored_actions_are_classes_too() -> None:
@@ -191,22 +193,22 @@ def test_numbers_are_scaled_by_their_layout() -> None:
     layout = Layout((Feature("a", "N", 0.0, 10.0), Feature("b", "m"), Feature("c", "m")))
     actions = np.stack([np.linspace(2, 8, 50), np.linspace(-3, 5, 50), np.ones(50)], axis=1)
     card = _card(actions.astype(np.float32), layout, "auto")
-    assert (card.head, card.low, card.high[:2]) == ("regression", (0.0, -3.0, 1.0), (10.0, 5.0))
-    np.testing.assert_allclose(card.targets(actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
+    assert (card.classes, card.low, card.high[:2]) == ((), (0.0, -3.0, 1.0), (10.0, 5.0))
+    np.testing.assert_allclose(targets(card, actions[:1]), [[-0.6, -1.0, -1.0]], atol=1e-6)
 
 
 def test_many_distinct_actions_give_regression() -> None:
     rng = np.random.default_rng(0)
     card = _card(rng.uniform(-1, 1, (10, 2)).astype(np.float32), STEERS, "auto")
-    assert card.head == "regression"
+    assert not card.classes
 
 
 def test_unsuitable_classes_are_refused() -> None:
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (200, 2)).astype(np.float32)
-    with pytest.raises(CloningError, match="200 different actions, but at most 16"):
+    with pytest.raises(DemosError, match="200 different actions, but at most 16"):
         output_fields(many, STEERS, "class")
-    with pytest.raises(CloningError, match=r"All of 5 actions are equal \(left\)"):
+    with pytest.raises(DemosError, match=r"All of 5 actions are equal \(left\)"):
         output_fields(_keys("LLLLL"), KEYS, "auto")
 
 

@@ -7,15 +7,15 @@ import pytest
 import torch
 from torch import Tensor
 
+from shapechanger.demos.cloning.clone import Augmentation
 from shapechanger.demos.cloning.examples import (
     augmented,
     evaluated_steps,
     mirror_of,
-    scaled,
     stretch,
 )
-from shapechanger.demos.cloning.pictures import CloningError
-from shapechanger.demos.cloning.settings import Augmentation
+from shapechanger.demos.cloning.network import scaled
+from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 from tests.demos.cloning.data import KEYS, STEERS
 
@@ -107,7 +107,7 @@ def test_values_stay_in_range() -> None:
     "wrong", [{"mirror": 1.5}, {"noisy": -0.1}, {"shift": -1}, {"noise": -1.0}, {"gain": 0.5}]
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(CloningError):
+    with pytest.raises(DemosError):
         Augmentation(**wrong)  # pyright: ignore[reportArgumentType]
 
 
@@ -145,7 +145,7 @@ def test_a_state_is_mirrored_with_its_image() -> None:
     ],
 )
 def test_a_layout_without_a_mirror_is_refused(layout: Layout, name: str) -> None:
-    with pytest.raises(CloningError, match=f"the mirror image of .*{name}"):
+    with pytest.raises(DemosError, match=f"the mirror image of .*{name}"):
         mirror_of(layout)
 
 
@@ -172,9 +172,9 @@ def test_split_by_episode() -> None:
 
 
 def test_invalid_splits_are_refused() -> None:
-    with pytest.raises(CloningError, match=r"one episode only.*split by time"):
+    with pytest.raises(DemosError, match=r"one episode only.*split by time"):
         evaluated_steps([10, 0], "episode", 0.2)
-    with pytest.raises(CloningError, match=r"share must be in \[0, 1\)"):
+    with pytest.raises(DemosError, match=r"share must be in \[0, 1\)"):
         evaluated_steps([10], "time", 1.0)
 
 

@@ -13,12 +13,12 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
+from shapechanger.demos.cloning.clone import CloneSettings
 from shapechanger.demos.cloning.evaluation import evaluate
 from shapechanger.demos.cloning.learn import Inputs, MemberCheck, Training, learn
-from shapechanger.demos.cloning.pictures import CloningError, PolicyError
-from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.dataset import Dataset
+from shapechanger.errors import DemosError, PolicyError
 from shapechanger.layout import Feature, Layout
 from tests.demos.cloning.data import KEYS, QUICK, SMALL, STEERS, corridor, error, stripes
 
@@ -53,7 +53,7 @@ def test_it_learns_which_key_is_held(keys: Cloned) -> None:
     report = evaluate(policy, stripes(90, 1))
     assert report.accuracy > 0.9
     assert report.macro_f1 > 0.9
-    assert (policy.card.head, policy.card.members) == ("class", 2)
+    assert (report.head, policy.net.members) == ("class", 2)
     assert training.learned == 200
     assert training.mirrored > 0.3  # The data go to both sides.
 
@@ -61,7 +61,7 @@ def test_it_learns_which_key_is_held(keys: Cloned) -> None:
 def test_actions_follow_the_layout(keys: Cloned) -> None:
     done = keys[0].predict_many(stripes(30, 2).pictures)
     assert done.shape == (30, 4)
-    assert set(map(tuple, done.tolist())) <= set(keys[0].card.classes)
+    assert set(map(tuple, done.tolist())) <= set(keys[0].net.classes)
     probabilities = keys[0].outputs(stripes(30, 2).pictures)
     np.testing.assert_allclose(probabilities.sum(axis=1), 1.0, atol=1e-5)
 
@@ -81,7 +81,7 @@ def test_applied_actions_are_not_inputs_and_missing_values_are_handled() -> None
     assert data.states is not None
     data.states[::3, 1] = np.nan
     policy, _ = learn(data, settings=QUICK, inputs="state")
-    assert policy.card.unseen == ("steering/applied",)
+    assert policy.net.unseen == ("steering/applied",)
     other = data.states.copy()
     other[:, 2] = 0.123
     done = policy.predict_many(None, data.states)
@@ -145,7 +145,7 @@ def test_a_policy_for_another_layout_is_refused(keys: Cloned) -> None:
     with pytest.raises(PolicyError, match=r"needs the state distance \[m\].*gets none"):
         felt.card.require_layouts(KEYS)
     plain = CameraPolicy.fresh(QUICK, 0, STEERS)
-    assert plain.card.action_layout is None
+    assert plain.card.action is None
     plain.card.require_layouts(STEERS)
     with pytest.raises(PolicyError, match="policy are steering, throttle"):
         plain.card.require_layouts(KEYS)
@@ -164,7 +164,8 @@ def test_the_training_log_matches_the_policy(driver: Cloned) -> None:
     policy, training = driver
     assert [check.step for check in training.checks] == [0, 30, 60, 90, 120, 150]
     best = min(training.checks, key=lambda check: check.error)
-    assert training.best_steps == (best.step,) == (policy.card.steps,)
+    assert training.best_steps == (best.step,)
+    assert policy.card.steps == training.learned
 
 
 def test_a_start_policy_helps_with_few_images(driver: Cloned) -> None:
@@ -194,8 +195,8 @@ def test_a_start_policy_sets_the_architecture_and_is_not_changed(driver: Cloned)
     further, _ = _cloned(few, settings, policy, seed=7)
     np.testing.assert_array_equal(policy.predict_many(few.pictures), before)
     assert not np.array_equal(further.predict_many(few.pictures), before)
-    assert (policy.card.seeds, further.card.seeds) == ((0,), (0, 7))
-    assert further.card.channels == SMALL.channels
+    assert (policy.net.seeds, further.net.seeds) == ((0,), (0, 7))
+    assert further.net.channels == SMALL.channels
 
 
 def test_one_image_is_enough() -> None:
@@ -237,20 +238,20 @@ def test_the_number_of_steps_follows_the_images() -> None:
 
 def test_invalid_data_are_refused() -> None:
     data = stripes(20, 0)
-    with pytest.raises(CloningError, match="no step to learn from"):
+    with pytest.raises(DemosError, match="no step to learn from"):
         learn(data, np.zeros(20, np.bool_), settings=QUICK)
-    with pytest.raises(CloningError, match="no images"):
+    with pytest.raises(DemosError, match="no images"):
         learn(replace(data, pictures=None), settings=QUICK, inputs="picture")
-    with pytest.raises(CloningError, match="no state"):
+    with pytest.raises(DemosError, match="no state"):
         learn(replace(data, states=None, state_layout=None), settings=QUICK, inputs="both")
     data.actions[3, 0] = np.nan
-    with pytest.raises(CloningError, match=r"Action 3 must be finite, got \[nan"):
+    with pytest.raises(DemosError, match=r"Action 3 must be finite, got \[nan"):
         learn(data, settings=QUICK)
     few = corridor(4, 0)
     few.actions[2] = [0.0, 1.5]
-    with pytest.raises(CloningError, match=r"action 2 is \[0.0, 1.5\]"):
+    with pytest.raises(DemosError, match=r"action 2 is \[0.0, 1.5\]"):
         _cloned(few, _HASTY)
-    with pytest.raises(CloningError, match="needs an image"):
+    with pytest.raises(DemosError, match="needs an image"):
         _cloned(replace(corridor(4, 0), pictures=None), _HASTY)
 
 
@@ -266,5 +267,5 @@ def test_invalid_data_are_refused() -> None:
     ],
 )
 def test_settings_that_contradict_themselves_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(CloningError):
+    with pytest.raises(DemosError):
         CloneSettings(**wrong)  # pyright: ignore[reportArgumentType]

@@ -7,8 +7,10 @@ import pytest
 import torch
 from torch import Tensor
 
+from shapechanger.demos.cloning.clone import prepare
 from shapechanger.demos.cloning.network import DIRECTIONS, Eyes, edges
-from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
+from shapechanger.errors import DemosError, PolicyError
+from shapechanger.policy import Framing
 
 _FRAMING = Framing()
 
@@ -68,7 +70,7 @@ def test_prepared_images_are_returned_unchanged() -> None:
     ],
 )
 def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
-    with pytest.raises(CloningError, match=words):
+    with pytest.raises(DemosError, match=words):
         prepare(pictures, _FRAMING)
 
 
@@ -76,7 +78,7 @@ def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
     "wrong", [{"height": 0}, {"width": -1}, {"top": 1.0}, {"top": float("nan")}]
 )
 def test_invalid_framing_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(CloningError, match="Invalid framing of"):
+    with pytest.raises(PolicyError, match="Invalid framing of"):
         Framing(**wrong)  # pyright: ignore[reportArgumentType]
 
 

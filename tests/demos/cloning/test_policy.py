@@ -1,89 +1,119 @@
-"""The file of a cloned policy: exact round trip, and rejection of anything else."""
+"""Clones in files, of safetensors and ONNX: equal actions, and refusals of anything else."""
 
 from __future__ import annotations
 
 import json
-import pickle
-from collections.abc import Callable
+import shutil
 from pathlib import Path
 from typing import Any, cast
 
+import msgspec
 import numpy as np
 import pytest
-import torch
 from numpy.typing import NDArray
+from onnx import TensorProto, helper
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
-from shapechanger.demos.cloning.policy import KIND, CameraPolicy
-from shapechanger.policy import read_tensors, tensor_bytes
+from shapechanger.demos.cloning.clone import OnnxClone
+from shapechanger.demos.cloning.network import CameraPolicy
+from shapechanger.errors import DemosError, PolicyError
+from shapechanger.layout import Feature, Layout
+from shapechanger.policy import load_policy, read_tensors, tensor_bytes
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from tests.demos.cloning.data import SMALL, STATE, corridor
+from tests.demos.cloning.data import SMALL, clone_card, corridor
 
 _PICTURES = cast("NDArray[np.uint8]", corridor(20, 0).pictures)
-
-
-def _policy() -> CameraPolicy:
-    return CameraPolicy.fresh(SMALL, 0)
+_STATE = Layout((Feature("speed", "m/s"), Feature("distance", "m"), Feature("bump", "1")))
+_STATES = np.array([[1.5, np.nan, 1.0], [0.5, 1.0, 0.1]], np.float32)
+_CARDS = {
+    "edges": clone_card(eyes="edges", low=(-0.5, 0.0), high=(0.5, 1.0)),
+    "both, several": clone_card(None, _STATE, nerves=(8, 4), members=3),
+    "state, classes": clone_card(
+        None,
+        _STATE,
+        eyes="none",
+        nerves=(8,),
+        unseen=("bump",),
+        classes=((-1.0, 0.5), (0.0, 1.0), (1.0, 0.5)),
+        class_names=("left", "forward", "right"),
+    ),
+}
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """A file with a policy."""
     file = tmp_path / "policies" / "corridor.safetensors"
-    _policy().save(file)
+    CameraPolicy.fresh(SMALL, 0).save(file)
     return file
 
 
-def test_a_policy_round_trips(path: Path) -> None:
-    policy = _policy().described(command="clone it", minutes=3, seeds=[1, 2])
-    policy.save(path)
-    again = CameraPolicy.load(path)
-    np.testing.assert_array_equal(again.predict_many(_PICTURES), policy.predict_many(_PICTURES))
+@pytest.mark.parametrize("kind", _CARDS)
+def test_files_have_the_same_card_and_actions(kind: str, tmp_path: Path) -> None:
+    card = _CARDS[kind]
+    policy = CameraPolicy.blank(card, seed=1).described(command="clone it", minutes=[1, 2])
+    saved, exported = tmp_path / "policy.safetensors", tmp_path / "policy.onnx"
+    policy.save(saved)
+    again = load_policy(saved)
     assert again.card == policy.card
-    assert again.card.data == {"minutes": 3, "seeds": [1, 2]}
-    assert again.card.command == "clone it"
-    again.save(path.with_name("again.safetensors"))
-    assert path.with_name("again.safetensors").read_bytes() == path.read_bytes()
+    again.save(tmp_path / "again.safetensors")
+    assert (tmp_path / "again.safetensors").read_bytes() == saved.read_bytes()
+
+    policy.export(exported, body="car", control_hz=20.0)
+    onnx = load_policy(exported)
+    assert isinstance(onnx, OnnxClone)
+    net = msgspec.structs.replace(policy.net, body="car", control_hz=20.0)
+    assert onnx.card == msgspec.structs.replace(policy.card, clone=net)
+    with pytest.raises(PolicyError, match="cannot be written again"):
+        onnx.save(saved)
+
+    images = None if policy.net.eyes == "none" else _PICTURES[:2]
+    states = None if card.observation is None else _STATES
+    acted = policy.predict_many(images, states)
+    both = {"image": images, "state": states}
+    seen = both if images is not None and states is not None else (images, states)[images is None]
+    for one in (policy, again):
+        np.testing.assert_array_equal(one.act(seen), acted)
+        single = one.predict(*(None if part is None else part[0] for part in both.values()))
+        np.testing.assert_allclose(single, acted[0], atol=1e-6)
+    np.testing.assert_allclose(onnx.act(seen), acted, atol=1e-5)
+    shutil.copy(saved, exported)  # A change of the file changes nothing.
+    np.testing.assert_allclose(onnx.act(seen), acted, atol=1e-5)
 
 
-def test_single_and_batch_predictions_agree() -> None:
-    policy = _policy()
-    many = policy.predict_many(_PICTURES)
-    assert many.dtype == np.float32
-    assert np.abs(many).max() <= 1.0
-    for picture, action in zip(_PICTURES, many, strict=True):
-        np.testing.assert_allclose(policy.predict(picture), action, atol=1e-6)
+@pytest.mark.parametrize("vehicle", CLONES)
+def test_the_clones_of_the_package_drive(vehicle: str) -> None:
+    actions = load_policy(CLONES[vehicle]).act(np.zeros((2, 120, 160, 3), np.uint8))
+    assert actions.shape == (2, 2)
+    assert np.abs(actions).max() <= 1.0
 
 
 def test_predictions_hardly_depend_on_brightness() -> None:
-    policy = _policy()
-    bright = (_PICTURES // 2) * 2
+    policy, bright = CameraPolicy.fresh(SMALL, 0), (_PICTURES // 2) * 2
     np.testing.assert_allclose(
         policy.predict_many(bright // 2), policy.predict_many(bright), atol=0.02
     )
 
 
-def test_other_sizes_are_accepted_and_missing_images_refused() -> None:
-    assert _policy().predict(np.zeros((50, 50, 3), np.uint8)).shape == (2,)
-    with pytest.raises(CloningError, match="Images must be uint8"):
-        _policy().predict(np.zeros((50, 50), np.uint8))
-    with pytest.raises(CloningError, match="needs an image, and none was given"):
-        _policy().predict(None, np.zeros(3))
+def test_missing_inputs_are_refused() -> None:
+    policy = CameraPolicy.blank(_CARDS["both, several"], 0)
+    with pytest.raises(DemosError, match="Images must be uint8"):
+        policy.predict(np.zeros((50, 50), np.uint8), _STATES[0])
+    with pytest.raises(DemosError, match="needs an image, and none was given"):
+        policy.predict(None, _STATES[0])
+    with pytest.raises(DemosError, match=r"needs the state speed, distance, bump"):
+        policy.predict(_PICTURES[0], np.zeros(2))
 
 
-def _changed(path: Path, weights: dict[str, Any] | None = None, **card: Any) -> None:
+def _changed(path: Path, weights: dict[str, Any] | None = None, **net: Any) -> None:
     """Rewrite a file with other weights or another card, and a matching hash."""
-    content, old = read_tensors(path, KIND)
-    card_fields = {**json.loads(content), **card}
-    path.write_bytes(
-        tensor_bytes(old if weights is None else weights, json.dumps(card_fields).encode(), KIND)
-    )
+    card, old = read_tensors(path)
+    fields = json.loads(msgspec.json.encode(card))
+    fields["clone"] |= net
+    path.write_bytes(tensor_bytes(old if weights is None else weights, json.dumps(fields).encode()))
 
 
 def test_unsuitable_weights_are_refused(path: Path) -> None:
-    state = {name: value.numpy() for name, value in _policy().network.state_dict().items()}
-    bias = "hands.bias"
+    state, bias = CameraPolicy.fresh(SMALL, 0).tensors(), "hands.bias"
     for weights in (
         {**state, bias: np.zeros(3, np.float32)},
         {**state, "more": np.zeros(3, np.float32)},
@@ -94,32 +124,7 @@ def test_unsuitable_weights_are_refused(path: Path) -> None:
     ):
         _changed(path, weights)
         with pytest.raises(PolicyError, match="is not a policy that"):
-            CameraPolicy.load(path)
-
-
-@pytest.mark.parametrize("write", [torch.save, pickle.dump], ids=["torch", "pickle"])
-def test_nothing_is_unpickled(
-    path: Path, write: Callable[..., None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Policy files are untrusted."""
-    with path.open("wb") as file:
-        write({"hands.bias": _Trap()}, file)
-    with pytest.raises(PolicyError, match="not a safetensors file"):
-        CameraPolicy.load(path)
-    assert "trapped" not in capsys.readouterr().out
-
-
-class _Trap:
-    """Runs code when it is unpickled."""
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (print, ("trapped",))
-
-
-@pytest.mark.parametrize("clone", [*CLONES.values()], ids=[*CLONES])
-def test_the_policies_of_the_package_load(clone: Path) -> None:
-    action = CameraPolicy.load(clone).predict(np.zeros((120, 160, 3), np.uint8))
-    assert action.shape == (2,)
+            load_policy(path)
 
 
 @pytest.mark.parametrize(
@@ -133,53 +138,51 @@ def test_the_policies_of_the_package_load(clone: Path) -> None:
         {"framing": {"height": 10**7, "width": 10**7}},
         {"framing": {"height": 10**30}},
         {"members": 33},
+        {"nerves": [4]},
+        {"classes": [[1.0]], "class_names": ["one"]},
+        {"low": [0.0, 0.0]},
     ],
 )
 def test_an_invalid_card_is_refused(path: Path, changes: dict[str, Any]) -> None:
     _changed(path, **changes)
-    with pytest.raises(PolicyError, match=r"corridor\.safetensors is n"):
-        CameraPolicy.load(path)
+    with pytest.raises(PolicyError, match=r"corridor\.safetensors is not a policy"):
+        load_policy(path)
+
+
+def _model(operator: str = "Identity", domain: str = "", card: str = "", **more: str) -> bytes:
+    make: Any = helper
+    node = make.make_node(operator, ["x"], ["y"], domain=domain, **more)
+    sides = [make.make_tensor_value_info(name, TensorProto.FLOAT, ["n", 2]) for name in "xy"]
+    graph = make.make_graph([node], "other", sides[:1], sides[1:])
+    domains = [make.make_opsetid("", 17), *([make.make_opsetid(domain, 1)] if domain else [])]
+    model = make.make_model(graph, opset_imports=domains, ir_version=8)
+    if card:
+        make.set_model_props(model, {"shapechanger": card})
+    return model.SerializeToString()
+
+
+# A network that was compiled for a provider.
+_COMPILED = _model(
+    "EPContext", "com.microsoft", ep_cache_context="x", source="TensorrtExecutionProvider"
+)
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("content", "words"),
     [
-        (lambda content: content[:-100] + bytes([content[-100] ^ 1]) + content[-99:], "its hash"),
-        (lambda content: tensor_bytes({"policy.weight": np.zeros(3)}, b"{}"), "it is a policy"),
-        (lambda content: content[: len(content) // 2], ""),
-        (lambda _: b"PK\x03\x04", ""),
+        (b"\x08\x08garbage", "protobuf parsing failed"),
+        (_model(), "no card of Shapechanger"),
+        (_model(card="{}"), "missing required field"),
+        (_model(card=msgspec.json.encode(clone_card()).decode()), "its card says"),
+        # An operator that only the provider of somebody's accelerator has.
+        (_model("Turbo", domain="com.accelerator"), "com.accelerator:Turbo"),
+        (_COMPILED, "not compatible with any execution provider"),
     ],
 )
-def test_another_or_damaged_file_is_refused(
-    path: Path, change: Callable[[bytes], bytes], words: str
-) -> None:
-    path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(PolicyError, match=rf"corridor\.safetensors is not a policy that.*{words}"):
-        CameraPolicy.load(path)
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(PolicyError, match=r"There is no policy file .*nowhere\.safetensors"):
-        CameraPolicy.load(tmp_path / "nowhere.safetensors")
-    with pytest.raises(PolicyError, match="is not a policy that"):
-        CameraPolicy.load(tmp_path)
-
-
-@pytest.mark.parametrize("eyes", ["none", "colours"])
-def test_a_clone_with_a_state_acts_on_states(eyes: Any) -> None:
-    """Without images an observation is the state; with both it is a mapping."""
-    card = CloneCard(
-        framing=Framing(height=24, width=32),
-        channels=(4, 6),
-        features=8,
-        eyes=eyes,
-        nerves=(8,),
-        state_layout=STATE,
-    )
-    clone = CameraPolicy.blank(card, seed=1)
-    states = np.array([[0.5, 1.0, 0.1], [1.5, 0.2, 0.3]])
-    images = None if eyes == "none" else np.full((2, 60, 80, 3), 90, np.uint8)
-    observations = states if images is None else {"image": images, "state": states}
-    acted = clone.act(observations)
-    np.testing.assert_array_equal(acted, clone.predict_many(images, states))
-    assert not np.array_equal(acted[0], acted[1])
+def test_other_onnx_files_are_refused(content: bytes, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "policy.onnx"
+    file.write_bytes(content)
+    with pytest.raises(PolicyError, match="is not a policy that") as refusal:
+        load_policy(file)
+    assert words in str(refusal.value)
+    assert "\n" not in str(refusal.value)

@@ -13,9 +13,9 @@ import torch
 from stable_baselines3 import PPO, SAC
 
 from shapechanger.demos.cloning.learn import Inputs, learn
-from shapechanger.demos.cloning.pictures import PolicyError
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.cloning.sb3 import ChosenActions, NormedReLU, as_ppo, as_sac
+from shapechanger.errors import PolicyError
 from shapechanger.layout import Layout
 from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 
@@ -102,7 +102,7 @@ def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
     model = PPO.load(tmp_path / "ppo.zip", env=ChosenActions(_World(KEYS, "picture"), policy))
     chosen = model.predict(data.pictures, deterministic=True)[0]
     np.testing.assert_array_equal(
-        np.asarray(policy.card.classes)[chosen], policy.predict_many(data.pictures)
+        np.asarray(policy.net.classes)[chosen], policy.predict_many(data.pictures)
     )
     model.learn(16)
 

@@ -13,14 +13,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import Framing
-from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.profile import load
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
+from tests.demos.cloning.data import clone_card
 from tests.robot.console.browser import Console, Pins
 from tests.robot.twin.robots import until
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
@@ -259,17 +258,8 @@ def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
 def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_path: Path) -> None:
     """The page shows which one runs and what it does; it drives once a person arms the robot."""
     car = write_profile(tmp_path, PATIENT_CAR)
-    card = CloneCard(
-        framing=Framing(),
-        channels=(1,),
-        features=1,
-        eyes="none",
-        nerves=(1,),
-        action_layout=car.action_layout(),
-        state_layout=car.state_layout(),
-        low=(0.3, 0.3),
-        high=(0.3, 0.3),
-    )
+    net = {"eyes": "none", "nerves": (1,), "low": (0.3, 0.3), "high": (0.3, 0.3)}
+    card = clone_card(car.action_layout(), car.state_layout(), **net)
     folder = tmp_path / "policies"
     for name in ("novice", "student"):
         CameraPolicy.blank(card, seed=0).export(folder / f"{name}.onnx")

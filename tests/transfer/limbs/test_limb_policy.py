@@ -16,7 +16,6 @@ from shapechanger.errors import StudyError, TransplantError
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_limbs
-from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import LimbSettings
@@ -260,7 +259,7 @@ def test_onnx_of_a_body_equals_pytorch(tmp_path: Path) -> None:
     )
     with EXTENDED.make() as env:
         export_limbs(trained, env, EXTENDED, tmp_path / "ant.onnx")
-        exported = OnnxPolicy(tmp_path / "ant.onnx")
+        exported = load_policy(tmp_path / "ant.onnx")
         assert exported.card.env == EXTENDED
         acting = fitted(env, trained.card.observation, 12)
         observation, _ = env.reset(seed=0)

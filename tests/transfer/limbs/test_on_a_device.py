@@ -17,7 +17,6 @@ from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
 from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.export import export_limbs
-from shapechanger.transfer.learners.card import OnnxPolicy
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.rsl import RslVecEnv
@@ -180,7 +179,7 @@ def test_the_file_acts_in_an_unseen_body(policy: TrainedPolicy, tmp_path: Path) 
         acting = fitted(env, loaded.card.observation)
         observation, _ = env.reset(seed=0)
         expected = acting.rows.actions(loaded.act(acting.rows.of(observation[None])))
-    exported = OnnxPolicy(tmp_path / "ant.onnx")
+    exported = load_policy(tmp_path / "ant.onnx")
     np.testing.assert_allclose(exported.act(observation[None]), expected, atol=1e-5)
 
 

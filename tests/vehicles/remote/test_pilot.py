@@ -8,18 +8,16 @@ import signal
 import subprocess
 from collections.abc import Generator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from shapechanger.cli import main
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import Framing, PolicyError
-from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.errors import RobotRefused
+from shapechanger.demos.cloning.network import CameraPolicy
+from shapechanger.errors import PolicyError, RobotRefused
 from shapechanger.layout import Feature, Layout
+from shapechanger.policy import PolicyCard
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.profile.load import find_profile
@@ -27,6 +25,7 @@ from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.remote.pilot import require_fit
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
+from tests.demos.cloning.data import clone_card
 from tests.robot.twin.robots import until
 
 _STEERING = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in ("steering", "throttle")))
@@ -48,40 +47,37 @@ _CAR = RobotCard(
     camera_fovy_deg=48.8,
     turning=(1.9, 0.0),
 )
-_CLONE = CloneCard(framing=Framing(), channels=(1,), features=1)
-_WAYPOINTS = CloneCard(framing=Framing(), channels=(1,), features=1, action_layout=ACTION_LAYOUT)
+_CLONE = clone_card()
+_WAYPOINTS = clone_card(ACTION_LAYOUT)
 
 
 def test_policies_that_fit() -> None:
     """A clone of the same body and rate, and waypoints from any body."""
-    require_fit(replace(_CLONE, body="car", control_hz=20.0), _CAR, measures=False)
+    require_fit(clone_card(body="car", control_hz=20.0), _CAR, measures=False)
     require_fit(_CLONE, _CAR, measures=False)
-    require_fit(replace(_WAYPOINTS, control_hz=20.0), _CAR, measures=False)
+    require_fit(clone_card(ACTION_LAYOUT, control_hz=20.0), _CAR, measures=False)
     require_fit(_WAYPOINTS, replace(_CAR, turning=None), measures=True)
 
 
 @pytest.mark.parametrize(
-    ("card", "origin", "robot", "text"),
+    ("card", "robot", "text"),
     [
-        (_CLONE, {"body": "tank"}, _CAR, "learned to steer a tank, and my-car is a car"),
-        (_CLONE, {"control_hz": 10.0}, _CAR, "10 actions a second, and my-car has control_hz = 20"),
-        (_CLONE, {}, replace(_CAR, image_size=None), "my-car has no camera"),
+        (clone_card(body="tank"), _CAR, "learned to steer a tank, and my-car is a car"),
+        (clone_card(control_hz=10.0), _CAR, "10 actions a second, and my-car has control_hz = 20"),
+        (_CLONE, replace(_CAR, image_size=None), "my-car has no camera"),
         (
             _CLONE,
-            {},
             replace(_CAR, action_layout=_STATE.to_json()),
             "those required here are speed",
         ),
-        (_WAYPOINTS, {}, replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
-        (_WAYPOINTS, {}, replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
+        (_WAYPOINTS, replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
+        (_WAYPOINTS, replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
     ],
 )
-def test_policies_that_do_not_fit(
-    card: CloneCard, origin: dict[str, Any], robot: RobotCard, text: str
-) -> None:
+def test_policies_that_do_not_fit(card: PolicyCard, robot: RobotCard, text: str) -> None:
     """The sentence names what differs."""
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
-        require_fit(replace(card, **origin), robot, measures=False)
+        require_fit(card, robot, measures=False)
     assert text in str(refusal.value)
 
 
@@ -99,7 +95,7 @@ def test_a_rate_within_the_jitter_of_the_recording_fits(
     hz: float, jitter: object, fits: bool
 ) -> None:
     """A policy's own demonstrations say how exactly its rate is known."""
-    card = replace(_CLONE, data={"rate_jitter": jitter}, control_hz=hz)
+    card = clone_card(data={"rate_jitter": jitter}, control_hz=hz)
     with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
         require_fit(card, _CAR, measures=False)
 

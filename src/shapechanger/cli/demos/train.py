@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import io
 from dataclasses import astuple, dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import numpy as np
 import tyro
+from msgspec.structs import replace
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
-from shapechanger.demos.clone_report import write_report
-from shapechanger.demos.cloning.evaluation import evaluate, outlook
-from shapechanger.demos.cloning.pictures import ShrunkFrames
-from shapechanger.demos.cloning.settings import settings_for
+from shapechanger.demos.clone_report import outlook, write_report
+from shapechanger.demos.cloning.clone import ShrunkFrames, load_clone, settings_for
+from shapechanger.demos.cloning.evaluation import evaluate
 from shapechanger.demos.dataset import Dataset, count_steps, load_dataset
 from shapechanger.errors import DemosError, OutputError, StudyError, check_seed
 from shapechanger.files import require_file, write_atomic
@@ -27,7 +26,7 @@ from shapechanger.vehicles.waypoints import SteeringResponse, as_waypoints
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.evaluation import EvaluationResult
     from shapechanger.demos.cloning.learn import MemberCheck
-    from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.demos.cloning.network import CameraPolicy
     from shapechanger.vehicles.cloning import CloningSettings
 
 
@@ -83,8 +82,6 @@ class DemosTrain(_Waypoints):
 
     def run(self) -> None:
         self._require_files()
-        # The report comes last; check its requirements before the work.
-        import_module("shapechanger.demos.clone_report")
         from shapechanger.demos.cloning.examples import evaluated_steps  # PyTorch.
         from shapechanger.demos.cloning.learn import learn  # PyTorch.
 
@@ -133,15 +130,14 @@ class DemosTrain(_Waypoints):
         except KeyboardInterrupt:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
         say(training.mirror_note)
-        policy = policy.described(
+        body = "" if view is not None else data.body
+        net = replace(policy.net, body=body, control_hz=data.control_hz)
+        policy = policy.carded(clone=net).described(
             command=command_line(),
             data=str(self.data),
             digest=shrinking.digest(data.actions),
-            learned=n,
             learned_s=n / len(data) * data.duration_s,
             steps=len(data),
-            body="" if view is not None else data.body,
-            control_hz=data.control_hz,
             rate_jitter=round(data.rate_jitter, 4),
             **origin,
         )
@@ -156,9 +152,8 @@ class DemosTrain(_Waypoints):
         numbers = write_report(page, self.out.name, policy, data, evaluation, training, note)
         say(f"wrote {self.out}, {page} and {numbers}")
         say(note)
-        if (ahead := outlook(policy.card)) is not None:
-            say(ahead.expected)
-            say(ahead.next_step)
+        if ahead := outlook(policy.card):
+            say(ahead)
         _print_evaluation(evaluation)
 
     def _require_files(self) -> None:
@@ -218,19 +213,17 @@ class DemosEvaluate(_Waypoints):
     """A page to write, with the worst frames; the numbers are written next to it as JSON."""
 
     def run(self) -> None:
-        from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
-
-        policy = CameraPolicy.load(self.policy)
-        layout = policy.card.action_layout
+        policy = load_clone(self.policy)
+        layout = policy.card.action
         has_waypoints = layout is not None and layout.names[0].startswith("waypoint/")
         view = self.view() if has_waypoints else None
-        shrinking = ShrunkFrames(policy.card.framing, view)
+        shrinking = ShrunkFrames(policy.net.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         if view is not None and view.rectifiers:
             data, _ = self.converted(data, view)
         evaluation = evaluate(policy, data)
         note = f"These are the {len(data)} steps of {self.data}."
-        learned = policy.card.data.get("learned", 0)
+        learned = policy.card.steps
         if policy.card.data.get("digest") == shrinking.digest(data.actions):
             note = f"The policy learned from the first {learned} of these {len(data)} steps."
             if learned < len(data):

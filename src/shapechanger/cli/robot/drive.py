@@ -15,7 +15,7 @@ from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
 from shapechanger.cli.robot.remote import RobotName
-from shapechanger.demos.cloning.card import OnnxClone
+from shapechanger.demos.cloning.clone import load_clone
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
@@ -26,7 +26,7 @@ from shapechanger.robot.link.messages import Observation
 from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.policy import CameraPolicy
+    pass
 
 _LOOK_EVERY_S: Final = 0.2
 
@@ -303,13 +303,7 @@ class Driving:
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
-    policy: CameraPolicy | OnnxClone
-    if path.suffix == ".onnx":
-        policy = OnnxClone(path)
-    else:
-        from shapechanger.demos.cloning.policy import CameraPolicy  # PyTorch.
-
-        policy = CameraPolicy.load(path)
+    policy = load_clone(path)
     with RobotClient.connect(robot, frames=False) as there:
         require_fit(policy.card, there.welcome, measures=True)
     return PolicyDriver(policy, path.stem, robot)

@@ -16,10 +16,10 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import require_port
-from shapechanger.demos.cloning.card import OnnxClone
-from shapechanger.demos.cloning.pictures import PolicyError
+from shapechanger.demos.cloning.clone import load_clone
 from shapechanger.errors import (
     MissingExtra,
+    PolicyError,
     RobotError,
     RobotRefused,
     check_seed,
@@ -122,7 +122,7 @@ class RobotServe(Service):
                 "`shapechanger policies export` writes one."
             )
         for file in files:
-            policy = OnnxClone(file)
+            policy = load_clone(file)
             try:
                 require_policy(policy.card, plan.card, measures=False)
             except (PolicyError, RobotRefused) as error:

@@ -1,21 +1,18 @@
-"""Evaluation of a policy: on held-out demonstrations, and the collisions to expect of it."""
+"""Outputs of a clone, chosen from the demonstrated actions, and its evaluation on others."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import CloneCard, Head, class_numbers
-from shapechanger.demos.cloning.pictures import CloningError
+from shapechanger.demos.cloning.clone import Clone, class_numbers
+from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.dataset import Dataset
 
 AskedHead = Literal["auto", "class", "regression"]
@@ -42,14 +39,8 @@ def tercile_classes(
 ) -> tuple[list[str], NDArray[np.int64]]:
     """Return the third of its range that each value is in, one class per combination that occurs.
 
-    An action with a value outside its range, by more than the tolerance, is in the class
-    `OUT_OF_RANGE`.
-
-    Args:
-        actions: Shape (n, m).
-        layout: Meaning of the values.
-        driver: The driver's actions, shape (n, m), whose extremes replace missing bounds; None for
-            `actions`.
+    The extremes of the driver's actions, or of `actions`, replace missing bounds. An action with a
+    value outside its range, by more than the tolerance, is in the class `OUT_OF_RANGE`.
 
     Returns:
         The names of the classes, and the class index of each action, shape (n,).
@@ -61,11 +52,13 @@ def tercile_classes(
     third[outside] = -1
     found, numbers = np.unique(third, axis=0, return_inverse=True)
     parts = [name for feature in layout for name in [feature.name] * feature.size]
+
+    def word(name: str, place: int) -> str:
+        words = _WORDS.get(name.split("/")[-1])
+        return words[place] if words else f"{name} {_PLACES[place]}"
+
     names = [
-        OUT_OF_RANGE
-        if row[0] < 0
-        else " ".join(_word(name, int(place)) for name, place in zip(parts, row, strict=True))
-        for row in found
+        OUT_OF_RANGE if row[0] < 0 else " ".join(map(word, parts, row.tolist())) for row in found
     ]
     return names, numbers.reshape(-1).astype(np.int64)
 
@@ -78,18 +71,13 @@ def _ranges(
     return low, np.where(np.isfinite(layout.high), layout.high, actions.max(axis=0))
 
 
-def _word(name: str, third: int) -> str:
-    words = _WORDS.get(name.split("/")[-1])
-    return words[third] if words else f"{name} {_PLACES[third]}"
-
-
 def output_fields(
     actions: NDArray[np.float32],
     layout: Layout,
     asked: AskedHead,
     mirrored: NDArray[np.float32] | None = None,
 ) -> dict[str, Any]:
-    """Choose the output encoding from the demonstrated actions, as fields of a `CloneCard`.
+    """Choose the output encoding from the demonstrated actions, as fields of a `CloneNetwork`.
 
     Args:
         actions: Actions of the driver, shape (n, m).
@@ -98,18 +86,18 @@ def output_fields(
         mirrored: The mirrored actions, if images are mirrored; None if not.
 
     Raises:
-        CloningError: If there are too many different actions for classes, or all are equal.
+        DemosError: If there are too many different actions for classes, or all are equal.
     """
     both = actions if mirrored is None else np.concatenate((actions, mirrored))
     different, counts = np.unique(both, axis=0, return_counts=True)
     few = len(different) <= _MOST_CLASSES and _MIN_REPEATS * len(different) <= len(actions)
     if asked == "class" and len(different) > _MOST_CLASSES:
-        raise CloningError(
+        raise DemosError(
             f"There are {len(different)} different actions, but at most {_MOST_CLASSES} classes "
             "are supported: choose the head regression."
         )
     if len(np.unique(actions, axis=0)) < 2 and asked != "regression":
-        raise CloningError(
+        raise DemosError(
             f"All of {len(actions)} actions are equal ({named(actions[0], layout)}), so there is "
             "nothing to learn."
         )
@@ -117,24 +105,18 @@ def output_fields(
         order = np.argsort(-counts, kind="stable")
         classes = tuple(tuple(map(float, different[i])) for i in order)
         names = tuple(named(np.asarray(c), layout) for c in classes)
-        return {"head": "class", "classes": classes, "class_names": names}
+        return {"classes": classes, "class_names": names}
     low, high = _ranges(both, layout)
     high = np.where(high > low, high, low + 1.0)  # For a constant value.
     return {"low": tuple(map(float, low)), "high": tuple(map(float, high))}
 
 
 def named(action: NDArray[np.floating], layout: Layout) -> str:
-    """Return the name of an action: the keys that are held, or its values.
-
-    Args:
-        action: Shape (m,).
-        layout: Meaning of the values.
-    """
+    """Return the name of an action, shape (m,): the keys that are held, or its values."""
     parts = [name.split("/")[-1] for name in layout.names]
     if len(parts) != len(action):
         return " ".join(f"{value:g}" for value in action)
-    is_keys = "forward" in parts and "left" in parts and set(action.tolist()) <= {0.0, 1.0}
-    if is_keys:
+    if {"forward", "left"} <= set(parts) and set(action.tolist()) <= {0.0, 1.0}:
         held = [part for part, value in zip(parts, action, strict=True) if value]
         return "+".join(held) or "none"
     return ", ".join(f"{part} {value:g}" for part, value in zip(parts, action, strict=True))
@@ -180,7 +162,7 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
         target: Actions of the driver at the same steps.
     """
 
-    head: Head
+    head: Literal["class", "regression"]
     steps: int
     accuracy: float
     macro_f1: float
@@ -199,7 +181,7 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def evaluate(
-    policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None = None
+    policy: Clone, data: Dataset, which: NDArray[np.bool_] | None = None
 ) -> EvaluationResult:
     """Compare a policy with the driver of demonstrations.
 
@@ -210,12 +192,12 @@ def evaluate(
 
     Raises:
         PolicyError: If the layouts differ.
-        CloningError: If there is no step, or the data lack an input of the policy.
+        DemosError: If there is no step, or the data lack an input of the policy.
     """
     policy.card.require_layouts(data.action_layout, data.state_layout)
     chosen = np.flatnonzero(np.ones(len(data), np.bool_) if which is None else which)
     if not len(chosen):
-        raise CloningError("There is no step to evaluate the policy on.")
+        raise DemosError("There is no step to evaluate the policy on.")
     pictures = None if data.pictures is None else data.pictures[chosen]
     states = None if data.states is None else data.states[chosen]
     target = data.actions[chosen].astype(np.float64)
@@ -230,9 +212,9 @@ def evaluate(
     absurd: NDArray[np.bool_] | None = None
     calibration: tuple[Bin, ...] = ()
     ece: float | None = None
-    if policy.card.classes:
-        did, truth = out.argmax(axis=1), class_numbers(target, policy.card.classes)
-        names = list(policy.card.class_names)
+    if policy.net.classes:
+        did, truth = out.argmax(axis=1), class_numbers(target, policy.net.classes)
+        names = list(policy.net.class_names)
         for step in np.flatnonzero(truth < 0):  # Actions that are unknown to the policy.
             name = named(target[step], layout)
             if name not in names:
@@ -252,10 +234,10 @@ def evaluate(
     confusion = np.zeros((len(names), len(names)), np.int64)
     np.add.at(confusion, (truth, did), 1)
     # Evenly spaced steps, in order.
-    points = 0 if policy.card.classes else min(len(target), _MAX_POINTS)
+    points = 0 if policy.net.classes else min(len(target), _MAX_POINTS)
     shown = np.unique(np.linspace(0, len(target) - 1, points).round().astype(np.int64))
     return EvaluationResult(
-        head=policy.card.head,
+        head="class" if policy.net.classes else "regression",
         steps=len(target),
         accuracy=float((truth == did).mean()),
         macro_f1=macro_f1(did, truth, absurd),
@@ -288,9 +270,9 @@ def macro_f1(
     """
     scores: list[float] = []
     for one in np.union1d(predicted, truth) if absurd is None else np.unique(truth):
-        hits = float(((predicted == one) & (truth == one)).sum())
-        chosen = predicted == one if absurd is None else (predicted == one) | absurd
-        scores.append(2.0 * hits / float(chosen.sum() + (truth == one).sum()))
+        chosen, right = predicted == one, truth == one
+        taken = chosen if absurd is None else chosen | absurd
+        scores.append(2.0 * float((chosen & right).sum()) / float(taken.sum() + right.sum()))
     return float(np.mean(scores))
 
 
@@ -306,107 +288,3 @@ def _calibration(
         if inside.any()
     )
     return bins, sum(b.steps * abs(b.confidence - b.accuracy) for b in bins) / len(out)
-
-
-class Driven(NamedTuple):
-    """Collision rate of clones of the simulated expert on courses that they had not seen.
-
-    Attributes:
-        minutes: Length of the demonstrations, min.
-        per_100_m: Collisions per 100 m, over all seeds.
-        by_seed: The same of each clone; () for a single one.
-        row: Beginning of the row in benchmarks/results/corrections.json.
-    """
-
-    minutes: int
-    per_100_m: float
-    by_seed: tuple[float, ...]
-    row: str
-
-    def __str__(self) -> str:
-        rate = f"{self.per_100_m:.1f}"
-        if not self.by_seed:
-            return rate
-        return f"{rate} ({max(self.by_seed):.1f} for the worst of {len(self.by_seed)} seeds)"
-
-
-# Measured by `python -m benchmarks.run corrections`: 9 km of held-out corridors each.
-EXPERT: Final = (
-    Driven(2, 3.52, (5.89, 2.33, 2.33), "car, 3 seeds, cloned from 2 minutes of the expert"),
-    Driven(4, 1.06, (1.63, 0.80, 0.77), "car, 3 seeds, after 2 more of the expert instead"),
-    Driven(10, 0.84, (), "car, cloned from 10 minutes of the expert"),
-)
-"""Clones of the expert's driving alone, by its length."""
-CORRECTED: Final = (
-    Driven(4, 0.91, (1.10, 0.63, 1.00), "car, 3 seeds, after a round of 2 minutes of corrections"),
-    Driven(20, 0.38, (), "car, after a round of 10 minutes of corrections"),
-)
-"""Clones of the expert and of its corrections, half of the length each."""
-_MINUTE_S: Final = 60.0
-
-
-@dataclass(frozen=True, slots=True)
-class Outlook:
-    """Collisions to expect of a policy before it drives.
-
-    Attributes:
-        minutes: Length of the driving that it learned from, min.
-        expected: A sentence on the collisions of clones of as much driving, with its source.
-        next_step: A sentence on the next step.
-    """
-
-    minutes: float
-    expected: str
-    next_step: str
-
-
-def outlook(card: CloneCard) -> Outlook | None:
-    """Return the collisions to expect of a cloned driver, from its card.
-
-    Returns:
-        None if the policy does not steer by images, or its card has no `learned_s`. The rates are
-        those of a car in corridors; no other clones were measured in this way.
-    """
-    learned_s = card.data.get("learned_s", 0.0)
-    names = () if card.action_layout is None else card.action_layout.names
-    steers = "steering" in names or {"left", "right"} <= set(names)
-    known = isinstance(learned_s, int | float) and math.isfinite(learned_s) and learned_s > 0.0
-    if not (steers and known) or card.eyes == "none":
-        return None
-    minutes = round(learned_s / _MINUTE_S, 1)
-    return Outlook(
-        minutes,
-        f"It learned from {minutes:.1f} minutes of driving, so expect {_rate(minutes)} per 100 m "
-        "where it has not driven. That is what clones of a car's simulated expert had in corridors "
-        "(docs/cloning.md); a person with keys is less steady, so expect more of its clone.",
-        _next_step(minutes),
-    )
-
-
-def _rate(minutes: float) -> str:
-    """Return the collision rate between those of the nearest lengths that were measured."""
-    less = [row for row in EXPERT if row.minutes <= minutes]
-    more = [row for row in EXPERT if row.minutes > minutes]
-    if not less:
-        return f"more than {more[0]} collisions"
-    if not more:
-        return f"about {less[-1]} collisions or fewer"
-    return f"{more[0].per_100_m:.1f} to {less[-1]} collisions"
-
-
-def _next_step(minutes: float) -> str:
-    after = next((row for row in CORRECTED if row.minutes > minutes), CORRECTED[-1])
-    half = after.minutes // 2
-    correct = (
-        "let it drive and correct it (`demos record ENV --driver POLICY --corrected-by expert`, or "
-        "take over at the console of a robot), merge, and train again: "
-        f"{after.per_100_m:.1f} per 100 m after {half} minutes of driving and {half} of corrections"
-    )
-    # The rate of the shortest length is too high to aim at.
-    longer = next((row for row in EXPERT[1:] if row.minutes > minutes), None)
-    if longer is None:
-        return f"Next: {correct}."
-    return (
-        f"Next: record more ({longer.per_100_m:.1f} per 100 m after {longer.minutes} minutes), or "
-        f"{correct}."
-    )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -14,10 +14,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import CloningError
-from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
+from shapechanger.demos.cloning.clone import (
+    Augmentation,
+    CloneSettings,
+    clone_of,
+    prepared,
+    targets,
+)
+from shapechanger.demos.cloning.network import BRIGHTEST
+from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
+from shapechanger.policy import PolicyCard
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
@@ -72,7 +79,7 @@ def mirror_of(layout: Layout) -> Mirror:
         parts = set(feature.name.split("/"))
         other = _SIDE.sub(lambda found: _SIDES[found[0]], feature.name)
         if feature.shape:
-            raise CloningError(f"the mirror image of the array {feature.name} is unknown")
+            raise DemosError(f"the mirror image of the array {feature.name} is unknown")
         if other != feature.name and other in names:
             rightward = 1.0 if _SIDE.findall(feature.name) == ["right"] else -1.0
             values.append((names.index(other), 1.0, rightward))
@@ -81,7 +88,7 @@ def mirror_of(layout: Layout) -> Mirror:
         elif parts & _KEPT:
             values.append((place, 1.0, 0.0))
         else:
-            raise CloningError(f"the mirror image of {feature.name} is unknown")
+            raise DemosError(f"the mirror image of {feature.name} is unknown")
     return Mirror(*zip(*values, strict=True))
 
 
@@ -94,33 +101,26 @@ def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArr
             until they have that share, but at least one, and leaves at least one.
         share: Share of the steps, in [0, 1).
 
-    Returns:
-        Shape (sum(episodes),).
-
     Raises:
-        CloningError: If the share is out of range, or there is one episode only.
+        DemosError: If the share is out of range, or there is one episode only.
     """
     if not 0.0 <= share < 1.0:
-        raise CloningError(f"The held-out share must be in [0, 1), got {share}.")
+        raise DemosError(f"The held-out share must be in [0, 1), got {share}.")
     n = sum(episodes)
-    mask = np.zeros(n, np.bool_)
-    if not share:
-        return mask
-    if by == "time":
-        mask[n - math.floor(share * n) :] = True
-        return mask
-    lengths = [length for length in episodes if length]
-    if len(lengths) < 2:
-        raise CloningError(
-            "There is one episode only, so none can be held out: split by time instead of episode."
-        )
-    last = 0
-    for length in reversed(lengths[1:]):
-        if last and last >= share * n:
-            break
-        last += length
-    mask[n - last :] = True
-    return mask
+    last = math.floor(share * n)
+    if share and by == "episode":
+        lengths = [length for length in episodes if length]
+        if len(lengths) < 2:
+            raise DemosError(
+                "There is one episode only, so none can be held out: split by time instead of "
+                "episode."
+            )
+        last = 0
+        for length in reversed(lengths[1:]):
+            if last and last >= share * n:
+                break
+            last += length
+    return np.arange(n) >= n - last
 
 
 def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_]:
@@ -131,23 +131,10 @@ def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_
         member: Index of the member.
         members: Number of members; the last one takes the end.
         share: Length of the stretch as a share of n, in [0, 1); at most n / (members + 1) steps.
-
-    Returns:
-        Shape (n,).
     """
     length = min(math.floor(share * n), n // (members + 1))
     start = round((n - length) * (member + 1) / members)
-    mask = np.zeros(n, np.bool_)
-    mask[start : start + length] = True
-    return mask
-
-
-_BRIGHTEST: Final = 255.0
-
-
-def scaled(pictures: Tensor) -> Tensor:
-    """Return images in [0, 1], shape (n, 3, height, width), of uint8 (n, height, width, 3)."""
-    return pictures.permute(0, 3, 1, 2).float() / _BRIGHTEST
+    return (np.arange(n) >= start) & (np.arange(n) < start + length)
 
 
 def augmented(
@@ -206,7 +193,7 @@ def _moved(
     places = (index[:, None, None] * height + rows[:, :, None]) * width + columns[:, None, :]
     pixels = pictures.reshape(-1, pictures.shape[3]).index_select(0, places.reshape(-1))
     # Colours stay last in memory, which is fastest for the network.
-    return pixels.reshape(*places.shape, -1).permute(0, 3, 1, 2).float().div_(_BRIGHTEST)
+    return pixels.reshape(*places.shape, -1).permute(0, 3, 1, 2).float().div_(BRIGHTEST)
 
 
 class Batch(NamedTuple):
@@ -223,8 +210,7 @@ class Batch(NamedTuple):
     targets: Tensor
 
 
-@dataclass(frozen=True, slots=True)
-class Examples:
+class Examples(NamedTuple):
     """Training examples, with their mirror images.
 
     Attributes:
@@ -241,42 +227,10 @@ class Examples:
     mirrored_states: NDArray[np.float32] | None
     mirrored_targets: NDArray[Any]
 
-    @classmethod
-    def of(
-        cls, data: Dataset, card: CloneCard, mirror: Mirror | None, state_mirror: Mirror | None
-    ) -> Examples:
-        """Return demonstrations as a policy sees and learns them.
-
-        Args:
-            data: The demonstrations.
-            card: Card of the policy.
-            mirror: Mirror of the actions; None for no mirror images.
-            state_mirror: Mirror of the states; None for no mirror images.
-
-        Raises:
-            CloningError: If the demonstrations lack an input, or an action is out of range.
-        """
-        pictures, states = card.prepared(data.pictures, data.states)
-        if pictures is not None:  # PyTorch does not accept read-only arrays.
-            pictures = np.require(pictures, requirements=["C", "W"])
-        return cls(
-            pictures,
-            states,
-            card.targets(data.actions),
-            states if states is None or state_mirror is None else state_mirror(states),
-            card.targets(data.actions if mirror is None else mirror(data.actions)),
-        )
-
-    def __len__(self) -> int:
-        """Return the number of examples."""
-        return len(self.targets)
-
     def part(self, which: NDArray[np.bool_]) -> Examples:
         """Return the examples selected by a mask of shape (n,)."""
-        arrays = {name: getattr(self, name) for name in self.__slots__}
-        return replace(
-            self, **{n: array[which] for n, array in arrays.items() if array is not None}
-        )
+        arrays: Any = (None if array is None else array[which] for array in self)
+        return Examples(*arrays)
 
     def draw(self, few: Tensor, augmentation: Augmentation, generator: torch.Generator) -> Batch:
         """Return the examples with these indices, augmented."""
@@ -294,6 +248,33 @@ class Examples:
         if self.states is not None and self.mirrored_states is not None:
             states = select(self.states, self.mirrored_states)
         return Batch(seen, states, select(self.targets, self.mirrored_targets))
+
+
+def examples_of(
+    data: Dataset, card: PolicyCard, mirror: Mirror | None, state_mirror: Mirror | None
+) -> Examples:
+    """Return demonstrations as a policy sees and learns them.
+
+    Args:
+        data: The demonstrations.
+        card: Card of the policy.
+        mirror: Mirror of the actions; None for no mirror images.
+        state_mirror: Mirror of the states; None for no mirror images.
+
+    Raises:
+        DemosError: If the demonstrations lack an input, or an action is out of range.
+    """
+    net = clone_of(card)
+    pictures, states = prepared(card, data.pictures, data.states)
+    if pictures is not None:  # PyTorch does not accept read-only arrays.
+        pictures = np.require(pictures, requirements=["C", "W"])
+    return Examples(
+        pictures,
+        states,
+        targets(net, data.actions),
+        states if states is None or state_mirror is None else state_mirror(states),
+        targets(net, data.actions if mirror is None else mirror(data.actions)),
+    )
 
 
 def batches(
@@ -314,22 +295,18 @@ def batches(
     """
     generator = torch.Generator().manual_seed(seed)
     again = 0 if rehearsal is None else round(settings.rehearsal * settings.batch)
-    index = np.flatnonzero(learned)
-    sources = [(shown, _shuffled(index, settings.batch - again, generator))]
+    sources = [(shown, np.flatnonzero(learned), settings.batch - again)]
     if rehearsal is not None and again:
-        sources.append((rehearsal, _shuffled(np.arange(len(rehearsal)), again, generator)))
+        sources.append((rehearsal, np.arange(len(rehearsal.targets)), again))
+    orders = [(examples, _shuffled(index, few, generator)) for examples, index, few in sources]
     while True:
         parts = [
             examples.draw(next(order), settings.augmentation, generator)
-            for examples, order in sources
+            for examples, order in orders
         ]
-        if len(parts) == 1:
-            yield parts[0]
-            continue
-        pictures, states, targets = (
-            None if few[0] is None else torch.cat(few) for few in zip(*parts, strict=True)
-        )
-        yield Batch(pictures, states, cast("Tensor", targets))
+        columns: Any = zip(*parts, strict=True)
+        joined: Any = (None if few[0] is None else torch.cat(few) for few in columns)
+        yield Batch(*joined)
 
 
 def _shuffled(

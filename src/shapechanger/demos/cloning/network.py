@@ -1,4 +1,4 @@
-"""Networks of cloned policies: encoders for images and states, and a linear output layer.
+"""Cloned policies of PyTorch: encoders for images and states, and a linear output layer.
 
 The names of the attributes (`eyes`, `nerves`, `hands`, ...) name the weights in the file of
 a policy, and must not change.
@@ -6,20 +6,36 @@ a policy, and must not change.
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Sequence
-from typing import Final, cast
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any, Final, cast
 
-import torch
-from torch import Tensor, nn
-from torch.nn import functional
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.clone import Clone, CloneSettings, clone_of, prepared
+from shapechanger.errors import MissingExtra
+from shapechanger.layout import Layout
+from shapechanger.onnx_file import export_network
+from shapechanger.policy import STEERING, CloneNetwork, Framing, PolicyCard
+
+try:
+    import torch
+    from torch import Tensor, nn
+    from torch.nn import functional
+except ImportError as error:
+    raise MissingExtra("torch", "learn") from error
 
 DIRECTIONS: Final = 6
 """Number of edge directions over half a turn: 30 degrees each."""
 
+BRIGHTEST: Final = 255.0
+"""Largest value of a pixel."""
+_CHUNK: Final = 256  # Examples at a time, to bound the memory.
 _CELL: Final = 4  # Side of a cell, pixels.
 # Added before the logarithm, as a share of full brightness: about a camera's noise in the dark.
 _DARK: Final = 8.0 / 255.0
@@ -140,25 +156,21 @@ class _Several(nn.ModuleList):
 
 
 class CameraNetwork(nn.Module):
-    """Network of a policy: encoders and output layer.
+    """Network of a clone: encoders and output layer, as the card describes them."""
 
-    Args:
-        card: Architecture.
-    """
-
-    def __init__(self, card: CloneCard) -> None:
+    def __init__(self, card: PolicyCard) -> None:
         super().__init__()
+        net = clone_of(card)
+        sees, feels = net.eyes != "none", card.observation
         eyes = [
-            Eyes(card.framing, card.channels, card.features, card.eyes == "edges")
-            for _ in range(card.members if card.eyes != "none" else 0)
+            Eyes(net.framing, net.channels, net.features, net.eyes == "edges")
+            for _ in range(net.members if sees else 0)
         ]
-        nerves = [
-            Nerves(card.state_size, card.nerves) for _ in range(card.members if card.nerves else 0)
-        ]
+        nerves = [Nerves(feels.size, net.nerves) for _ in range(net.members) if feels is not None]
         self.eyes: nn.Module | None = _one_or_several(eyes)
         self.nerves: nn.Module | None = _one_or_several(nerves)
-        features = len(eyes) * card.features + (len(nerves) * card.nerves[-1] if nerves else 0)
-        self.hands = nn.Linear(features, card.outputs)
+        features = len(eyes) * net.features + (len(nerves) * net.nerves[-1] if nerves else 0)
+        self.hands = nn.Linear(features, len(net.classes) or card.action_size)
         # With colours last in memory, convolutions of a single image are a third faster.
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
@@ -169,19 +181,180 @@ class CameraNetwork(nn.Module):
             pictures: In [0, 1], shape (n, 3, height, width); None for a policy without images.
             states: Shape (n, state size); None for a policy without a state.
         """
-        found: list[Tensor] = []
-        if self.eyes is not None:
-            found.append(self.eyes(pictures))
-        if self.nerves is not None:
-            found.append(self.nerves(states))
+        given = ((self.eyes, pictures), (self.nerves, states))
+        found = [encoder(part) for encoder, part in given if encoder is not None]
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
 
 
-def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
+def _one_or_several(parts: Sequence[nn.Module]) -> nn.Module | None:
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    return _Several(parts)
+
+
+class CameraPolicy(Clone):
+    """A clone for images, states or both.
+
+    Attributes:
+        network: The network.
+        card: Architecture and origin.
+    """
+
+    def __init__(self, network: CameraNetwork, card: PolicyCard) -> None:
+        self.network = network.eval()
+        self.card = card
+
+    @classmethod
+    def fresh(
+        cls, settings: CloneSettings, seed: int, actions: Layout | None = None
+    ) -> CameraPolicy:
+        """Return an untrained policy whose actions are in [-1, 1], from an image.
+
+        Args:
+            settings: Architecture of the network.
+            seed: Seed of the weights.
+            actions: Meaning of the actions; None for the steering and throttle of any vehicle.
+        """
+        if actions is not None and actions.names == STEERING:
+            actions = None
+        clone = CloneNetwork(
+            framing=settings.framing,
+            channels=settings.channels,
+            features=settings.features,
+            eyes=settings.eyes,
+        )
+        return cls.blank(PolicyCard(learner="cloning", action=actions, clone=clone), seed)
+
+    @classmethod
+    def blank(cls, card: PolicyCard, seed: int) -> CameraPolicy:
+        """Return an untrained policy with the architecture of a card and weights of a seed."""
+        with seeded(seed):
+            return cls(CameraNetwork(card), card)
+
+    @classmethod
+    def of_file(
+        cls, card: PolicyCard, weights: Mapping[str, NDArray[Any]], algorithm: str = ""
+    ) -> CameraPolicy:
+        """Return the policy of a file, see `shapechanger.load_policy`.
+
+        Args:
+            card: Its card.
+            weights: Its arrays.
+            algorithm: Unused.
+        """
+        del algorithm
+        # On the meta device a forged card cannot allocate memory before the sizes are compared.
+        with torch.device("meta"):
+            network = CameraNetwork(card)
+        state = {name: torch.from_numpy(value.copy()) for name, value in weights.items()}  # pyright: ignore[reportUnknownMemberType]
+        network.load_state_dict(state, assign=True)
+        # Assigned weights lie in memory as in the file; sums in another order are other sums.
+        network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        for name, value in weights.items():
+            if value.dtype != np.float32 or not np.isfinite(value).all():
+                raise ValueError(f"its weights {name} must be finite and in single precision")
+        settings = msgspec.convert(card.settings, CloneSettings | None)
+        return cls(network, msgspec.structs.replace(card, settings=settings))
+
+    def tensors(self) -> dict[str, NDArray[Any]]:
+        """Return its weights, keyed by name."""
+        return {name: value.numpy() for name, value in self.network.state_dict().items()}
+
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the outputs of the network, as `Clone` describes them."""
+        return _activated(self.logits(pictures, states), self.net).numpy()
+
+    def logits(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> Tensor:
+        """Return the outputs of the last layer, from which `outputs` are computed."""
+        small, states = prepared(self.card, pictures, states)
+        known = None if states is None else torch.as_tensor(states)
+        n = len(small) if small is not None else len(known) if known is not None else 0
+        found = torch.empty(n, self.network.hands.in_features)
+        with torch.inference_mode():
+            for start in range(0, n, _CHUNK):
+                some = slice(start, start + _CHUNK)
+                found[some] = self.network.perceive(
+                    None if small is None else scaled(torch.as_tensor(small[some].copy())),
+                    None if known is None else known[some],
+                )
+            return self.network.hands(found)
+
+    def copy(self) -> CameraPolicy:
+        """Return a policy that shares no weights with this one."""
+        return CameraPolicy(copy.deepcopy(self.network), self.card)
+
+    def export(self, path: Path, *, body: str = "", control_hz: float | None = None) -> None:
+        """Write the policy as ONNX, which a robot runs without PyTorch.
+
+        Its inputs are `picture`, uint8 of the shape (n, height, width, 3) that the card's framing
+        gives, and `state`, float32 of shape (n, values); its output is `output`, float32: actions
+        in [-1, 1], or probabilities of the card's classes.
+
+        Args:
+            path: The file, such as `car.onnx`.
+            body: Kind of robot that it learned in; "" for any.
+            control_hz: Actions per second that it learned with; None if unknown.
+
+        Raises:
+            MissingExtra: If onnx or onnxscript is not installed.
+            OutputError: If the file cannot be written.
+        """
+        net = msgspec.structs.replace(self.net, body=body, control_hz=control_hz)
+        card = msgspec.structs.replace(self.card, clone=net)
+        kinds = {"picture": torch.uint8, "state": torch.float32}
+        inputs = {
+            name: torch.zeros((2, *shape), dtype=kinds[name])
+            for name, shape in card.shapes.items()
+            if name in kinds
+        }
+        export_network(_Whole(self.network, net, tuple(inputs)), inputs, card, path)
+
+
+class _Whole(nn.Module):
+    """A network with the scaling of images and outputs."""
+
+    def __init__(self, network: CameraNetwork, net: CloneNetwork, inputs: tuple[str, ...]) -> None:
+        super().__init__()
+        self.network, self.net, self.inputs = network, net, inputs
+
+    def forward(self, *given: Tensor) -> Tensor:
+        named = dict(zip(self.inputs, given, strict=True))
+        seen = scaled(named["picture"]) if "picture" in named else None
+        out = self.network.hands(self.network.perceive(seen, named.get("state")))
+        return _activated(out, self.net)
+
+
+def _activated(out: Tensor, net: CloneNetwork) -> Tensor:
+    """Return probabilities of classes, or actions in [-1, 1], for outputs of the last layer."""
+    return torch.softmax(out, dim=1) if net.classes else torch.tanh(out)
+
+
+def scaled(pictures: Tensor) -> Tensor:
+    """Return images in [0, 1], shape (n, 3, height, width), of uint8 (n, height, width, 3)."""
+    return pictures.permute(0, 3, 1, 2).float() / BRIGHTEST
+
+
+@contextmanager
+def seeded(seed: int) -> Generator[None]:
+    """Seed the global generator, and restore it at the end."""
+    fork = cast(
+        "AbstractContextManager[None]",
+        torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
+    )
+    with fork:
+        torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
+        yield
+
+
+def joined(card: PolicyCard, members: list[CameraNetwork]) -> CameraNetwork:
     """Return one network whose output is the mean of the outputs of several networks.
 
     Args:
-        card: Architecture of the joint network.
+        card: Card with the architecture of the joint network.
         members: Networks of the same architecture, each with one member.
     """
     network = CameraNetwork(card)
@@ -190,16 +363,10 @@ def joined(card: CloneCard, members: list[CameraNetwork]) -> CameraNetwork:
         if several is not None:
             for one, member in zip(several, members, strict=True):
                 one.load_state_dict(getattr(member, name).state_dict())
-    seen = card.features if card.eyes != "none" else 0
+    seen = clone_of(card).features if network.eyes is not None else 0
     weights = [member.hands.weight for member in members]
     parts = [weight[:, :seen] for weight in weights] + [weight[:, seen:] for weight in weights]
     with torch.no_grad():
         network.hands.weight.copy_(torch.cat(parts, dim=1) / len(members))
         network.hands.bias.copy_(torch.stack([member.hands.bias for member in members]).mean(dim=0))
     return network
-
-
-def _one_or_several(parts: Sequence[nn.Module]) -> nn.Module | None:
-    if len(parts) < 2:
-        return parts[0] if parts else None
-    return _Several(parts)

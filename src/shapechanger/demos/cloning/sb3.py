@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.network import CameraNetwork
-from shapechanger.demos.cloning.pictures import HALF, PolicyError, area_shares
-from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.errors import MissingExtra
+from shapechanger.demos.cloning.clone import HALF, area_shares, clone_of
+from shapechanger.demos.cloning.network import BRIGHTEST, CameraNetwork, CameraPolicy
+from shapechanger.errors import MissingExtra, PolicyError
+from shapechanger.policy import PolicyCard
 
 try:
     from stable_baselines3 import PPO, SAC
@@ -35,7 +34,6 @@ _STATE: Final = "state"
 # Logarithm of the initial standard deviation of an action before it is squashed. A larger one would
 # drown the actions of the clone in noise.
 _LOG_STD: Final = -2.0
-_BRIGHTEST: Final = 255.0
 # Raw images are large: SAC's default of a million would take 50 GB and more.
 _BUFFER: Final = 10_000
 
@@ -52,13 +50,6 @@ class NormedReLU(nn.Module):
         return functional.relu(functional.layer_norm(x, x.shape[-1:]))
 
 
-# No layer between features and actions, as in the policy.
-_SAC_NETWORKS: Final[dict[str, Any]] = {
-    "net_arch": {"pi": [], "qf": [256, 256]},
-    "activation_fn": NormedReLU,
-}
-
-
 class ClonedPerception(BaseFeaturesExtractor):
     """Frozen encoders of a clone, from raw observations to features.
 
@@ -68,43 +59,37 @@ class ClonedPerception(BaseFeaturesExtractor):
     """
 
     def __init__(self, observation_space: Any, card: str) -> None:
-        known = msgspec.json.decode(card, type=CloneCard)
-        network = CameraNetwork(known)
-        size = network.hands.in_features
-        super().__init__(observation_space, size)  # pyright: ignore[reportUnknownMemberType]
-        self.eyes, self.nerves = network.eyes, network.nerves
-        self.network = network
-        self._unseen = [known.state_layout.slices[n] for n in known.unseen if known.state_layout]
-        if known.eyes != "none":
+        known = msgspec.json.decode(card, type=PolicyCard)
+        net, layout, network = clone_of(known), known.observation, CameraNetwork(known)
+        super().__init__(observation_space, network.hands.in_features)  # pyright: ignore[reportUnknownMemberType]
+        self.eyes, self.nerves, self.network = network.eyes, network.nerves, network
+        self._unseen = [layout.slices[name] for name in net.unseen if layout is not None]
+        if net.eyes != "none":
             space = observation_space
             image = space[_IMAGE] if isinstance(space, spaces.Dict) else space
             _, height, width = cast("tuple[int, int, int]", image.shape)  # Channels first in SB3.
-            self._first = min(round(height * known.framing.top), height - 1)
-            rows = area_shares(height - self._first, known.framing.height)
+            self._first = min(round(height * net.framing.top), height - 1)
+            rows = area_shares(height - self._first, net.framing.height)
             self.register_buffer("rows", torch.as_tensor(rows), persistent=False)
-            columns = area_shares(width, known.framing.width)
+            columns = area_shares(width, net.framing.width)
             self.register_buffer("columns", torch.as_tensor(columns), persistent=False)
         del network.hands
         self.requires_grad_(False)
 
     def forward(self, observations: Tensor | dict[str, Tensor]) -> Tensor:
         """Return the features, shape (n, features)."""
-        if isinstance(observations, dict):
-            pictures, states = observations[_IMAGE], observations[_STATE]
-        else:
-            pictures = observations if self.eyes is not None else None
-            states = observations if self.nerves is not None else None
+        if not isinstance(observations, dict):
+            observations = {_STATE if self.eyes is None else _IMAGE: observations}
+        pictures, states = observations.get(_IMAGE), observations.get(_STATE)
+        if pictures is not None:  # Reduce them as `clone.prepare` does.
+            rows, columns = cast("Tensor", self.rows), cast("Tensor", self.columns)
+            seen = rows @ pictures[:, :, self._first :] @ columns.T
+            pictures = torch.floor(seen + HALF) / BRIGHTEST
         if states is not None and self._unseen:
             states = states.clone()
             for place in self._unseen:
                 states[:, place] = torch.nan
-        return self.network.perceive(None if pictures is None else self._small(pictures), states)
-
-    def _small(self, pictures: Tensor) -> Tensor:
-        """Reduce raw images in the same way as `pictures.prepare`."""
-        rows, columns = cast("Tensor", self.rows), cast("Tensor", self.columns)
-        seen = rows @ pictures[:, :, self._first :] @ columns.T
-        return torch.floor(seen + HALF) / _BRIGHTEST
+        return self.network.perceive(pictures, states)
 
 
 class _Between(nn.Module):
@@ -141,7 +126,7 @@ class ChosenActions(gym.ActionWrapper[Any, Any, Any]):
 
     def __init__(self, env: gym.Env[Any, Any], policy: CameraPolicy) -> None:
         super().__init__(env)
-        self._classes = np.asarray(policy.card.classes, np.float32)
+        self._classes = np.asarray(policy.net.classes, np.float32)
         self.action_space = spaces.Discrete(len(self._classes))
 
     def action(self, action: Any) -> NDArray[np.float32]:
@@ -166,13 +151,18 @@ def as_sac(
     Raises:
         PolicyError: If the policy has classes, which SAC does not support.
     """
-    if policy.card.classes:
+    if policy.net.classes:
         raise PolicyError(
             "This policy has classes, which SAC does not support: use PPO, or train it with the "
             "head regression."
         )
     settings = {"learning_starts": 0, "buffer_size": _BUFFER, "device": "cpu", **settings}
-    kwargs = _perception(policy) | _SAC_NETWORKS | {"share_features_extractor": True}
+    kwargs = _perception(policy) | {
+        # No layer between features and actions, as in the policy.
+        "net_arch": {"pi": [], "qf": [256, 256]},
+        "activation_fn": NormedReLU,
+        "share_features_extractor": True,
+    }
     env = _Spaces(policy, size)
     kind = "MultiInputPolicy" if isinstance(env.observation_space, spaces.Dict) else "MlpPolicy"
     model = SAC(kind, env, seed=seed, policy_kwargs=kwargs, **settings)
@@ -189,10 +179,9 @@ def as_sac(
 def as_ppo(
     policy: CameraPolicy, size: tuple[int, int] | None, *, seed: int = 0, **settings: Any
 ) -> PPO:
-    """Return the policy as a PPO model on raw observations; its `save` writes a file.
+    """Return the policy as a PPO model on raw observations, as `as_sac` does.
 
-    Its deterministic action equals the policy's. The actions of a policy with classes are class
-    indices; wrap the env in `ChosenActions`.
+    The actions of a policy with classes are class indices; wrap the env in `ChosenActions`.
 
     Args:
         policy: The policy.
@@ -202,11 +191,11 @@ def as_ppo(
     """
     settings = {"device": "cpu", **settings}
     kwargs = _perception(policy) | {"net_arch": {"pi": [], "vf": [64, 64]}, "ortho_init": False}
-    if not policy.card.classes:
+    if not policy.net.classes:
         kwargs["log_std_init"] = _LOG_STD
     model = PPO(ClonedPolicy, _Spaces(policy, size), seed=seed, policy_kwargs=kwargs, **settings)
     acting = cast("Any", model.policy)
-    net = acting.action_net if policy.card.classes else acting.action_net[0]
+    net = acting.action_net if policy.net.classes else acting.action_net[0]
     net.load_state_dict(policy.network.hands.state_dict())
     _copy_encoders(acting.features_extractor, policy)
     return model
@@ -216,27 +205,26 @@ class _Spaces(gym.Env[Any, Any]):
     """Spaces of a policy as an env that cannot be stepped."""
 
     def __init__(self, policy: CameraPolicy, size: tuple[int, int] | None) -> None:
-        card = policy.card
+        net, card = policy.net, policy.card
         parts: dict[str, gym.Space[Any]] = {}
-        if card.eyes != "none":
+        if net.eyes != "none":
             if size is None:
                 raise PolicyError("The size of the images is needed for this policy.")
             parts[_IMAGE] = spaces.Box(0, 255, (*size, 3), np.uint8)
-        if card.nerves:
-            parts[_STATE] = spaces.Box(-np.inf, np.inf, (card.state_size,), np.float32)
-        self.observation_space = (
-            spaces.Dict(parts) if len(parts) > 1 else next(iter(parts.values()))
-        )
-        if card.classes:
-            self.action_space = spaces.Discrete(len(card.classes))
+        if card.observation is not None:
+            parts[_STATE] = spaces.Box(-np.inf, np.inf, (card.observation.size,), np.float32)
+        whole = spaces.Dict(parts)
+        self.observation_space = whole if len(parts) > 1 else next(iter(parts.values()))
+        if net.classes:
+            self.action_space = spaces.Discrete(len(net.classes))
         else:
-            low = np.asarray(card.low or (-1.0,) * card.action_size, np.float32)
-            high = np.asarray(card.high or (1.0,) * card.action_size, np.float32)
+            low = np.asarray(net.low or (-1.0,) * card.action_size, np.float32)
+            high = np.asarray(net.high or (1.0,) * card.action_size, np.float32)
             self.action_space = spaces.Box(low, high, dtype=np.float32)
 
 
 def _perception(policy: CameraPolicy) -> dict[str, Any]:
-    card = msgspec.structs.replace(policy.card, data={}, settings=None, command="")
+    card = policy.carded(data={}, settings=None, command="").card
     return {
         "features_extractor_class": ClonedPerception,
         "features_extractor_kwargs": {"card": msgspec.json.encode(card).decode()},

@@ -14,7 +14,7 @@ import msgspec
 
 from shapechanger.contract.env_ref import EnvRef, EnvTraits
 from shapechanger.errors import StudyError
-from shapechanger.identity import Identity
+from shapechanger.policy import PolicyCard
 from shapechanger.registry import LEARNERS
 from shapechanger.transfer.learners.evaluation import evaluation_envs
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-__all__ = ["Learner", "LearnerSettings", "PolicyOrigin", "SharedFile", "Takes", "ignore"]
+__all__ = ["Learner", "LearnerSettings", "SharedFile", "Takes", "ignore"]
 
 Takes = Literal[
     "trial", "on-policy", "off-policy", "callback", "demonstrations", "many bodies", "device"
@@ -117,14 +117,6 @@ class SharedFile(NamedTuple):
 
     path: Path
     seed: int
-
-
-class PolicyOrigin(NamedTuple):
-    """Origin of a stored policy."""
-
-    env: EnvRef
-    steps: int
-    identity: dict[str, Identity]
 
 
 _Settings = TypeVar("_Settings", bound=LearnerSettings, covariant=True)
@@ -222,10 +214,10 @@ class Learner(Generic[_Settings]):
         """Load a policy."""
         raise NotImplementedError
 
-    def origin(self, path: Path) -> PolicyOrigin:
-        """Read where a stored policy comes from.
+    def origin(self, path: Path) -> PolicyCard:
+        """Read the card of a stored policy, which must fit as a source.
 
         Raises:
-            StudyError: If another kind of learner trained it.
+            PolicyError: If another kind of learner trained it.
         """
         raise NotImplementedError

@@ -11,7 +11,7 @@ from typing import Any, Final
 import gymnasium as gym
 import msgspec
 
-from shapechanger.errors import CorruptStudy, MissingExtra, StudyError, UnknownName
+from shapechanger.errors import MissingExtra, PolicyError, StudyError, UnknownName
 from shapechanger.transfer.learners.settings import ImportedSettings, Sb3Settings
 
 try:
@@ -66,7 +66,7 @@ def require_class(algorithm: str) -> None:
     module = algorithm.partition(":")[0]
     own = algorithm not in _SHIPPED and module not in sys.modules
     if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
-        raise CorruptStudy(
+        raise PolicyError(
             f"A policy of {algorithm} needs the module {module}, which a file may not import: "
             f"name it too, as load_policy(path, {algorithm!r}) or --learner {algorithm}."
         )

@@ -5,7 +5,6 @@ Reading one can run code in it.
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,12 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from torch import nn
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import CorruptStudy, StudyError, no_policy_file
+from shapechanger.errors import PolicyError, no_policy_file
 from shapechanger.layout import Layout
+from shapechanger.policy import PolicyCard
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import Identities
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
-from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import OffPolicySettings, PpoSettings, Sb3Settings
 from shapechanger.transfer.transplant.model import check_supported
@@ -40,8 +39,8 @@ def convert_zip(
         command: The command that converts it.
 
     Raises:
-        CorruptStudy: If the file is missing or no such zip.
-        StudyError: If it is of another algorithm or policy class.
+        PolicyError: If the file is missing or no such zip.
+        PolicyError: If it is of another algorithm or policy class.
         SpaceMismatch: If the layouts do not fit the policy's spaces.
     """
     model = load_zip(path)
@@ -57,7 +56,6 @@ def convert_zip(
         settings=settings_of_model(model),
         steps=int(model.num_timesteps),
         seed=int(model.seed or 0),
-        version=version("shapechanger"),
         identity=identity,
         command=command,
     )
@@ -74,12 +72,12 @@ def load_zip(path: Path) -> Any:
             if data["policy_class"] is kind.policy_aliases["MlpPolicy"]:
                 return kind.load(path, device="cpu")
     except FileNotFoundError:
-        raise CorruptStudy(no_policy_file(path)) from None
+        raise PolicyError(no_policy_file(path)) from None
     except Exception as error:  # A damaged pickle can raise anything.
-        raise CorruptStudy(
+        raise PolicyError(
             f"{path} is not a zip of Stable-Baselines3's PPO, SAC or TQC ({error})."
         ) from error
-    raise StudyError(
+    raise PolicyError(
         f"{path} is of another algorithm or policy class: the MlpPolicy of PPO, SAC and TQC can be "
         "converted."
     )
@@ -93,7 +91,7 @@ def settings_of_model(model: Any) -> Sb3Settings:
     of_each: Any = widths if "pi" in widths else {"pi": widths, "critic": widths}
     actor, critic = (list(layers) for layers in of_each.values())
     if actor != critic or model.policy.activation_fn is not activation:
-        raise StudyError(
+        raise PolicyError(
             f"The actor has layers {actor} and the critic {critic}, with "
             f"{model.policy.activation_fn.__name__}: both must be the same, with "
             f"{activation.__name__}."
@@ -106,7 +104,7 @@ def settings_of_model(model: Any) -> Sb3Settings:
     else:
         frequency, unit = model.train_freq
         if unit.value != "step":
-            raise StudyError("This model updates after episodes: only updates after steps fit.")
+            raise PolicyError("This model updates after episodes: only updates after steps fit.")
         kind, update = OffPolicySettings, model.n_envs * frequency
         same = ("n_envs", "batch_size", "buffer_size", "learning_starts", "gradient_steps", "gamma")
         same = (*same, "tau", "ent_coef")
@@ -124,5 +122,5 @@ def settings_of_model(model: Any) -> Sb3Settings:
     built = build_model(settings, DummyVecEnv([lambda: spaces] * model.n_envs), 0).policy
     shapes = {name: weight.shape for name, weight in model.policy.state_dict().items()}
     if shapes != {name: weight.shape for name, weight in built.state_dict().items()}:
-        raise StudyError(f"These policy_kwargs change the networks: {model.policy_kwargs}.")
+        raise PolicyError(f"These policy_kwargs change the networks: {model.policy_kwargs}.")
     return settings

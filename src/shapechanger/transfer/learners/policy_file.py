@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
@@ -21,14 +21,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import CorruptStudy, MissingExtra
-from shapechanger.files import from_builtins, write_atomic
-from shapechanger.identity import Identity
+from shapechanger.errors import MissingExtra
 from shapechanger.layout import Layout
-from shapechanger.policy import read_tensors, refusing, tensor_bytes
+from shapechanger.policy import Policy, PolicyCard
 from shapechanger.transfer.actions import ActionScale
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
-from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 
 try:
@@ -63,8 +61,7 @@ class Normalisation:
     reward: RunningMeanStd
 
 
-@dataclass(frozen=True)
-class TrainedPolicy:
+class TrainedPolicy(Policy):
     """A policy with its normalisation and card.
 
     Attributes:
@@ -75,41 +72,37 @@ class TrainedPolicy:
         card: Its provenance.
     """
 
-    model: BaseAlgorithm
-    normalisation: Normalisation | None
-    card: PolicyCard
+    def __init__(
+        self, model: BaseAlgorithm, normalisation: Normalisation | None, card: PolicyCard
+    ) -> None:
+        self.model, self.normalisation, self.card = model, normalisation, card
 
-    @property
-    def act(self) -> Act:
-        """The policy's mean actions for observations of shape (n, ...), in the env's units."""
-        return actor(self.model, self.normalisation, self.card.action)
-
-    def described(
-        self, *, command: str = "", identity: Mapping[str, Identity] | None = None
+    @classmethod
+    def of_file(
+        cls, card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str = ""
     ) -> TrainedPolicy:
-        """Return the same policy with more information on its card.
+        """Return the policy of a file, see `shapechanger.load_policy`.
 
         Args:
-            command: The command that made it; "" keeps the present one.
-            identity: Version of its ingredients (env, learner, packages); None keeps the present
-                one.
+            card: Its card, with settings as a table.
+            tensors: Its arrays.
+            algorithm: As of `shapechanger.load_policy`.
         """
-        card = msgspec.structs.replace(
-            self.card,
-            command=command or self.card.command,
-            identity=self.card.identity if identity is None else dict(identity),
-        )
-        return replace(self, card=card)
+        settings = LearnerSettings.from_builtins(card.settings)
+        card = msgspec.structs.replace(card, settings=settings)
+        _require_numbers(card, tensors)
+        return cls(_model(card, tensors, algorithm), _read_statistics(card, tensors), card)
 
-    def save(self, path: Path) -> None:
-        """Write the policy to one file of safetensors.
+    @cached_property
+    def _act(self) -> Act:
+        return actor(self.model, self.normalisation, self.card.layouts[1])
 
-        Args:
-            path: The file, such as `Ant-v1.safetensors`.
+    def act(self, observations: NDArray[Any]) -> NDArray[Any]:
+        """Return the mean actions for observations of shape (n, ...), in the env's units."""
+        return self._act(observations)
 
-        Raises:
-            OutputError: If it cannot be written.
-        """
+    def tensors(self) -> dict[str, NDArray[Any]]:
+        """Return its weights, spaces and statistics, keyed by name."""
         tensors: dict[str, NDArray[Any]] = {
             _WEIGHTS + name: value.detach().cpu().numpy()
             for name, value in self.model.policy.state_dict().items()
@@ -122,24 +115,7 @@ class TrainedPolicy:
                 statistics = getattr(self.normalisation, side)
                 for name in ("mean", "var", "count"):
                     tensors[f"{_STATISTICS}{side}.{name}"] = np.asarray(getattr(statistics, name))
-        write_atomic(path, tensor_bytes(tensors, msgspec.json.encode(self.card)))
-
-    @classmethod
-    def load(cls, path: Path, algorithm: str = "") -> TrainedPolicy:
-        """Read what `save` wrote; `shapechanger.load_policy` reads every kind of policy.
-
-        Args:
-            path: The file.
-            algorithm: As of `shapechanger.load_policy`.
-
-        Raises:
-            CorruptStudy: If the file is missing, is not such a policy, or has been changed.
-        """
-        with refusing(path, CorruptStudy):
-            content, tensors = read_tensors(path)
-            card = msgspec.json.decode(content, type=PolicyCard, dec_hook=from_builtins)
-            _require_numbers(card, tensors)
-            return cls(_model(card, tensors, algorithm), _read_statistics(card, tensors), card)
+        return tensors
 
 
 def actor(
@@ -210,7 +186,7 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
         if (np.isnan(value) if is_bound else ~np.isfinite(value)).any():
             raise ValueError(f"its numbers {name!r} must be finite")
     settings: Any = card.settings
-    widths = (card.observation.size, *settings.net_arch)
+    widths = (card.layouts[0].size, *settings.net_arch)
     weights = sum(before * after for before, after in pairwise(widths))
     known = sum(value.size for value in tensors.values())
     # A custom class need not take `net_arch`.
@@ -227,7 +203,7 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
     if settings.algorithm != algorithm:
         require_class(settings.algorithm)
     spaces: list[gym.spaces.Box] = []
-    for side, layout in (("observation", card.observation), ("action", card.action)):
+    for side, layout in zip(("observation", "action"), card.layouts, strict=True):
         low, high = (tensors[f"{_SPACES}{side}.{end}"] for end in ("low", "high"))
         if not {low.dtype, high.dtype} <= {np.dtype(np.float32), np.dtype(np.float64)}:
             raise ValueError(f"its bounds of the {side} are {low.dtype} and {high.dtype}")
@@ -261,7 +237,7 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
 
 def _read_statistics(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> Normalisation | None:
     if not any(name.startswith(_STATISTICS) for name in tensors):
-        if cast("Any", card.settings).normalise:
+        if card.settings.normalise:
             raise ValueError("its learner normalises, and it has no statistics")
         return None
 
@@ -275,6 +251,5 @@ def _read_statistics(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
         result.mean, result.var, result.count = mean, var, float(count)
         return result
 
-    return Normalisation(
-        statistics("observation", (card.observation.size,)), statistics("reward", ())
-    )
+    size = card.layouts[0].size
+    return Normalisation(statistics("observation", (size,)), statistics("reward", ()))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -17,17 +16,16 @@ from shapechanger.contract.env_ref import (
     is_single_instance,
     layouts_of,
 )
-from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError
+from shapechanger.errors import MissingExtra, PolicyError, SpaceMismatch, StudyError
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
-from shapechanger.policy import kind_of
+from shapechanger.policy import PolicyCard, load_policy
 from shapechanger.transfer.actions import require_ranges
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import identities_in
-from shapechanger.transfer.learners import Learner, PolicyOrigin, ignore
+from shapechanger.transfer.learners import Learner, ignore
 from shapechanger.transfer.learners.algorithms import build_model
-from shapechanger.transfer.learners.card import PolicyCard
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
@@ -159,7 +157,6 @@ class Sb3Learner(Learner[Sb3Settings]):
             settings=settings,
             steps=int(model.num_timesteps),
             seed=seed,
-            version=version("shapechanger"),
             identity=identity,
             start_log_std=explores,
         )
@@ -177,23 +174,24 @@ class Sb3Learner(Learner[Sb3Settings]):
 
     def load(self, path: Path) -> TrainedPolicy:
         """Load a policy."""
-        return TrainedPolicy.load(path, self.settings.algorithm)
-
-    def origin(self, path: Path) -> PolicyOrigin:
-        """Read where a policy comes from."""
-        if kind_of(path):
-            raise StudyError(
-                f"{path} is a clone, and {self.name} does not learn from images: give "
-                f"--learner cloning, or a policy trained with {self.name}."
+        policy = load_policy(path, self.settings.algorithm)
+        if not isinstance(policy, TrainedPolicy):
+            raise PolicyError(
+                f"{path} is a clone or a policy as ONNX, and {self.name} cannot train those: give "
+                f"a policy trained with {self.name}, or --learner cloning for a clone."
             )
+        return policy
+
+    def origin(self, path: Path) -> PolicyCard:
+        """Read the card of a policy that this learner can start from."""
         card = self.load(path).card
         other: Any = card.settings
         if other.algorithm != self.settings.algorithm:
-            raise StudyError(
+            raise PolicyError(
                 f"{path} was trained with {other.algorithm}, and {self.name} is "
                 f"{self.settings.algorithm}: give --learner {card.learner}."
             )
-        return PolicyOrigin(card.env, card.steps, card.identity)
+        return card
 
     def _training_envs(self, env: EnvRef) -> VecEnv:
         """Make the parallel envs of a training."""

@@ -50,7 +50,7 @@ class LimbLearner(Sb3Learner):
     ) -> list[gym.Env[Any, Any]]:
         del body_map
         name = envs[0].spec.id if envs[0].spec else ""
-        require_same_columns(policy.card.observation, layouts_of(envs[0])[0], name)
+        require_same_columns(policy.card.layouts[0], layouts_of(envs[0])[0], name)
         return envs
 
     def _moved(
@@ -65,13 +65,13 @@ class LimbLearner(Sb3Learner):
         observation: Layout,
     ) -> BaseAlgorithm:
         del body_map
-        require_same_columns(source.card.observation, observation, env.id)
+        require_same_columns(source.card.layouts[0], observation, env.id)
         model = build_model(settings, envs, seed, tensorboard)
         try:
             cast("Any", model.policy).load_state_dict(source.model.policy.state_dict())
         except RuntimeError as error:
             raise TransplantError(
-                f"The network of the policy of {source.card.env.id} is padded for another number "
-                "of limbs than this training's: give the same --set room."
+                f"The network of the policy of {source.card.trained_in.id} is padded for another "
+                "number of limbs than this training's: give the same --set room."
             ) from error
         return model

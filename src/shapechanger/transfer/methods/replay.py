@@ -114,7 +114,7 @@ class OffDynamics(Method):
 
 def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transitions:
     """Let a policy act in an env with its exploration noise."""
-    act = actor(policy.model, policy.normalisation, policy.card.action, deterministic=False)
+    act = actor(policy.model, policy.normalisation, policy.card.layouts[1], deterministic=False)
     rows: list[tuple[Any, ...]] = []
     with closing(env.make()) as made:
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]

@@ -24,7 +24,7 @@ _FOLDER: Final = Path(__file__).parent / "clones"
 CLONES: Final[Mapping[str, Path]] = MappingProxyType(
     {vehicle: _FOLDER / f"{vehicle}.safetensors" for vehicle in ("boat", "car", "tank", "truck")}
 )
-"""Files of the shipped camera policies by vehicle; `CameraPolicy.load` reads them.
+"""Files of the shipped camera policies by vehicle; `shapechanger.load_policy` reads them.
 
 Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
 """

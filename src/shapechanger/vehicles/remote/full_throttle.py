@@ -13,10 +13,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.errors import LinkError
 from shapechanger.layout import Layout
+from shapechanger.policy import CloneNetwork, Framing, PolicyCard
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.twin.check.driver import FAILURES, asked_robot, print_time
 from shapechanger.vehicles.remote.pilot import PolicyDriver
@@ -29,15 +28,10 @@ class FullThrottle:
     """A policy that sees nothing and knows one command."""
 
     def __init__(self, actions: Layout, state: Layout) -> None:
-        self.card = CloneCard(
-            framing=Framing(),
-            channels=(1,),
-            features=1,
-            eyes="none",
-            nerves=(1,),
-            action_layout=actions,
-            state_layout=state,
+        self.net = CloneNetwork(
+            framing=Framing(), channels=(1,), features=1, eyes="none", nerves=(1,)
         )
+        self.card = PolicyCard(learner="none", observation=state, action=actions, clone=self.net)
         self._throttle = np.array([float(name == "throttle") for name in actions.names], np.float32)
         self._failing = ""
         for number in FAILURES.values():

@@ -13,15 +13,15 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
-from shapechanger.demos.cloning.card import OnnxClone
-from shapechanger.demos.cloning.pictures import PolicyError
+from shapechanger.demos.cloning.clone import Clone, clone_of, load_clone
 from shapechanger.demos.statistics import is_same_rate
-from shapechanger.errors import RobotRefused, ShapechangerError
+from shapechanger.errors import PolicyError, RobotRefused, ShapechangerError
 from shapechanger.layout import Layout
+from shapechanger.policy import PolicyCard
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.client.known_robots import KnownRobot
@@ -29,17 +29,13 @@ from shapechanger.robot.link.card import RobotCard
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 
-if TYPE_CHECKING:
-    from shapechanger.demos.cloning.card import CloneCard
-    from shapechanger.demos.cloning.policy import CameraPolicy
-
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
 _WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
 
 
-def require_fit(card: CloneCard, robot: RobotCard, *, measures: bool) -> None:
+def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
     """Refuse a policy that does not fit a robot; the message names what differs.
 
     Args:
@@ -52,14 +48,15 @@ def require_fit(card: CloneCard, robot: RobotCard, *, measures: bool) -> None:
         RobotRefused: If the robot has no camera, or its card lacks how the camera looks or how the
             vehicle turns.
     """
-    if card.body and card.body != robot.body:
+    net = clone_of(card)
+    if net.body and net.body != robot.body:
         raise PolicyError(
-            f"The policy learned to steer a {card.body}, and {robot.robot} is a {robot.body}: only "
+            f"The policy learned to steer a {net.body}, and {robot.robot} is a {robot.body}: only "
             "policies of waypoints move from one body to another."
         )
     jitter = card.data.get("rate_jitter", 0.0)
     jitter = float(jitter) if isinstance(jitter, int | float) else 0.0
-    if (hz := card.control_hz) is not None and not is_same_rate(hz, robot.control_hz, jitter):
+    if (hz := net.control_hz) is not None and not is_same_rate(hz, robot.control_hz, jitter):
         within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
         raise PolicyError(
             f"The policy learned at {hz:g} actions a second{within}, and {robot.robot} has "
@@ -69,7 +66,7 @@ def require_fit(card: CloneCard, robot: RobotCard, *, measures: bool) -> None:
     if not has_waypoints:
         actions, state = map(Layout.from_json, (robot.action_layout, robot.state_layout))
         card.require_layouts(actions, state)
-    if card.eyes != "none" and robot.image_size is None:
+    if net.eyes != "none" and robot.image_size is None:
         raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by images.")
     if has_waypoints and None in (robot.camera_pitch_deg, robot.camera_fovy_deg):
         raise RobotRefused(
@@ -83,8 +80,8 @@ def require_fit(card: CloneCard, robot: RobotCard, *, measures: bool) -> None:
         )
 
 
-def _has_waypoints(card: CloneCard) -> bool:
-    return card.action_layout is not None and card.action_layout.names == ACTION_LAYOUT.names
+def _has_waypoints(card: PolicyCard) -> bool:
+    return card.action is not None and card.action.names == ACTION_LAYOUT.names
 
 
 class PolicyDriver:
@@ -106,7 +103,7 @@ class PolicyDriver:
 
     def __init__(
         self,
-        policy: CameraPolicy | OnnxClone,
+        policy: Clone,
         name: str,
         robot: KnownRobot,
         on_note: Callable[[str], object] = lambda _: None,
@@ -121,8 +118,8 @@ class PolicyDriver:
         self._ended = threading.Event()
         self._failure: Exception | None = None
         self._why = ""
-        self._sees = policy.card.eyes != "none"
-        self._feels = policy.card.state_layout is not None
+        self._sees = policy.net.eyes != "none"
+        self._feels = policy.card.observation is not None
         self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
 
     def __enter__(self) -> Self:
@@ -226,7 +223,7 @@ def main() -> int:
     robot = KnownRobot(**task["robot"])
     file = Path(task["policy"])
     try:
-        policy = OnnxClone(file)
+        policy = load_clone(file)
         with RobotClient.connect(robot, frames=False) as there:
             card = there.welcome
         require_fit(policy.card, card, measures=False)

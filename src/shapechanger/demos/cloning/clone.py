@@ -1,0 +1,448 @@
+"""Cloned policies without PyTorch: their settings, what they see, and how they act."""
+
+from __future__ import annotations
+
+import hashlib
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import DemosError, PolicyError
+from shapechanger.policy import CloneNetwork, Framing, Network, Policy, PolicyCard, load_policy
+
+if TYPE_CHECKING:
+    from shapechanger.demos.episodes import EpisodeHeader
+
+_CHUNK: Final = 256  # Images at a time, to bound the memory of the sums.
+# A mean in single precision may miss a half by a rounding error, and is still rounded up.
+HALF: Final = 0.5 + 1e-4
+_ROUNDING: Final = 1e-4  # Of actions in single precision.
+
+
+def _require(
+    settings: msgspec.Struct, names: str, limits: str, fits: Callable[[float], bool]
+) -> None:
+    """Refuse settings, whose names a text lists, with a value or an empty tuple out of limits."""
+    for name in names.split():
+        value: Any = getattr(settings, name)
+        values: Any = value if hasattr(value, "__len__") else (value,)
+        if not values or not all(map(fits, values)):
+            raise DemosError(f"{name} must be {limits}, got {value}.")
+
+
+class Augmentation(msgspec.Struct, frozen=True, kw_only=True):
+    """Random changes of each image each time it is learned from.
+
+    Attributes:
+        mirror: Share of images that are mirrored, with their actions.
+        shift: Maximum shift to each side, and up and down, pixels.
+        gain: Maximum brightness factor, >= 1; its inverse is the minimum.
+        colour: Maximum further factor of a single colour, >= 1; its inverse is the minimum.
+        offset: Maximum offset of all pixels in either direction, as a share of full brightness.
+        noise: Maximum standard deviation of the noise, as a share of full brightness.
+        noisy: Share of images with noise.
+        blurred: Share of images that are blurred over 3 x 3 pixels.
+    """
+
+    mirror: float = 0.5
+    shift: int = 2
+    gain: float = 1.8
+    colour: float = 1.2
+    offset: float = 0.08
+    noise: float = 0.04
+    noisy: float = 0.3
+    blurred: float = 0.2
+
+    def __post_init__(self) -> None:
+        _require(self, "mirror noisy blurred", "in [0, 1]", lambda x: 0.0 <= x <= 1.0)
+        _require(self, "shift offset noise", "at least 0", lambda x: x >= 0.0)
+        _require(self, "gain colour", "at least 1", lambda x: x >= 1.0)
+
+
+class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """Hyperparameters of behaviour cloning.
+
+    Attributes:
+        framing: Crop and resolution; those of `start` where training starts from another policy.
+        channels: Filters of each convolution; each one halves rows and columns.
+        features: Number of features between image and actions.
+        batch: Examples per step.
+        passes: Number of passes over the data, within the two bounds below.
+        fewest_steps: Minimum number of steps.
+        most_steps: Maximum number of steps.
+        learning_rate: Initial learning rate; falls to 0 along half a cosine.
+        further_rate: Initial learning rate when another policy is trained further.
+        warm_up: Steps in which the rate rises from 0.
+        weight_decay: Of AdamW.
+        held_out: Share of the steps, in [0, 1), in one stretch, that is not learned from but used
+            for early stopping.
+        checks: Number of validations during training.
+        patience: Number of validations without improvement after which training stops.
+        rehearsal: Share of each batch that comes from the rehearsal data, if there are any.
+        augmentation: Random changes of the images.
+        eyes: Input of the first layer: "colours", or "edges": strength of the edges of each
+            direction in each cell, independent of light and colour.
+        nerves: Widths of the layers for the state.
+        members: Number of averaged networks; each uses another stretch of time for early stopping,
+            so that together they learn from all data.
+        dropout: Share of the features that are dropped in each step.
+        smoothing: Label smoothing of classes.
+        averaging: Decay of the exponential moving average of the weights; 0 for no average.
+    """
+
+    framing: Framing = Framing()
+    # Few filters in the first layer, which is by far the most expensive one: 16 and 32 in the first
+    # two took 1.8 times as long per step, and drove no better after the same number of steps.
+    channels: tuple[int, ...] = (8, 24, 48, 64)
+    features: int = 96
+    batch: int = 64
+    passes: float = 12.0
+    fewest_steps: int = 500
+    most_steps: int = 1400
+    learning_rate: float = 2e-3
+    further_rate: float = 1e-3
+    warm_up: int = 50
+    weight_decay: float = 1e-3
+    held_out: float = 0.1
+    checks: int = 10
+    patience: int = 10
+    rehearsal: float = 0.25
+    augmentation: Augmentation = Augmentation()
+    eyes: Literal["colours", "edges"] = "colours"
+    nerves: tuple[int, ...] = (64, 64)
+    members: int = 1
+    dropout: float = 0.0
+    smoothing: float = 0.0
+    averaging: float = 0.0
+
+    def __post_init__(self) -> None:
+        counts = "channels features batch fewest_steps checks patience nerves members"
+        shares = "held_out rehearsal dropout smoothing averaging"
+        _require(self, counts, "at least 1", lambda x: x >= 1)
+        _require(
+            self, "most_steps", "at least fewest_steps", lambda steps: steps >= self.fewest_steps
+        )
+        _require(self, "passes learning_rate further_rate", "positive", lambda x: x > 0.0)
+        _require(self, "warm_up weight_decay", "at least 0", lambda x: x >= 0.0)
+        _require(self, shares, "in [0, 1)", lambda x: 0.0 <= x < 1.0)
+
+    def steps(self, pictures: int) -> int:
+        """Return the number of training steps for this many images."""
+        wanted = round(self.passes * pictures / self.batch)
+        return min(max(wanted, self.fewest_steps), self.most_steps)
+
+
+# Chosen on the first 430 frames of a real drive by the accuracy on five later stretches;
+# benchmarks/cloning_real.py lists the alternatives.
+DEMOS: Final = CloneSettings(
+    framing=Framing(height=48, width=64, top=0.0),
+    channels=(24, 48),
+    features=64,
+    batch=32,
+    passes=25.0,
+    fewest_steps=300,
+    most_steps=3000,
+    learning_rate=2e-3,
+    weight_decay=0.1,
+    held_out=0.15,
+    checks=12,
+    patience=12,
+    augmentation=Augmentation(shift=3),
+    eyes="edges",
+    members=4,
+    dropout=0.5,
+    smoothing=0.1,
+    averaging=0.98,
+)
+"""Settings for few demonstrations."""
+
+# Steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network on colours
+# and finer images learns from them; with fewer it would learn irrelevant details.
+_MANY: Final = 3000
+
+
+def settings_for(steps: int) -> CloneSettings:
+    """Return the settings for this many steps.
+
+    With many steps nothing is held out, and the last network is kept. When a tenth of twenty
+    minutes was held out, the network after 140 of 1,400 steps was best by 0.3 %, and drove badly;
+    see docs/cloning.md.
+    """
+    return DEMOS if steps < _MANY else CloneSettings(held_out=0.0)
+
+
+def prepare(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
+    """Crop and reduce images.
+
+    Each pixel is the mean of the area that it covers, rounded half up: of a block of pixels where
+    the size divides evenly, and weighted by the covered shares elsewhere. Images that already
+    have the target size are returned unchanged.
+
+    Args:
+        pictures: Red, green and blue, shape (n, H, W, 3).
+        framing: Crop and resolution.
+
+    Returns:
+        Shape (n, height, width, 3).
+
+    Raises:
+        DemosError: If the images have another type or shape.
+    """
+    if pictures.ndim != 4 or pictures.shape[3] != 3 or pictures.dtype != np.uint8:
+        raise DemosError(
+            "Images must be uint8 with shape (n, height, width, 3), got "
+            f"{pictures.dtype} with shape {pictures.shape}."
+        )
+    if pictures.shape[1:] == framing.shape:
+        return pictures
+    if not pictures.shape[1] or not pictures.shape[2]:
+        raise DemosError(f"Images of shape {pictures.shape} have no pixels.")
+    # At least one row is left.
+    first = min(round(pictures.shape[1] * framing.top), pictures.shape[1] - 1)
+    rows, rest_of_rows = divmod(pictures.shape[1] - first, framing.height)
+    columns, rest_of_columns = divmod(pictures.shape[2], framing.width)
+    if rest_of_rows or rest_of_columns or not rows or not columns:
+        return _by_area(pictures[:, first:], framing)
+    small = np.empty((len(pictures), *framing.shape), np.uint8)
+    for start in range(0, len(pictures), _CHUNK):
+        part = pictures[start : start + _CHUNK, first:]
+        # Adding strided views is several times faster than a mean over reshaped axes.
+        total = np.full((len(part), *framing.shape), rows * columns // 2, np.uint32)
+        for row in range(rows):
+            for column in range(columns):
+                total += part[:, row::rows, column::columns]
+        small[start : start + _CHUNK] = total // (rows * columns)
+    return small
+
+
+def _by_area(pictures: NDArray[np.uint8], framing: Framing) -> NDArray[np.uint8]:
+    """Reduce images whose size does not divide evenly: rows first, then columns."""
+    n, height, width, _ = pictures.shape
+    of_rows = area_shares(height, framing.height)
+    of_columns = area_shares(width, framing.width)
+    small = np.empty((n, *framing.shape), np.uint8)
+    for i, picture in enumerate(pictures):  # One at a time: they may be large.
+        low = of_rows @ picture.reshape(height, -1).astype(np.float32)
+        narrow = of_columns @ low.reshape(framing.height, width, 3)
+        small[i] = np.floor(narrow + HALF)
+    return small
+
+
+def area_shares(before: int, after: int) -> NDArray[np.float32]:
+    """Return the weight of each old pixel in each new one along one axis, shape (after, before)."""
+    edges = np.linspace(0.0, before, after + 1)
+    old = np.arange(before)
+    overlap = np.minimum(edges[1:, None], old + 1) - np.maximum(edges[:-1, None], old)
+    shares = np.clip(overlap, 0.0, None)
+    return (shares / shares.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+@dataclass
+class ShrunkFrames:
+    """Convert frames to a policy's view while they are read, and record their digests.
+
+    Attributes:
+        framing: Crop and resolution.
+        view: Returns the frame of another camera for a frame and the header of its episode; None
+            for the same camera.
+        size: Rows and columns of the last frame before; None before the first.
+        seen: Digests of the frames.
+    """
+
+    framing: Framing
+    view: Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]] | None = None
+    size: tuple[int, int] | None = None
+    seen: list[bytes] = field(default_factory=list[bytes])
+
+    def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
+        """Return the policy's view of a frame of an episode."""
+        if self.view is not None:
+            picture = self.view(picture, header)
+        self.size = picture.shape[0], picture.shape[1]
+        self.seen.append(hashlib.sha256(picture.tobytes()).digest())
+        return prepare(picture[None], self.framing)[0]
+
+    def digest(self, actions: NDArray[np.float32]) -> str:
+        """Return a digest of the demonstrations."""
+        return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()
+
+
+def clone_of(card: PolicyCard) -> CloneNetwork:
+    """Return the architecture of a clone.
+
+    Raises:
+        PolicyError: If the policy is no clone.
+    """
+    if card.clone is None:
+        raise PolicyError(
+            f"A clone of demonstrations is needed here, and this policy was trained with "
+            f"{card.learner}."
+        )
+    return card.clone
+
+
+class Clone(Policy):
+    """A cloned policy, for images, states or both."""
+
+    @property
+    def net(self) -> CloneNetwork:
+        """Its architecture."""
+        return clone_of(self.card)
+
+    @abstractmethod
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
+
+        The inputs are those of `predict_many`.
+        """
+
+    def predict(
+        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the action, shape (m,), for one image, (H, W, 3), and state, (k,)."""
+        return self.predict_many(
+            None if picture is None else picture[np.newaxis],
+            None if state is None else state[np.newaxis],
+        )[0]
+
+    def predict_many(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return an action for each image and state.
+
+        Args:
+            pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared; None for a policy
+                without images.
+            states: Shape (n, k), NaN for unknown values; None for a policy without a state.
+
+        Returns:
+            Actions, shape (n, m). For a vehicle: steering (-1 is left), throttle (1 is forward).
+
+        Raises:
+            DemosError: If an input is missing or has another shape.
+        """
+        net, outputs = self.net, self.outputs(pictures, states)
+        if net.classes:
+            return np.asarray(net.classes, np.float32)[outputs.argmax(axis=1)]
+        if not net.low:
+            return outputs
+        low, high = np.asarray(net.low, np.float32), np.asarray(net.high, np.float32)
+        return (low + 0.5 * (outputs + 1.0) * (high - low)).astype(np.float32)
+
+    def act(self, observations: Any) -> NDArray[np.float32]:
+        """Return an action for each observation of an env, shape (n, m), as `predict_many` does."""
+        if isinstance(observations, Mapping):
+            named = cast("Mapping[str, NDArray[Any]]", observations)
+            return self.predict_many(named.get("image"), named.get("state"))
+        values: NDArray[Any] = np.asarray(observations)
+        return self.predict_many(*((None, values) if self.net.eyes == "none" else (values,)))
+
+
+class OnnxClone(Clone):
+    """A cloned policy from an ONNX file, which runs without PyTorch: its card and its network."""
+
+    def __init__(self, card: PolicyCard, run: Network, algorithm: str = "") -> None:
+        del algorithm
+        self.card, self._run = card, run
+
+    def outputs(
+        self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the outputs of the network, as `Clone` describes them."""
+        given = zip(("picture", "state"), prepared(self.card, pictures, states), strict=True)
+        return self._run({name: part for name, part in given if part is not None})
+
+
+def load_clone(path: Path) -> Clone:
+    """Load a clone, of PyTorch or ONNX.
+
+    Raises:
+        PolicyError: If the file is missing, damaged, or no clone.
+        MissingExtra: If what the file needs is not installed.
+    """
+    policy = load_policy(path)
+    if not isinstance(policy, Clone):
+        raise PolicyError(
+            f"{path} was trained with {policy.card.learner}, and a clone of demonstrations is "
+            "needed here."
+        )
+    return policy
+
+
+def prepared(
+    card: PolicyCard,
+    pictures: NDArray[np.uint8] | None,
+    states: NDArray[np.floating] | None,
+) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None]:
+    """Return images and states as the network of a clone takes them; None for an input it lacks.
+
+    Args:
+        card: Its card.
+        pictures: Red, green and blue, shape (n, H, W, 3), raw or prepared.
+        states: Shape (n, k), NaN for unknown values.
+
+    Raises:
+        DemosError: If an input is missing or has another shape.
+    """
+    net, layout = clone_of(card), card.observation
+    seen = None
+    if net.eyes != "none":
+        if pictures is None:
+            raise DemosError("This policy needs an image, and none was given.")
+        seen = prepare(pictures, net.framing)
+    if layout is None:
+        return seen, None
+    if states is None or states.ndim != 2 or states.shape[1] != layout.size:
+        raise DemosError(
+            f"This policy needs the state {', '.join(layout.names)} with shape "
+            f"(n, {layout.size}), got {'none' if states is None else states.shape}."
+        )
+    known = np.array(states, np.float32)
+    for name in net.unseen:
+        known[:, layout.slices[name]] = np.nan
+    return seen, known
+
+
+def targets(net: CloneNetwork, actions: NDArray[np.float32]) -> NDArray[Any]:
+    """Return the target outputs of a network for actions of shape (n, m).
+
+    Returns:
+        Class indices, shape (n,), -1 for an unknown action; or actions scaled to [-1, 1], shape
+        (n, m).
+
+    Raises:
+        DemosError: If an action is out of range, where the network states no other than [-1, 1].
+    """
+    if net.classes:
+        return class_numbers(actions, net.classes)
+    if not net.low:
+        if (wrong := ~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1)).any():
+            first = int(wrong.argmax())
+            raise DemosError(
+                f"Steering and throttle must be in [-1, 1], but action {first} is "
+                f"{actions[first].tolist()}."
+            )
+        return actions.astype(np.float32)
+    low, high = np.asarray(net.low, np.float32), np.asarray(net.high, np.float32)
+    return (2.0 * (actions - low) / (high - low) - 1.0).astype(np.float32).clip(-1.0, 1.0)
+
+
+def class_numbers(
+    actions: NDArray[np.floating], classes: tuple[tuple[float, ...], ...]
+) -> NDArray[np.int64]:
+    """Return the class index of each action, shape (n,); -1 for an unknown action.
+
+    Args:
+        actions: Shape (n, m).
+        classes: The actions of the classes.
+    """
+    apart = np.abs(actions[:, None, :] - np.asarray(classes, np.float32)).max(axis=2)
+    return np.where(apart.min(axis=1) < _ROUNDING, apart.argmin(axis=1), -1).astype(np.int64)
