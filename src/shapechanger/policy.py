@@ -301,8 +301,7 @@ class OnnxPolicy(Policy):
         run: Its network, see `read_network`.
     """
 
-    def __init__(self, card: PolicyCard, run: Network, algorithm: str = "") -> None:
-        del algorithm
+    def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
 
     def act(self, observations: NDArray[Any]) -> NDArray[np.float32]:
@@ -341,7 +340,8 @@ def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
     with refusing(file):
         card, content = read_network(file) if exported else read_tensors(file)
         kind = ("trained" if card.clone is None else "clone") + ("-onnx" if exported else "")
-        return POLICIES.load(kind)(card, content, algorithm)
+        read = POLICIES.load(kind)
+        return read(card, content, algorithm) if kind == "trained" else read(card, content)
 
 
 def save_policy(policy: Policy, path: str | PathLike[str]) -> None:

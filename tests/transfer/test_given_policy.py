@@ -115,17 +115,9 @@ def test_a_clone_of_recordings_is_refused(tmp_path: Path) -> None:
         _plan(path)
 
 
-def test_invalid_policy_files_are_refused(clone_file: Path, tmp_path: Path) -> None:
+def test_a_missing_policy_is_refused(tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match=r"There is no policy file .*none\.safetensors"):
         _plan(tmp_path / "none.safetensors")
-    (tmp_path / "text.safetensors").write_text("not at all")
-    with pytest.raises(PolicyError, match=r"text\.safetensors is not a policy"):
-        _plan(tmp_path / "text.safetensors")
-    damaged = bytearray(clone_file.read_bytes())
-    damaged[-2000] ^= 0xFF
-    (tmp_path / "damaged.safetensors").write_bytes(damaged)
-    with pytest.raises(PolicyError, match=r"damaged\.safetensors"):
-        _plan(tmp_path / "damaged.safetensors")
 
 
 def test_source_steps_are_those_of_arms_that_train_their_own(

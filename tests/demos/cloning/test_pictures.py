@@ -10,7 +10,7 @@ from torch import Tensor
 from shapechanger.demos.cloning.clone import prepare
 from shapechanger.demos.cloning.network import DIRECTIONS, Eyes, edges
 from shapechanger.errors import DemosError, PolicyError
-from shapechanger.policy import Framing
+from shapechanger.policy import CloneNetwork, Framing
 
 _FRAMING = Framing()
 
@@ -109,7 +109,8 @@ def test_a_black_image_has_no_edges() -> None:
 
 def test_images_of_any_size_have_features() -> None:
     for height, width in ((48, 64), (30, 41), (3, 5)):
-        eyes = Eyes(Framing(height=height, width=width, top=0.0), (8, 8), 5, by_edges=True)
+        framing = Framing(height=height, width=width, top=0.0)
+        eyes = Eyes(CloneNetwork(framing=framing, channels=(8, 8), features=5, eyes="edges"))
         found = eyes(torch.rand(2, 3, height, width))
         assert found.shape == (2, 5)
         assert bool((found >= 0.0).all())

@@ -349,8 +349,7 @@ class Clone(Policy):
 class OnnxClone(Clone):
     """A cloned policy from an ONNX file, which runs without PyTorch: its card and its network."""
 
-    def __init__(self, card: PolicyCard, run: Network, algorithm: str = "") -> None:
-        del algorithm
+    def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
 
     def outputs(

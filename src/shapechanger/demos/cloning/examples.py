@@ -124,13 +124,10 @@ def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArr
 
 
 def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_]:
-    """Return a mask of the steps with which a member decides when to stop.
+    """Return a mask of those of n steps with which a member decides when to stop.
 
-    Args:
-        n: Number of training steps.
-        member: Index of the member.
-        members: Number of members; the last one takes the end.
-        share: Length of the stretch as a share of n, in [0, 1); at most n / (members + 1) steps.
+    The stretch is a share of n, in [0, 1), but at most n / (members + 1) steps; the last member
+    takes the end.
     """
     length = min(math.floor(share * n), n // (members + 1))
     start = round((n - length) * (member + 1) / members)
@@ -253,13 +250,7 @@ class Examples(NamedTuple):
 def examples_of(
     data: Dataset, card: PolicyCard, mirror: Mirror | None, state_mirror: Mirror | None
 ) -> Examples:
-    """Return demonstrations as a policy sees and learns them.
-
-    Args:
-        data: The demonstrations.
-        card: Card of the policy.
-        mirror: Mirror of the actions; None for no mirror images.
-        state_mirror: Mirror of the states; None for no mirror images.
+    """Return demonstrations as a policy sees and learns them, with mirror images if there are any.
 
     Raises:
         DemosError: If the demonstrations lack an input, or an action is out of range.
@@ -284,14 +275,9 @@ def batches(
     settings: CloneSettings,
     seed: int,
 ) -> Iterator[Batch]:
-    """Yield batches of augmented examples without end, each drawn once before any repeats.
+    """Yield batches without end of the examples in a mask, shape (n,), and of a rehearsal.
 
-    Args:
-        shown: The examples.
-        learned: Mask of those to learn from, shape (n,).
-        rehearsal: Examples to mix in; None for none.
-        settings: Batch size, share of the rehearsal, and augmentation.
-        seed: Seed of order and augmentation.
+    They are augmented, and each example is drawn once before any repeats.
     """
     generator = torch.Generator().manual_seed(seed)
     again = 0 if rehearsal is None else round(settings.rehearsal * settings.batch)

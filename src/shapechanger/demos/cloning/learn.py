@@ -370,9 +370,7 @@ def _share_of_rate(step: int, total: int, warm_up: int) -> float:
 def best_temperature(logits: Tensor, target: Tensor) -> float:
     """Return the softmax temperature with the smallest cross-entropy on held-out steps.
 
-    Args:
-        logits: Shape (n, classes).
-        target: Class indices, shape (n,).
+    Logits have shape (n, classes), and targets are class indices, shape (n,).
     """
     if len(target) < _MIN_CALIBRATION_STEPS:
         return 1.0

@@ -21,7 +21,7 @@ from shapechanger.demos.cloning.clone import Clone, CloneSettings, clone_of, pre
 from shapechanger.errors import MissingExtra
 from shapechanger.layout import Layout
 from shapechanger.onnx_file import export_network
-from shapechanger.policy import STEERING, CloneNetwork, Framing, PolicyCard
+from shapechanger.policy import STEERING, CloneNetwork, PolicyCard
 
 try:
     import torch
@@ -50,12 +50,8 @@ _MAX_DEVIATIONS: Final = 5.0  # Larger deviations of a state value carry no more
 def edges(pictures: Tensor, cells: tuple[int, int]) -> Tensor:
     """Return the strength of the edges of each direction in each cell, relative to their mean.
 
-    Args:
-        pictures: In [0, 1], shape (n, 3, height, width).
-        cells: Rows and columns of cells.
-
-    Returns:
-        At least 0, shape (n, DIRECTIONS, rows, columns).
+    Images are in [0, 1], shape (n, 3, height, width); strengths are at least 0, shape
+    (n, DIRECTIONS, rows, columns) for the given rows and columns of cells.
     """
     light = torch.log(pictures.mean(dim=1, keepdim=True) + _DARK)
     across = functional.pad(light[..., 2:] - light[..., :-2], (1, 1, 0, 0))
@@ -74,38 +70,27 @@ class Eyes(nn.Module):
 
     Colours are normalised by the mean and standard deviation of their image, so that neither
     daylight nor exposure matters.
-
-    Args:
-        framing: Size of the images.
-        channels: Filters of each convolution, which halves rows and columns.
-        features: Number of features.
-        by_edges: Whether the first layer sees edges instead of colours.
     """
 
-    def __init__(
-        self, framing: Framing, channels: tuple[int, ...], features: int, by_edges: bool
-    ) -> None:
+    def __init__(self, net: CloneNetwork) -> None:
         super().__init__()
+        framing, by_edges = net.framing, net.eyes == "edges"
         self._cells: tuple[int, int] | None = None
         height, width, before = framing.shape
         if by_edges:
             height, width = max(height // _CELL, 1), max(width // _CELL, 1)
             self._cells, before = (height, width), DIRECTIONS
         layers: list[nn.Module] = []
-        for i, after in enumerate(channels):
+        for i, after in enumerate(net.channels):
             # The first filters of colours are wider, to find edges.
             side = 3 if i or by_edges else 5
             layers += [nn.Conv2d(before, after, side, stride=2, padding=side // 2), nn.ReLU()]
             height, width, before = (height + 1) // 2, (width + 1) // 2, after
         self.filters = nn.Sequential(*layers)
-        self.boiled_down = nn.Linear(before * height * width, features)
+        self.boiled_down = nn.Linear(before * height * width, net.features)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Return the features, shape (n, features).
-
-        Args:
-            pictures: In [0, 1], shape (n, 3, height, width).
-        """
+        """Return the features, shape (n, features), of images in [0, 1], (n, 3, height, width)."""
         if self._cells is not None:
             seen = edges(pictures, self._cells) - 1.0
         else:
@@ -149,7 +134,7 @@ class Nerves(nn.Module):
 
 
 class _Several(nn.ModuleList):
-    """Modules side by side, with concatenated outputs."""
+    """Modules with concatenated outputs."""
 
     def forward(self, x: Tensor) -> Tensor:
         return torch.cat([one(x) for one in self], dim=1)
@@ -162,10 +147,7 @@ class CameraNetwork(nn.Module):
         super().__init__()
         net = clone_of(card)
         sees, feels = net.eyes != "none", card.observation
-        eyes = [
-            Eyes(net.framing, net.channels, net.features, net.eyes == "edges")
-            for _ in range(net.members if sees else 0)
-        ]
+        eyes = [Eyes(net) for _ in range(net.members if sees else 0)]
         nerves = [Nerves(feels.size, net.nerves) for _ in range(net.members) if feels is not None]
         self.eyes: nn.Module | None = _one_or_several(eyes)
         self.nerves: nn.Module | None = _one_or_several(nerves)
@@ -175,12 +157,7 @@ class CameraNetwork(nn.Module):
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def perceive(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
-        """Return the features of images and states, shape (n, features).
-
-        Args:
-            pictures: In [0, 1], shape (n, 3, height, width); None for a policy without images.
-            states: Shape (n, state size); None for a policy without a state.
-        """
+        """Return the features, shape (n, features), of images and states as the encoders take."""
         given = ((self.eyes, pictures), (self.nerves, states))
         found = [encoder(part) for encoder, part in given if encoder is not None]
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
@@ -232,17 +209,8 @@ class CameraPolicy(Clone):
             return cls(CameraNetwork(card), card)
 
     @classmethod
-    def of_file(
-        cls, card: PolicyCard, weights: Mapping[str, NDArray[Any]], algorithm: str = ""
-    ) -> CameraPolicy:
-        """Return the policy of a file, see `shapechanger.load_policy`.
-
-        Args:
-            card: Its card.
-            weights: Its arrays.
-            algorithm: Unused.
-        """
-        del algorithm
+    def of_file(cls, card: PolicyCard, weights: Mapping[str, NDArray[Any]]) -> CameraPolicy:
+        """Return the policy of a file, see `shapechanger.load_policy`."""
         # On the meta device a forged card cannot allocate memory before the sizes are compared.
         with torch.device("meta"):
             network = CameraNetwork(card)
@@ -351,12 +319,7 @@ def seeded(seed: int) -> Generator[None]:
 
 
 def joined(card: PolicyCard, members: list[CameraNetwork]) -> CameraNetwork:
-    """Return one network whose output is the mean of the outputs of several networks.
-
-    Args:
-        card: Card with the architecture of the joint network.
-        members: Networks of the same architecture, each with one member.
-    """
+    """Return one network, as a card describes it, whose output is the mean of its members'."""
     network = CameraNetwork(card)
     for name in ("eyes", "nerves"):
         several = getattr(network, name)

@@ -1,10 +1,8 @@
-"""Trained policies in files.
+"""Trained policies of Stable-Baselines3.
 
-A file holds safetensors: the weights, the normalisation statistics and the bounds of the model's
-own spaces; in its metadata a JSON card (env, learner, settings, steps, seed, version, command, both
-layouts) and a hash of the tensors. The model's actions are scaled from the bounds of the model's
-space to those of the action layout; in files of older versions the two are equal. Loading a file
-only reads numbers and JSON, so it cannot run code.
+Their file has the weights, the normalisation statistics and the bounds of the model's own spaces.
+The model's actions are scaled from those bounds to the bounds of the action layout; in files of
+older versions the two are equal.
 """
 
 from __future__ import annotations
@@ -12,7 +10,6 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -79,27 +76,18 @@ class TrainedPolicy(Policy):
 
     @classmethod
     def of_file(
-        cls, card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str = ""
+        cls, card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
     ) -> TrainedPolicy:
-        """Return the policy of a file, see `shapechanger.load_policy`.
-
-        Args:
-            card: Its card, with settings as a table.
-            tensors: Its arrays.
-            algorithm: As of `shapechanger.load_policy`.
-        """
+        """Return the policy of a file, whose settings are a table, see `load_policy`."""
         settings = LearnerSettings.from_builtins(card.settings)
         card = msgspec.structs.replace(card, settings=settings)
         _require_numbers(card, tensors)
         return cls(_model(card, tensors, algorithm), _read_statistics(card, tensors), card)
 
-    @cached_property
-    def _act(self) -> Act:
+    @property
+    def act(self) -> Act:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The policy's mean actions for observations of shape (n, ...), in the env's units."""
         return actor(self.model, self.normalisation, self.card.layouts[1])
-
-    def act(self, observations: NDArray[Any]) -> NDArray[Any]:
-        """Return the mean actions for observations of shape (n, ...), in the env's units."""
-        return self._act(observations)
 
     def tensors(self) -> dict[str, NDArray[Any]]:
         """Return its weights, spaces and statistics, keyed by name."""
@@ -125,13 +113,9 @@ def actor(
     *,
     deterministic: bool = True,
 ) -> Act:
-    """Return a function from the env's observations to the env's actions.
+    """Return a function from the env's observations to the env's actions, which `action` describes.
 
-    Args:
-        model: The model.
-        normalisation: Its statistics; None if it is not normalised.
-        action: Layout of the env's actions.
-        deterministic: Whether actions are the mean ones, without exploration noise.
+    Deterministic actions are the mean ones, without exploration noise.
     """
     if deterministic and hasattr(model.policy, "act"):
         return cast("Any", model).policy.act  # Rows of limbs are scaled already, and of any body.
@@ -141,7 +125,9 @@ def actor(
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         inputs = observations
         if normalisation is not None:
-            inputs = _normalised(observations, normalisation.observation)
+            known = normalisation.observation
+            inputs = (observations - known.mean) / np.sqrt(known.var + EPSILON)
+            inputs = np.clip(inputs, -CLIP, CLIP).astype(np.float32)
         if mean is not None:
             return scale.to_env(mean(inputs))
         return scale.to_env(model.predict(inputs, deterministic=deterministic)[0])
@@ -169,11 +155,6 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
         return np.clip(actions, space.low, space.high)
 
     return act
-
-
-def _normalised(observations: NDArray[Any], statistics: RunningMeanStd) -> NDArray[np.float32]:
-    scaled = (observations - statistics.mean) / np.sqrt(statistics.var + EPSILON)
-    return np.clip(scaled, -CLIP, CLIP).astype(np.float32)
 
 
 def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> None:
