@@ -67,11 +67,6 @@ def test_fewer_demonstrations_are_the_first_of_more() -> None:
     assert not np.array_equal(other.actions, fewer.actions)
 
 
-def test_an_env_without_a_demonstrator_is_refused() -> None:
-    with pytest.raises(StudyError, match="BigInvertedPendulum-v1 has no demonstrator"):
-        record_demonstrations(BIG, 10, 20, 3, _FRAMING)
-
-
 def _cloned(
     folder: Path, steps: int = 120, *, only_last: bool = False, start: CameraPolicy | None = None
 ) -> tuple[CameraPolicy, list[Evaluation]]:

@@ -301,7 +301,7 @@ class Clone(Policy):
     ) -> NDArray[np.float32]:
         """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
 
-        The inputs are those of `predict_many`.
+        It takes the arguments of `predict_many`.
         """
 
     def predict(
