@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +73,7 @@ def test_a_policy_of_any_number_of_worlds_is_loaded(tmp_path: Path) -> None:
     few = msgspec.structs.replace(SETTINGS, n_steps=2, batch_size=16, eval_every=16)
     trained = RslLearner("rsl-ppo", few).train(PENDULUM, 16, 0, on_evaluation=ignore)
     many = msgspec.structs.replace(SETTINGS, n_envs=8192, eval_every=2**20)
-    card = msgspec.structs.replace(trained.card, settings=many)
-    save_policy(dataclasses.replace(trained, card=card), tmp_path / "many.safetensors")
+    trained.carded(settings=many).save(tmp_path / "many.safetensors")
     loaded = load_policy(tmp_path / "many.safetensors")
     assert loaded.card.settings.n_envs == 8192
     seen = np.zeros((1, 4))
