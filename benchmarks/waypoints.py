@@ -388,7 +388,7 @@ def taught_source(name: str, seed: int) -> CameraPolicy:
         record_demonstrations(env, steps, settings.episode_steps, seed, settings.clone.framing)
         for env in envs
     ]
-    data = merged(shown)
+    data = merged([replace(part, states=None, state_layout=None) for part in shown])
     start = CameraPolicy.fresh(settings.clone, seed, data.action_layout)
     policy, _ = learn(data, settings=settings.clone, seed=seed, start=start, symmetric=True)
     policy.save(path)

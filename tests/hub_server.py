@@ -89,22 +89,6 @@ class _Handler(BaseHTTPRequestHandler):
     def log_message(self, *_: object) -> None:
         """Print nothing."""
 
-    def do_HEAD(self) -> None:
-        """Answer with the headers of a file."""
-        self._answer()
-
-    def do_GET(self) -> None:
-        """Answer with a file, or with what is known of a repository."""
-        self._answer()
-
-    def do_POST(self) -> None:
-        """Make repositories and commits."""
-        self._answer()
-
-    def do_PUT(self) -> None:
-        """Store a large file."""
-        self._answer()
-
     def _answer(self) -> None:
         self._body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
         path = unquote(urlsplit(self.path).path)
@@ -114,6 +98,8 @@ class _Handler(BaseHTTPRequestHandler):
                 getattr(self, method)(*match.groups())
                 return
         self._send(501, {"error": f"The fake has no {self.command} {path}."})
+
+    do_HEAD = do_GET = do_POST = do_PUT = _answer
 
     def _send(self, code: int, answer: Any, **headers: str) -> None:
         body = json.dumps(answer).encode()
@@ -167,9 +153,8 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(200, {"url": f"{self.server.address}/{prefix}{name}"})
 
     def _info(self, name: str, revision: str | None) -> None:
-        if (found := self._repository(name)) is None:
-            return
-        if (commit := self._commit_of(found, revision or "")) is None:
+        found = self._repository(name)
+        if found is None or (commit := self._commit_of(found, revision or "")) is None:
             return
         files = found.commits.get(commit, {})
         files = {".gitattributes": b""} | files
@@ -178,15 +163,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(200, about | {"private": found.private, "tags": [], "downloads": 0, "likes": 0})
 
     def _tree(self, name: str, revision: str) -> None:
-        if (found := self._repository(name)) is None:
-            return
-        if (commit := self._commit_of(found, revision)) is None:
-            return
-        files = [
-            {"type": "file", "path": path, "size": len(content), "oid": "0"}
-            for path, content in found.commits.get(commit, {}).items()
-        ]
-        self._send(200, files)
+        if (found := self._repository(name)) and (commit := self._commit_of(found, revision)):
+            about = {"type": "file", "oid": "0"}
+            files = found.commits.get(commit, {})
+            self._send(200, [about | {"path": p, "size": len(c)} for p, c in files.items()])
 
     def _validate(self) -> None:
         self._send(200, {"errors": [], "warnings": []})
@@ -196,10 +176,8 @@ class _Handler(BaseHTTPRequestHandler):
             return
         files = [
             {
-                "path": file["path"],
-                "uploadMode": "lfs"
-                if file["path"].endswith((".jsonl", ".safetensors"))
-                else "regular",
+                "path": (path := file["path"]),
+                "uploadMode": "lfs" if path.endswith((".jsonl", ".safetensors")) else "regular",
                 "shouldIgnore": False,
                 "oid": None,
             }
@@ -242,9 +220,8 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(200, {"success": True, "commitUrl": url, "commitOid": sha, "hookOutput": ""})
 
     def _file(self, prefix: str | None, name: str, revision: str, file: str) -> None:
-        if (found := self._repository(f"{prefix or 'models/'}{name}")) is None:
-            return
-        if (commit := self._commit_of(found, revision)) is None:
+        found = self._repository(f"{prefix or 'models/'}{name}")
+        if found is None or (commit := self._commit_of(found, revision)) is None:
             return
         content = found.commits[commit].get(file)
         if content is None:

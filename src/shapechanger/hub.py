@@ -33,11 +33,10 @@ POLICY: Final = "policy.safetensors"
 EPISODES: Final = "episodes"
 """Folder of the episodes."""
 
-_LIST: Final = "shapechanger.json"
-_CARD: Final = "README.md"
+_LIST, _CARD = "shapechanger.json", "README.md"
 _FORMAT: Final = 1
 _TYPES: Final[dict[Kind, str]] = {"policy": "model", "demonstrations": "dataset"}
-_PLACES: Final[dict[Kind, str]] = {"policy": POLICY, "demonstrations": f"{EPISODES}/*"}
+_PLACES: Final[dict[Kind, str]] = {"policy": POLICY, "demonstrations": EPISODES}
 _EPISODE_FILE: Final = r"(episode\.json|steps\.jsonl|frames/\w[\w-]{0,63}\.jpg)"
 _NAMES: Final[dict[Kind, re.Pattern[str]]] = {
     "policy": re.compile(re.escape(POLICY)),
@@ -49,15 +48,11 @@ _LOG_IN: Final = "log in with `hf auth login`, or set HF_TOKEN"
 
 
 class _File(msgspec.Struct):
-    """Size in bytes and SHA-256 of a file."""
-
     bytes: int
     sha256: str
 
 
 class _Listed(msgspec.Struct):
-    """Content of `shapechanger.json`."""
-
     kind: str = ""
     files: dict[str, _File] = {}
     format: int = 0
@@ -87,7 +82,6 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
         HubError: If the Hub refuses, or the repository holds something else.
         MissingExtra: If huggingface_hub is not installed.
     """
-    hub, errors = _library(), import_module("huggingface_hub.errors")
     repo_type = _TYPES[kind]
     files = {
         str(path.relative_to(folder)): _File(path.stat().st_size, sha256_of(path))
@@ -97,16 +91,12 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
     listed = _Listed(kind, files, _FORMAT, version("shapechanger"))
     (folder / _CARD).write_bytes(card.encode(errors="replace"))
     (folder / _LIST).write_bytes(msgspec.json.format(msgspec.json.encode(listed), indent=1))
-    with _answers(repo, kind):
+    with _hub(repo, kind) as hub:
         api = hub.HfApi()
-        try:
-            found = api.repo_info(repo, repo_type=repo_type)
-            there = {file.rfilename for file in found.siblings or ()}
-        except errors.RepositoryNotFoundError:
-            api.create_repo(repo, repo_type=repo_type, private=not public, exist_ok=True)
-            there = set[str]()
-        strange = there - {".gitattributes", _CARD}
-        if strange and _LIST not in there:
+        api.create_repo(repo, repo_type=repo_type, private=not public, exist_ok=True)
+        found = api.repo_info(repo, repo_type=repo_type).siblings or ()
+        strange = {file.rfilename for file in found} - {".gitattributes", _CARD}
+        if strange and _LIST not in strange:
             raise HubError(
                 f"{repo} holds files that Shapechanger did not push, such as {min(strange)}: "
                 "choose another name."
@@ -115,7 +105,7 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
             repo_id=repo,
             folder_path=folder,
             repo_type=repo_type,
-            delete_patterns=_PLACES[kind],
+            delete_patterns=[_PLACES[kind], f"{_PLACES[kind]}/*"],
             commit_message=f"Push {kind} with Shapechanger",
         )
         return str(done.commit_url)
@@ -140,35 +130,26 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         OutputError: If the folder cannot be written to.
         MissingExtra: If huggingface_hub is not installed.
     """
-    hub = _library()
     repo_type = _TYPES[kind]
-    with _answers(repo, kind):
+    with _hub(repo, kind) as hub:
         found = hub.HfApi().repo_info(
             repo, repo_type=repo_type, revision=revision or None, files_metadata=True
         )
-        commit = str(found.sha)
         sizes = {file.rfilename: file.size or 0 for file in found.siblings or ()}
-        if _LIST not in sizes:
+        if not 0 < sizes.get(_LIST, 0) <= _MAX_LIST_BYTES:
             raise HubError(f"{repo} has no {_LIST}, so Shapechanger did not push it.")
-        if sizes[_LIST] > _MAX_LIST_BYTES:
-            raise HubError(f"{_LIST} of {repo} has more than {_MAX_LIST_BYTES} bytes.")
 
         def fetch(name: str) -> None:
-            hub.hf_hub_download(repo, name, repo_type=repo_type, revision=commit, local_dir=folder)
+            hub.hf_hub_download(
+                repo, name, repo_type=repo_type, revision=found.sha, local_dir=folder
+            )
 
         fetch(_LIST)
         listed = _listed((folder / _LIST).read_bytes(), repo, kind)
-        here = {name: size for name, size in sizes.items() if _NAMES[kind].match(name)}
-        for name, about in listed.items():
-            if here.get(name) != about.bytes:
-                raise HubError(
-                    f"{name} of {repo} has {here.get(name, 0)} bytes, and {_LIST} says "
-                    f"{about.bytes}."
-                )
-        place = _PLACES[kind].rstrip("*")
-        if more := sorted(n for n in sizes.keys() - listed.keys() if n.startswith(place)):
-            raise HubError(f"{repo} has {more[0][:80]!r}, which {_LIST} does not name.")
-        if (total := sum(here.values())) > max_bytes:
+        held = {name for name in sizes if name.split("/")[0] == _PLACES[kind]}
+        if odd := sorted(held ^ listed.keys()):
+            raise HubError(f"{repo} has other files than its {_LIST} names: {odd[0][:80]!r}.")
+        if (total := sum(sizes[name] for name in listed)) > max_bytes:
             raise HubError(
                 f"The files of {repo} have {total} bytes, more than the limit of {max_bytes}."
             )
@@ -181,72 +162,58 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
                 raise HubError(
                     f"{name} of {repo} does not have the SHA-256 that {_LIST} says: it was changed."
                 )
-    return commit
+    return str(found.sha)
 
 
 def _listed(content: bytes, repo: str, kind: Kind) -> dict[str, _File]:
     """Return the size and the SHA-256 of each file that a repository lists."""
     try:
         listed = msgspec.json.decode(content, type=_Listed)
-    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        raise HubError(f"{_LIST} of {repo} does not list its files.") from error
-    if listed.format != _FORMAT:
-        raise HubError(f"{repo} was pushed by another version of Shapechanger.")
-    if listed.kind != kind:
-        raise HubError(f"{repo} holds {listed.kind[:40]!r}, and not {kind!r}.")
-    for name in listed.files:
-        if not _NAMES[kind].fullmatch(name):
-            raise HubError(f"{_LIST} of {repo} names {name[:80]!r}, which is no {kind} file.")
-    if not listed.files:
-        raise HubError(f"{_LIST} of {repo} does not list its files.")
+    except (msgspec.MsgspecError, ValueError, RecursionError):
+        listed = _Listed()
+    if not listed.files or (listed.format, listed.kind) != (_FORMAT, kind):
+        raise HubError(f"{_LIST} of {repo} does not list files of {kind} in format {_FORMAT}.")
+    if strange := [name for name in listed.files if not _NAMES[kind].fullmatch(name)]:
+        raise HubError(f"{_LIST} of {repo} names {strange[0][:80]!r}, which is no {kind} file.")
     return listed.files
 
 
-def _library() -> Any:
+@contextmanager
+def _hub(repo: str, kind: Kind) -> Generator[Any]:
+    """Import huggingface_hub, and turn its errors into sentences."""
+    no_name = f"{repo!r} is no name of a repository: give owner and name, such as ada/ant."
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):  # No address, and no path.
+        raise HubError(no_name)
     try:
         hub = import_module("huggingface_hub")
     except ImportError as error:
         raise MissingExtra("huggingface_hub", "hub") from error
     # Our errors are one sentence; its warnings would clutter them.
-    utilities = import_module("huggingface_hub.utils")
+    utilities, errors = map(import_module, ("huggingface_hub.utils", "huggingface_hub.errors"))
     utilities.logging.set_verbosity_error()
     utilities.disable_progress_bars()
-    return hub
-
-
-@contextmanager
-def _answers(repo: str, kind: Kind) -> Generator[None]:
-    """Turn what the Hub answers, and errors of the transport, into sentences."""
-    errors = import_module("huggingface_hub.errors")
-    no_name = HubError(
-        f"{repo!r} is no name of a repository: give its owner and its name, such as ada/ant."
-    )
-    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):  # No address, and no path.
-        raise no_name
     try:
-        yield
+        yield hub
     except ShapechangerError:
         raise
-    except errors.HFValidationError as error:
-        raise no_name from error
-    except errors.RevisionNotFoundError as error:
-        raise HubError(f"{repo} has no such revision.") from error
-    except errors.RepositoryNotFoundError as error:
-        raise HubError(
-            f"There is no {_TYPES[kind]} {repo} on the Hub, or it is private: check the name, and "
-            f"{_LOG_IN}."
-        ) from error
-    except errors.HfHubHTTPError as error:
-        code = getattr(error.response, "status_code", 0)
-        sentences = {
+    except PermissionError as error:
+        raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
+    except Exception as error:  # Of the transport, too, whose package differs between versions.
+        code = getattr(getattr(error, "response", None), "status_code", 0)
+        codes = {
             401: f"The Hub wants to know who asks for {repo}: {_LOG_IN}.",
             403: f"The Hub forbids this for {repo}: use a token that may write to it.",
         }
-        other = f"The Hub answered {code} for {repo}: try again later."
-        raise HubError(sentences.get(code, other)) from error
-    except PermissionError as error:
-        raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
-    except Exception as error:  # Of the transport, whose package differs between versions.
-        raise HubError(
-            f"The connection to the Hub failed ({type(error).__name__}): try again."
-        ) from error
+        missing = (
+            f"There is no {_TYPES[kind]} {repo} on the Hub, or it is private: check the name, and "
+            f"{_LOG_IN}."
+        )
+        sentences = {
+            errors.HFValidationError: no_name,
+            errors.RevisionNotFoundError: f"{repo} has no such revision.",
+            errors.RepositoryNotFoundError: missing,
+            errors.HfHubHTTPError: codes.get(code, f"The Hub answered {code} for {repo}."),
+            Exception: f"The connection to the Hub failed ({type(error).__name__}): try again.",
+        }
+        found = next(text for class_, text in sentences.items() if isinstance(error, class_))
+        raise HubError(found) from error

@@ -10,7 +10,6 @@ import simplejpeg
 
 from shapechanger.demos.dataset import load_dataset, merged
 from shapechanger.demos.episodes import EpisodeWriter, drop
-from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.episodes.making import ACTIONS, STATES, header, step
 
@@ -103,7 +102,9 @@ def test_episodes_that_differ_are_not_mixed(
 
 def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
     path = _recorded(tmp_path, image_size=(64, 24))
-    with pytest.raises(DemosError, match=r"000000\.jpg has 32 x 24 pixels, but .* 64 x 24"):
+    with pytest.raises(
+        DemosError, match=r"000000\.jpg has \(32, 24\) pixels, but the header \(64, 24\)"
+    ):
         load_dataset(path)
 
 
@@ -112,11 +113,3 @@ def test_a_truncated_frame_is_refused(tmp_path: Path) -> None:
         writer.add(step(0), _jpeg(1)[:-40])
     with pytest.raises(DemosError, match=r"000000\.jpg is not a JPEG, or is damaged"):
         load_dataset(tmp_path)
-
-
-def test_an_oversized_frame_is_not_decoded() -> None:
-    jpeg = bytearray(_jpeg(1))
-    place = jpeg.index(b"\xff\xc0") + 5
-    jpeg[place : place + 4] = b"\xea\x60\xea\x60"  # 60,000 x 60,000.
-    with pytest.raises(DemosError, match=r"x\.jpg claims 60000 x 60000 pixels"):
-        decode_picture(bytes(jpeg), "x.jpg")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -76,16 +75,6 @@ def test_durations_are_those_of_the_times(
     assert sum(found) == pytest.approx(driven_s, rel=1e-6)
     assert durations_s([None] * 8, hz) == [1 / hz] * 8
     assert durations_s([], hz) == []
-
-
-def test_an_episode_lasts_as_long_as_its_times_say(tmp_path: Path) -> None:
-    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
-        for number in range(100):
-            at_ns = number * 200_000_000
-            writer.add(msgspec.structs.replace(step(number), captured_ns=at_ns, decided_ns=None))
-    assert read_episode(writer.path).seconds == pytest.approx(99 * 0.2 + 0.05)
-    drop(writer.path, 0, 49, "bad")
-    assert read_episode(writer.path).seconds == pytest.approx(49 * 0.2 + 0.05)
 
 
 def test_jitter_is_measured_and_bounded() -> None:

@@ -6,9 +6,10 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import (
@@ -20,15 +21,16 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.exchange import import_episodes
+from shapechanger.demos.exchange.format import kept_steps
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.demos.statistics import is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 
-_NS_PER_S: Final = 1e9
-
 DEMONSTRATORS: Final = ("person", "expert")
 """Drivers from whose steps policies learn."""
+
+_StepAndImage = tuple[Step, bytes | None]
 
 Shrink = Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]]
 """Function that reduces an image of an episode, shape (H, W, 3), to save memory."""
@@ -96,17 +98,17 @@ class Dataset:
 
 
 def merged(datasets: Sequence[Dataset]) -> Dataset:
-    """Return the steps of several datasets of images, whose other attributes are of the first."""
-    pictures = [data.pictures for data in datasets if data.pictures is not None]
+    """Return the steps of several datasets of one kind; other attributes are the first one's."""
+
+    def joined(name: str) -> Any:
+        arrays = [getattr(data, name) for data in datasets]
+        return None if arrays[0] is None else np.concatenate(arrays)
+
     return replace(
         datasets[0],
-        pictures=np.concatenate(pictures),
-        states=None,
-        actions=np.concatenate([data.actions for data in datasets]),
+        **{name: joined(name) for name in ("pictures", "states", "actions", "times_s")},
         episodes=tuple(length for data in datasets for length in data.episodes),
-        times_s=np.concatenate([data.times_s for data in datasets]),
         files=tuple(file for data in datasets for file in data.files),
-        state_layout=None,
     )
 
 
@@ -133,33 +135,43 @@ def load_dataset(
     for driver in drivers:
         if driver not in DRIVERS:
             raise UnknownName("driver", driver, DRIVERS)
-    parts = [part for part in _parts(data, drivers, shrink) if part.steps]
+    parts: list[Dataset] = []
+    kinds: list[tuple[str, dict[str, object], float]] = []
+    periods_s: list[float] = []
+    for name, header, steps in _episodes(data):
+        chosen, pictures = _chosen(name, header, steps, drivers, shrink)
+        if not chosen:
+            continue
+        kind: dict[str, object] = {"actions": header.action_layout, "states": header.state_layout}
+        kind["pictures"] = (header.image_size, bool(pictures))
+        kinds.append((name, kind, header.control_hz))
+        other = [what for what, value in kinds[0][1].items() if kind[what] != value]
+        if not is_same_rate(header.control_hz, kinds[0][2]):
+            other.append("steps a second")
+        if other:
+            raise DemosError(
+                f"{name} has other {other[0]} than {kinds[0][0]}: learn from one kind at a time."
+            )
+        times_s, are_known = _times_s(chosen, header.control_hz, name)
+        follows = np.diff([step.index for step in chosen]) == 1
+        periods_s += np.diff(times_s)[follows & are_known].tolist()
+        layout = Layout.from_json(header.state_layout) if header.state_layout else None
+        part = Dataset(
+            pictures=np.stack(pictures) if pictures else None,
+            states=np.array([step.state for step in chosen], np.float32) if layout else None,
+            actions=np.array([step.action for step in chosen], np.float32),
+            episodes=(len(chosen),),
+            times_s=times_s,
+            files=tuple(f"{name}, step {step.index}" for step in chosen),
+            action_layout=Layout.from_json(header.action_layout),
+            state_layout=layout,
+            control_hz=header.control_hz,
+            body=header.body,
+        )
+        parts.append(part)
     if not parts:
         raise DemosError(f"There is no step of {' or '.join(sorted(drivers))} in {data}.")
-    for part in parts[1:]:
-        _require_same(part, parts[0])
-    header = parts[0].header
-    pictures = [picture for part in parts for picture in part.pictures]
-    steps = [step for part in parts for step in part.steps]
-    layout = Layout.from_json(header.state_layout) if header.state_layout else None
-    periods_s: list[float] = []
-    for part in parts:
-        if all(step.captured_ns is not None for step in part.steps):
-            follows = np.diff([step.index for step in part.steps]) == 1
-            periods_s += np.diff(part.times_s())[follows].tolist()
-    return Dataset(
-        pictures=np.stack(pictures) if pictures else None,
-        states=np.array([step.state for step in steps], np.float32) if layout else None,
-        actions=np.array([step.action for step in steps], np.float32),
-        episodes=tuple(len(part.steps) for part in parts),
-        times_s=np.concatenate([part.times_s() for part in parts]),
-        files=tuple(f"{part.name}, step {step.index}" for part in parts for step in part.steps),
-        action_layout=Layout.from_json(header.action_layout),
-        state_layout=layout,
-        control_hz=header.control_hz,
-        body=header.body,
-        rate_jitter=rate_jitter(periods_s, header.control_hz),
-    )
+    return replace(merged(parts), rate_jitter=rate_jitter(periods_s, parts[0].control_hz))
 
 
 def count_steps(data: Path) -> int:
@@ -167,84 +179,62 @@ def count_steps(data: Path) -> int:
     return sum(step.driver in DEMONSTRATORS for _, _, steps in _episodes(data) for step, _ in steps)
 
 
-class _Part(NamedTuple):
-    """The chosen steps of one episode, each with its image if there are any."""
-
-    name: str
-    header: EpisodeHeader
-    steps: list[Step]
-    pictures: list[NDArray[np.uint8]]
-
-    def times_s(self) -> NDArray[np.float64]:
-        """Return the time of each step, s; from the rate where a time is missing."""
-        indices = [step.index for step in self.steps]
-        known = [step.captured_ns for step in self.steps if step.captured_ns is not None]
-        if len(known) < len(self.steps):
-            return (np.array(indices) - indices[0]) / self.header.control_hz
-        times_s = (np.array(known, np.int64) - known[0]) / _NS_PER_S
-        if (np.diff(times_s) < 0.0).any():
-            worst = int(np.diff(times_s).argmin())
-            raise DemosError(
-                f"Time runs backwards in {self.name} after step {indices[worst]}: exclude steps "
-                "with `shapechanger demos bad`."
-            )
-        return times_s
-
-
-def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Iterator[_Part]:
-    """Yield each episode, in order."""
-    for name, header, steps in _episodes(data):
-        part = _Part(name, header, [], [])
-        newest = decoded = None
-        pixels = np.empty((0, 0, 3), np.uint8)
-        for step, jpeg in steps:
-            newest = jpeg or newest
-            if step.driver not in drivers:
-                continue
-            part.steps.append(step)
-            if newest is None:
-                continue
-            if newest is not decoded and newest != decoded:
-                decoded, where = newest, f"{name}/{step.frame or step.index}"
-                pixels = decode_picture(newest, where)
-                size, expected = (pixels.shape[1], pixels.shape[0]), header.image_size
-                if expected and expected != size:
-                    text = "{} has {} x {} pixels, but the other images {} x {}."
-                    raise DemosError(text.format(where, *size, *expected))
-                pixels = pixels if shrink is None else shrink(pixels, header)
-            part.pictures.append(pixels)
-        if len(part.pictures) not in {0, len(part.steps)}:
-            raise DemosError(f"Only some steps of {name} have images.")
-        yield part
-
-
-def _episodes(
-    data: Path,
-) -> Iterator[tuple[str, EpisodeHeader, Iterator[tuple[Step, bytes | None]]]]:
+def _episodes(data: Path) -> Iterator[tuple[str, EpisodeHeader, Iterator[_StepAndImage]]]:
     """Yield the name, the header, and the kept steps with their images, of each episode."""
-    is_recording = data.is_dir() and any(map(is_episode, (data, *data.iterdir())))
-    if is_recording or not data.exists():
+    if not data.exists() or any(map(is_episode, (data, *data.glob("*")))):
         for path in episodes_of(data):
             episode = read_episode(path)
-            kept = ((step, episode.jpeg(step)) for step in episode.kept)
-            yield str(path), episode.header, kept
+            steps = ((step, episode.jpeg(step)) for step in episode.kept)
+            yield str(path), episode.header, steps
         return
+    for number, found in enumerate(import_episodes(data)):
+        kept = enumerate(kept_steps(found.rows))
+        steps = ((structs.replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
+        yield f"{data}, episode {number}", found.header, steps
 
-    for number, (header, steps) in enumerate(import_episodes(data)):
-        yield f"{data}, episode {number}", header, iter(steps)
+
+def _chosen(
+    name: str,
+    header: EpisodeHeader,
+    steps: Iterator[_StepAndImage],
+    drivers: Collection[str],
+    shrink: Shrink | None,
+) -> tuple[list[Step], list[NDArray[np.uint8]]]:
+    """Return the steps of some drivers, each with its image if there are any."""
+    chosen: list[Step] = []
+    pictures: list[NDArray[np.uint8]] = []
+    newest = decoded = None
+    pixels = np.empty((0, 0, 3), np.uint8)
+    for step, jpeg in steps:
+        newest = jpeg or newest
+        if step.driver not in drivers:
+            continue
+        chosen.append(step)
+        if newest is None:
+            continue
+        if newest is not decoded and newest != decoded:
+            decoded, where = newest, f"{name}/{step.frame or step.index}"
+            pixels = decode_picture(newest, where)
+            size = (pixels.shape[1], pixels.shape[0])
+            if header.image_size not in {None, size}:
+                raise DemosError(f"{where} has {size} pixels, but the header {header.image_size}.")
+            pixels = pixels if shrink is None else shrink(pixels, header)
+        pictures.append(pixels)
+    if len(pictures) not in {0, len(chosen)}:
+        raise DemosError(f"Only some steps of {name} have images.")
+    return chosen, pictures
 
 
-def _require_same(part: _Part, first: _Part) -> None:
-    """Refuse an episode that differs in layout, image size or rate."""
-    one, other = part.header, first.header
-    same = {
-        "actions": one.action_layout == other.action_layout,
-        "states": one.state_layout == other.state_layout,
-        "pictures": one.image_size == other.image_size
-        and bool(part.pictures) == bool(first.pictures),
-        "steps a second": is_same_rate(one.control_hz, other.control_hz),
-    }
-    if kind := next((kind for kind, is_same in same.items() if not is_same), ""):
+def _times_s(steps: Sequence[Step], hz: float, name: str) -> tuple[NDArray[np.float64], bool]:
+    """Return the time of each step, s, and whether all are known; or else from the rate."""
+    indices = np.array([step.index for step in steps])
+    known = [step.captured_ns for step in steps if step.captured_ns is not None]
+    if len(known) < len(steps):
+        return (indices - indices[0]) / hz, False
+    times_s = (np.array(known, np.int64) - known[0]) / 1e9
+    if (np.diff(times_s) < 0.0).any():
         raise DemosError(
-            f"{part.name} has other {kind} than {first.name}: learn from one kind at a time."
+            f"Time runs backwards in {name} after step {indices[np.diff(times_s).argmin()]}: "
+            "exclude steps with `shapechanger demos bad`."
         )
+    return times_s, True

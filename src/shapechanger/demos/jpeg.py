@@ -22,7 +22,6 @@ claim four thousand million."""
 
 _SCAN: Final = b"\xff\xda"  # Start of a scan (ITU-T T.81); in the scans 0xff is followed by 0.
 _MAX_SCANS: Final = 64  # Progressive JPEGs have about ten.
-_GREY: Final = "Gray"
 _REMEDY: Final = "replace it with an intact copy, or remove it and its entry"
 
 
@@ -41,11 +40,8 @@ def decode_picture(jpeg: bytes, name: str) -> NDArray[np.uint8]:
         MissingExtra: If simplejpeg is not installed.
     """
     picture_size(jpeg, name)
-    try:
-        # Strict by default: a truncated image is an error, not filled up with grey.
-        return _simplejpeg().decode_jpeg(jpeg, colorspace="RGB")
-    except ValueError as error:
-        raise DemosError(f"The image {name} is damaged ({error}): {_REMEDY}.") from error
+    # Strict by default: a truncated image is an error, not filled up with grey.
+    return _decoded("decode_jpeg", jpeg, name, colorspace="RGB")
 
 
 def encode_picture(pixels: NDArray[np.uint8], quality: int = 100) -> bytes:
@@ -75,7 +71,7 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
             f"The image {name} has more than {_MAX_SCANS} scans, each of which takes the time of "
             f"a picture: {_REMEDY}."
         )
-    height, width, _ = _header(jpeg, name)
+    height, width, *_ = _decoded("decode_jpeg_header", jpeg, name)
     if height * width > MAX_PIXELS:
         raise DemosError(
             f"The image {name} claims {width} x {height} pixels, more than the limit of "
@@ -85,23 +81,16 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
 
 
 def is_grey(jpeg: bytes, name: str) -> bool:
-    """Return whether a JPEG has no colours; errors as in `picture_size`.
-
-    Args:
-        jpeg: Its bytes.
-        name: How to name the image in errors.
-    """
-    return _header(jpeg, name)[2] == _GREY
+    """Return whether a JPEG has no colours; errors as in `picture_size`."""
+    return _decoded("decode_jpeg_header", jpeg, name)[2] == "Gray"
 
 
-def _header(jpeg: bytes, name: str) -> tuple[int, int, str]:
-    """Return the height, width and colour space of a JPEG."""
+def _decoded(function: str, jpeg: bytes, name: str, **options: str) -> Any:
     try:
-        height, width, colours, _ = _simplejpeg().decode_jpeg_header(jpeg)
+        return getattr(_simplejpeg(), function)(jpeg, **options)
     except ValueError as error:
         what = f"is not a JPEG, or is damaged ({error})" if jpeg else "is empty"
-        raise DemosError(f"The picture {name} {what}: {_REMEDY}.") from error
-    return height, width, colours
+        raise DemosError(f"The image {name} {what}: {_REMEDY}.") from error
 
 
 def _simplejpeg() -> Any:
@@ -159,13 +148,12 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
         return np.rint(shares * (width - 1)).astype(int).tolist()
 
     bars = np.full((len(lows), _BAR, width, 3), BACKGROUND, np.uint8)
-    for bar, zero, value in zip(
-        bars, columns([0.0] * len(lows)), columns(step.action), strict=True
-    ):
+    wanted = [None] * len(lows) if step.wanted is None else columns(step.wanted)
+    ends = zip(bars, columns([0.0] * len(lows)), columns(step.action), wanted, strict=True)
+    for bar, zero, value, line in ends:
         bar[2:-2, min(zero, value) : max(zero, value) + 1] = COLOURS[step.driver]
         bar[:, zero] = _MIDDLE
-    if step.wanted is not None:
-        for bar, wanted in zip(bars, columns(step.wanted), strict=True):
-            place = min(wanted, width - 2)
+        if line is not None:
+            place = min(line, width - 2)
             bar[1:-1, place : place + 2] = _WANTED
     return np.concatenate([large, *bars])

@@ -6,28 +6,13 @@ import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.demos.episodes.files import free_path, is_episode
 from shapechanger.errors import DemosError, OutputError
 
 
-class Merged(NamedTuple):
-    """Result of a merge.
-
-    Attributes:
-        episodes: Source and target folder of each episode.
-        layouts: Number of different layouts in the merged recording; learning needs exactly one.
-        bytes_: Number of bytes copied.
-    """
-
-    episodes: tuple[tuple[Path, Path], ...]
-    layouts: int
-    bytes_: int
-
-
-def merge(sources: Sequence[Path], out: Path) -> Merged:
+def merge(sources: Sequence[Path], out: Path) -> list[tuple[Path, Path]]:
     """Copy episodes into one recording; the sources are not changed, and nothing is overwritten.
 
     All episodes are read before the first one is copied. An episode whose name is taken gets the
@@ -37,6 +22,9 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
         sources: Recordings, or single episodes.
         out: Folder of the target recording; created if missing.
 
+    Returns:
+        Source and target folder of each episode.
+
     Raises:
         DemosError: If there are no episodes, or one is still being recorded, already in `out`, or
             has links.
@@ -45,12 +33,11 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
     """
     if not sources:
         raise DemosError("There is nothing to merge: give at least one recording.")
+    if is_episode(out):
+        raise DemosError(f"{out} is an episode, but a recording is a folder of episodes.")
     episodes = [read_episode(path) for source in sources for path in episodes_of(source)]
-    there: list[Episode] = []
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        if is_episode(out):
-            raise DemosError(f"{out} is an episode, but a recording is a folder of episodes.")
-        there = [read_episode(path) for path in episodes_of(out)]
+    is_new = not out.exists() or (out.is_dir() and not any(out.iterdir()))
+    there = [] if is_new else [read_episode(path) for path in episodes_of(out)]
     known = {_identity(episode): episode.path for episode in there}
     for episode in episodes:
         if not episode.closed:
@@ -64,11 +51,7 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
         # A link would copy a file or a folder of another place into the recording.
         if link := next((path for path in episode.path.rglob("*") if path.is_symlink()), None):
             raise DemosError(f"{link} is a link, but an episode has only files: remove it.")
-    headers = [episode.header for episode in [*there, *episodes]]
-    layouts = {(header.action_layout, header.state_layout) for header in headers}
-    pairs = tuple((episode.path, _copied(episode.path, out)) for episode in episodes)
-    files = (file for _, target in pairs for file in target.rglob("*") if file.is_file())
-    return Merged(pairs, len(layouts), sum(file.stat().st_size for file in files))
+    return [(episode.path, _copied(episode.path, out)) for episode in episodes]
 
 
 def _identity(episode: Episode) -> tuple[object, ...]:

@@ -10,7 +10,9 @@ import numpy as np
 
 from shapechanger.demos.episodes import Episode
 
-_NS_PER_S: Final = 1e9
+_SAME_RATE: Final = 0.01  # Two recorders at 20 Hz may write 20 and 20.000001.
+_MOST_JITTER: Final = 0.25  # Two settings of a rate differ by at least a third.
+_MIN_PERIODS: Final = 20
 
 
 def gaps_s(episode: Episode) -> list[float]:
@@ -19,18 +21,10 @@ def gaps_s(episode: Episode) -> list[float]:
     Steps without a time, and pairs with dropped steps in between, are left out.
     """
     return [
-        (at - before) / _NS_PER_S
+        (two.clock_ns - one.clock_ns) / 1e9
         for one, two in pairwise(episode.kept)
-        if two.index == one.index + 1
-        and (before := one.clock_ns) is not None
-        and (at := two.clock_ns) is not None
+        if two.index == one.index + 1 and one.clock_ns is not None and two.clock_ns is not None
     ]
-
-
-_SAME_RATE: Final = 0.01  # Two recorders at 20 Hz may write 20 and 20.000001.
-_MOST_JITTER: Final = 0.25  # Two settings of a rate differ by at least a third.
-_MIN_PERIODS: Final = 20
-_MIDDLE: Final = (5.0, 95.0)  # %
 
 
 def rate_jitter(periods_s: Iterable[float], control_hz: float) -> float:
@@ -47,7 +41,7 @@ def rate_jitter(periods_s: Iterable[float], control_hz: float) -> float:
     periods = np.fromiter(periods_s, np.float64)
     if len(periods) < _MIN_PERIODS:
         return 0.0
-    low, high = np.percentile(periods, _MIDDLE) * control_hz
+    low, high = np.percentile(periods, (5.0, 95.0)) * control_hz
     return float(min(max(1.0 - low, high - 1.0, 0.0), _MOST_JITTER))
 
 

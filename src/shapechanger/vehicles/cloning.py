@@ -431,7 +431,7 @@ def _student(
     shown: Sequence[Dataset], settings: CloneSettings, seed: int, most_steps: int
 ) -> CameraPolicy:
     """Clone a teacher from all that was recorded, in at most this many training steps."""
-    data = merged(shown)
+    data = merged([replace(part, states=None, state_layout=None) for part in shown])
     actions = _moving(data.actions)
     # The whole range of the throttle above the least is the range of the network's output.
     actions[:, 1] = 2.0 * ((actions[:, 1] - LEAST_THROTTLE) / (1.0 - LEAST_THROTTLE)) - 1.0

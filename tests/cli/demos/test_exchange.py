@@ -59,7 +59,7 @@ def test_export_prints_a_summary_and_how_to_load(
     DemosExport(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
     output = capsys.readouterr().out
     assert "3 steps of 2 episodes\n" in output
-    assert "note: Episodes are split at excluded or missing steps (1 times)" in output
+    assert "so episodes are split at 1 gap of excluded or missing steps" in output
     assert "left out 2 dropped steps; --dropped includes them" in output
     assert f"MINARI_DATASETS_PATH={tmp_path / 'sets'}" in output
     assert "minari.load_dataset('drive-v0')" in output
@@ -77,9 +77,9 @@ def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     drop(drive(tmp_path / "data"), 0, 0, "bad")
     DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out
-    assert "4 steps of 1 episode\nleft out 1 dropped steps\n" in output
+    assert "4 steps of 1 episode\nleft out 1 dropped step\n" in output
     assert f"LeRobotDataset('set', root='{tmp_path / 'set'}')" in output
     DemosImport(tmp_path / "set", tmp_path / "back", camera="camera").run()
     assert "(lerobot): 1 episode, 4 steps, 4 images" in capsys.readouterr().out
     DemosExport(tmp_path / "data", tmp_path / "logs", "mcap").run()
-    assert "left out 1 dropped steps; --dropped includes them" in capsys.readouterr().out
+    assert "left out 1 dropped step; --dropped includes them" in capsys.readouterr().out

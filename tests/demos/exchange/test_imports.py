@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -196,11 +197,12 @@ def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.Mon
         {"goal": np.full((4, 2), 0.5, np.float32), "at": np.arange(4)},
         np.array([1, 2, 3]),
     )
-    ((head, steps),) = import_episodes(path)
+    (episode,) = import_episodes(path)
+    head = episode.header
     assert Layout.from_json(head.state_layout).names == ("at", "goal/0", "goal/1")
     (action,) = Layout.from_json(head.action_layout)
     assert (action.low, action.high) == (1.0, 3.0)
-    read = [step for step, jpeg in steps if jpeg is None]
+    read = [row.step for row in episode.rows if row.jpeg is None]
     assert [step.action for step in read] == [(1.0,), (2.0,), (3.0,)]
     assert [step.state for step in read] == [(0.0, 0.5, 0.5), (1.0, 0.5, 0.5), (2.0, 0.5, 0.5)]
     assert read[-1].terminated
@@ -240,17 +242,17 @@ def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> N
     folder = tub_folder(tmp_path / "tub", records)
     (folder / "images/4_cam_image_array_.jpg").write_bytes(b"")
     with pytest.raises(DemosError, match=r"is not whole .*1 record with an empty image: 4"):
-        list(import_episodes(folder))
+        list(chain.from_iterable(episode.rows for episode in import_episodes(folder)))
     with pytest.raises(DemosError, match="import it with `shapechanger demos import`"):
         load_dataset(folder)
     context = ImportContext()
-    ((_, steps),) = list(import_episodes(folder, context=context))
-    assert len(list(steps)) == 11
+    (episode,) = import_episodes(folder, context=context)
+    assert len(list(episode.rows)) == 11
     assert context.left_out_lines() == ["1 record with an empty image: 4"]
     csv = tmp_path / "csv"
     drive(tmp_path / "data")
     export_recording(tmp_path / "data", csv, "csv")
     with pytest.raises(DemosError, match="leave out --hz"):
         import_recording(csv, tmp_path / "out", hz=20.0)
-    with pytest.raises(DemosError, match="A camera is chosen in lerobot and tub"):
+    with pytest.raises(DemosError, match="csv has no option 'camera', unlike tub, lerobot"):
         import_recording(csv, tmp_path / "out", camera="front")

@@ -178,7 +178,7 @@ def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
     path = record(tmp_path / "data", header(), steps)
     drop(path, 0, 0, "bad")
     done = export_recording(tmp_path / "data", tmp_path / "csv", "csv")
-    assert (done.steps, done.left_out) == (3, 1)
+    assert (done.steps, done.left_out) == (3, ("1 dropped step; --dropped includes them",))
     import_recording(tmp_path / "csv", tmp_path / "back")
     (after,) = all_of(tmp_path / "back")
     assert [step.action[0] for step in after.kept] == [1.0, 2.0, 3.0]
@@ -203,10 +203,10 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
 ) -> None:
     drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
     done = export_recording(tmp_path / "data", tmp_path / folder, name)
-    assert (done.episodes, done.steps, done.left_out) == (3, 7, 1)
-    assert (
-        "split at excluded or missing steps (1 times) and pauses (1, up to 7.17 s)" in done.notes[0]
-    )
+    assert (done.episodes, done.steps) == (3, 7)
+    assert done.left_out[0].startswith("1 dropped step")
+    split = "split at 1 gap of excluded or missing steps and 1 pause (up to 7.17 s): 1 became 3."
+    assert done.notes[0].endswith(split)
     off = [note for note in done.notes if "off by more than half a period" in note]
     assert [("in 1 of 3 episodes, by up to 0.09 s" in note) for note in off] == (
         [True] if name == "lerobot" else []
@@ -227,7 +227,7 @@ def test_a_whole_episode_is_not_split(tmp_path: Path) -> None:
     assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
     done = export_recording(tmp_path / "data", tmp_path / "all-v0", "minari", dropped=True)
     assert (done.episodes, done.steps) == (2, 8)
-    assert "missing" not in done.notes[0]
+    assert "split at 1 pause (up to" in done.notes[0]
 
 
 _BEGUN = 10**18

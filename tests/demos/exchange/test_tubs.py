@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from shapechanger.demos.exchange import Imported, import_recording
+from shapechanger.demos.exchange import Converted, import_recording
 from shapechanger.demos.exchange.imports import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.exchange.small import all_of, picture, tub_folder
@@ -37,7 +37,7 @@ def records(
     ]
 
 
-def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Imported]:
+def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Converted]:
     """Import a tub, and return the numbers of the records of each episode, by their steering."""
     out = folder.with_name(f"{folder.name}-data-{len(list(folder.parent.iterdir()))}")
     done = import_recording(folder, out, **options)
@@ -329,8 +329,7 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
     folder = tub_folder(tmp_path / "tub", made)
     _, done = imported(folder)
     assert done.warnings == (
-        "The drive from record 12 has 10 steps a second, and the drive from record 0 20: a policy "
-        "learns from one rate at a time.",
+        "The drives have from 10 to 20 steps a second: a policy learns from one rate at a time.",
     )
     _, done = imported(folder, hz=20.0)
     assert done.steps == 24

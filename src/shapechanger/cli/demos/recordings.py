@@ -31,7 +31,7 @@ from shapechanger.demos.episodes import (
     Repair as Repaired,
 )
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS
-from shapechanger.demos.exchange import export_recording, formats, import_recording
+from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.demos.exchange.files import new_folder
 from shapechanger.demos.merging import merge
 from shapechanger.demos.report import distributions, recording_html
@@ -41,7 +41,6 @@ from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
 
 _WIDEST: Final = 400
-_MB: Final = 1e6
 _Data = Annotated[
     Path,
     tyro.conf.Positional,
@@ -64,36 +63,24 @@ class DemosList:
 
     def run(self) -> None:
         table = Table(box=None, pad_edge=False)
-        for name in (
-            "episode",
-            "of",
-            "when (UTC)",
-            "steps",
-            "length",
-            "drivers",
-            "marks",
-            "outcome",
-        ):
-            right = name in ("steps", "length", "marks")
-            table.add_column(name, justify="right" if right else "left")
-        broken: list[str] = []
-        steps = kept = 0
-        seconds = 0.0
-        paths = episodes_of(self.data)
-        for path in paths:
-            try:
-                one = read_episode(path)
-            except DemosError as error:
-                broken.append(str(error))
-                table.add_row(path.name, "", "", "", "", "", "", "cannot be read, see below")
+        for name in ("episode", "of", "when (UTC)"):
+            table.add_column(name)
+        for name in ("steps", "length"):
+            table.add_column(name, justify="right")
+        table.add_column("drivers")
+        table.add_column("marks", justify="right")
+        table.add_column("outcome")
+        found = _read_all(self.data)
+        for path, one in found.items():
+            if isinstance(one, DemosError):
+                table.add_row(path.name, *[""] * 6, "cannot be read, see below")
                 continue
-            n, counted_n = len(one.steps), len(one.kept)
-            steps, kept, seconds = steps + n, kept + counted_n, seconds + one.seconds
+            n, kept = len(one.steps), len(one.kept)
             table.add_row(
                 path.name,
                 one.origin,
                 one.header.created[:16].replace("T", " "),
-                str(n) if counted_n == n else f"{counted_n} of {n}",
+                str(n) if kept == n else f"{kept} of {n}",
                 duration_text(one.seconds),
                 shares_text(one.drivers),
                 str(len(one.marks) or ""),
@@ -103,9 +90,9 @@ class DemosList:
         # Truncated names could not be typed; let the terminal wrap the line.
         needed = console.measure(table, options=console.options.update(width=_WIDEST)).maximum
         plain_console(width=max(console.width, needed)).print(table)
-        say(_totals(len(paths), kept, steps, seconds))
-        for sentence in broken:
-            say(sentence)
+        whole = [one for one in found.values() if isinstance(one, Episode)]
+        say(_totals(len(found), whole))
+        _say_broken(found)
 
 
 @dataclass(frozen=True)
@@ -117,49 +104,53 @@ class DemosShow:
     """The page to write, such as page.html; it needs no other file."""
 
     def run(self) -> None:
-        episodes: list[Episode] = []
-        broken: list[str] = []
-        for path in episodes_of(self.data):
-            try:
-                episodes.append(read_episode(path))
-            except DemosError as error:
-                broken.append(str(error))
+        found = _read_all(self.data)
+        episodes = [one for one in found.values() if isinstance(one, Episode)]
         if self.out is not None:
             require_file(self.out)
-        for line in _overview(episodes):
-            say(line)
-        for found in distributions(episodes):
-            of = "" if found.unit == "1" else f" {found.unit}"
-            extent = f"{found.values.min():.3g} to {found.values.max():.3g}{of}"
-            say(f"{found.name}: {extent}, median {np.median(found.values):.3g}")
-        for sentence in broken:
-            say(sentence)
-        if self.out is None:
-            return
-
-        name = self.data.resolve().name
-        write_atomic(self.out, recording_html(name, episodes, broken).encode())
-        say(f"wrote {self.out}")
-
-
-def _totals(episodes: int, kept: int, steps: int, seconds: float) -> str:
-    many = counted(episodes, "episode")
-    return f"{many}: {kept} of {steps} steps count, {duration_text(seconds)}"
+        say(_totals(len(episodes), episodes))
+        counts = Counter(step.driver for one in episodes for step in one.kept)
+        if counts:
+            say(f"driven by {shares_text(dict(counts.most_common()))}")
+        outcomes = Counter(one.outcome or "just ended" for one in episodes if one.closed)
+        if outcomes:
+            ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())
+            say(f"ended by: {ended}")
+        for numbers in distributions(episodes):
+            of = "" if numbers.unit == "1" else f" {numbers.unit}"
+            extent = f"{numbers.values.min():.3g} to {numbers.values.max():.3g}{of}"
+            say(f"{numbers.name}: {extent}, median {np.median(numbers.values):.3g}")
+        broken = _say_broken(found)
+        if self.out is not None:
+            name = self.data.resolve().name
+            write_atomic(self.out, recording_html(name, episodes, broken).encode())
+            say(f"wrote {self.out}")
 
 
-def _overview(episodes: Sequence[Episode]) -> list[str]:
-    counts: Counter[str] = Counter(step.driver for one in episodes for step in one.kept)
-    seconds = sum(one.seconds for one in episodes)
+def _read_all(data: Path) -> dict[Path, Episode | DemosError]:
+    """Return each episode of a recording, or why it cannot be read."""
+    found: dict[Path, Episode | DemosError] = {}
+    for path in episodes_of(data):
+        try:
+            found[path] = read_episode(path)
+        except DemosError as error:
+            found[path] = error
+    return found
+
+
+def _say_broken(found: dict[Path, Episode | DemosError]) -> list[str]:
+    """Print why episodes cannot be read, and return it."""
+    broken = [str(one) for one in found.values() if isinstance(one, DemosError)]
+    for sentence in broken:
+        say(sentence)
+    return broken
+
+
+def _totals(count: int, episodes: Sequence[Episode]) -> str:
     steps = sum(len(one.steps) for one in episodes)
     kept = sum(len(one.kept) for one in episodes)
-    lines = [_totals(len(episodes), kept, steps, seconds)]
-    if counts:
-        lines.append(f"driven by {shares_text(dict(counts.most_common()))}")
-    outcomes = Counter(one.outcome or "just ended" for one in episodes if one.closed)
-    if outcomes:
-        ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())
-        lines.append(f"ended by: {ended}")
-    return lines
+    seconds = sum(one.seconds for one in episodes)
+    return f"{counted(count, 'episode')}: {kept} of {steps} steps count, {duration_text(seconds)}"
 
 
 @dataclass(frozen=True)
@@ -250,15 +241,16 @@ class DemosMerge:
     """Folder of the recording that they come into."""
 
     def run(self) -> None:
-        done = merge(self.data, self.out)
-        for source, target in done.episodes:
+        copied = merge(self.data, self.out)
+        for source, target in copied:
             if source.name != target.name:
                 say(f"{source} became {target.name}: its name was taken")
-        many = counted(len(done.episodes), "episode")
-        say(f"copied {many}, {done.bytes_ / _MB:.1f} MB, to {self.out}")
-        if done.layouts > 1:
+        say(f"copied {counted(len(copied), 'episode')} to {self.out}")
+        headers = [read_episode(path).header for path in episodes_of(self.out)]
+        layouts = {(header.action_layout, header.state_layout) for header in headers}
+        if len(layouts) > 1:
             say(
-                f"they have {done.layouts} different layouts, and a policy learns from one: "
+                f"they have {len(layouts)} different layouts, and a policy learns from one: "
                 "`shapechanger demos list` lists their robots"
             )
 
@@ -372,10 +364,8 @@ class DemosExport:
             f"wrote {self.out} ({done.format}): {counted(done.steps, 'step')} of "
             f"{counted(done.episodes, 'episode')}"
         )
-        if done.left_out:
-            marks = "dropped" in formats()[done.format].options
-            where = "; --dropped includes them" if marks else ""
-            say(f"left out {done.left_out} dropped steps{where}")
+        for line in done.left_out:
+            say(f"left out {line}")
         for note in done.notes:
             say(f"note: {note}")
         if done.format == "lerobot":

@@ -1,42 +1,428 @@
 """Import and export of recordings in other formats.
 
 A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
-`Format` (`format`), which `convert` finds among our own and in the entry points
-`shapechanger.formats`. `format.COLUMNS` names each column of a step. `files` and `pictures`
-load what strangers made, within one budget; `imports` measures rates.
-Sources are never changed, and targets appear atomically.
+`Format` (`format`); `formats` finds our own and those of the entry points `shapechanger.formats`.
+`format.COLUMNS` names each column of a step. `files` and `pictures` load what strangers made,
+within one budget; `imports` checks records and measures rates. Sources are never changed, and
+targets appear atomically.
 """
 
 from __future__ import annotations
 
-from shapechanger.demos.exchange.convert import (
-    Exported,
-    Imported,
-    export_recording,
-    find_format,
-    formats,
-    import_episodes,
-    import_recording,
+import math
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from functools import cache
+from importlib.metadata import entry_points
+from itertools import groupby, pairwise
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from shapechanger.demos.episodes import (
+    Episode,
+    EpisodeHeader,
+    EpisodeWriter,
+    Step,
+    drop,
+    episodes_of,
+    read_episode,
 )
+from shapechanger.demos.episodes.files import is_episode
+from shapechanger.demos.episodes.records import Keep, longest_period_s
+from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
+from shapechanger.demos.exchange.files import new_folder
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
     ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
+    counted,
 )
+from shapechanger.errors import DemosError, UnknownName
+from shapechanger.files import writing
+from shapechanger.layout import Layout
 
 __all__ = [
+    "Converted",
     "ExchangeEpisode",
     "ExchangeStep",
     "ExportContext",
-    "Exported",
     "Format",
     "ImportContext",
-    "Imported",
     "export_recording",
     "find_format",
     "formats",
     "import_episodes",
     "import_recording",
 ]
+
+_GROUP: Final = "shapechanger.formats"
+_OWN: Final = (tub.FORMAT, minari.FORMAT, lerobot.FORMAT, csv_files.FORMAT, mcap.FORMAT)
+
+
+@cache
+def formats() -> Mapping[str, Format]:
+    """Return all formats by name: our own, and those that entry points of other packages name.
+
+    Raises:
+        DemosError: If an entry point does not name a format, or one with a name that is taken.
+    """
+    found = {form.name: form for form in _OWN}
+    for point in entry_points(group=_GROUP):
+        form = point.load()
+        if not isinstance(form, Format) or form.name in found:
+            raise DemosError(
+                f"The entry point {point.name} in {_GROUP} must name a Format of another name than "
+                f"{', '.join(found)}."
+            )
+        found[form.name] = form
+    return MappingProxyType(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """Result of an import or an export.
+
+    Attributes:
+        format: Name of the format.
+        episodes: Number of episodes written.
+        steps: Number of steps written.
+        pictures: Number of images of an import.
+        left_out: What is left out, a line for each reason.
+        warnings: Contradictions in the source, as sentences.
+        notes: Further facts, and what an export changes, as sentences.
+    """
+
+    format: str
+    episodes: int
+    steps: int
+    pictures: int = 0
+    left_out: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def export_recording(
+    data: Path,
+    out: Path,
+    format: str,
+    *,
+    dropped: bool = False,
+    task: str = "",
+    images: bool = False,
+) -> Converted:
+    """Export a recording.
+
+    Args:
+        data: A recording, or one episode; it is not changed.
+        out: The folder to create, atomically.
+        format: Name of one of the `formats`.
+        dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
+        task: What the robot does, in words, for policies that follow language; lerobot only.
+        images: Whether to store images as they were recorded, instead of video; lerobot only.
+
+    Raises:
+        DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies
+            in `data`.
+        UnknownName: If there is no such format.
+        OutputError: If `out` cannot be written.
+        MissingExtra: If a package that the format needs is not installed.
+    """
+    form = formats().get(format)
+    if form is None or form.write is None:
+        raise UnknownName("format", format, [n for n, one in formats().items() if one.write])
+    _require_options(form, dropped=dropped, task=task, images=images)
+    read = [read_episode(path) for path in episodes_of(data)]
+    chosen = [(episode, episode.steps if dropped else episode.kept) for episode in read]
+    if not any(steps for _, steps in chosen):
+        raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
+    episodes = [_exchanged(episode, steps, episode.outcome) for episode, steps in chosen]
+    notes: list[str] = []
+    if form.consecutive:
+        episodes = _consecutive(chosen, form, notes)
+        _require_alike(episodes, form.title)
+    rewarded = all(step.reward is not None for episode in read for step in episode.kept)
+    context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
+    try:
+        with new_folder(out, data) as folder, writing(out):
+            steps = form.write(episodes, folder, context)
+    except OverflowError as error:
+        raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
+    left = sum(len(episode.steps) for episode in read) - steps
+    hint = "; --dropped includes them" if "dropped" in form.options else ""
+    left_out = (f"{counted(left, 'dropped step')}{hint}",) if left else ()
+    return Converted(format, len(episodes), steps, left_out=left_out, notes=tuple(notes))
+
+
+def _require_options(form: Format, **given: object) -> None:
+    for option, value in given.items():
+        if value and option not in form.options:
+            takes = [name for name, other in formats().items() if option in other.options]
+            raise DemosError(
+                f"The format {form.name} has no option {option!r}, unlike {', '.join(takes)}."
+            )
+
+
+def _exchanged(
+    episode: Episode, steps: Sequence[Step], outcome: str, since_s: float = 0.0
+) -> ExchangeEpisode:
+    """Return an episode, or a part of it that begins later and is exported as one."""
+    header = episode.header
+    if since_s:
+        with suppress(ValueError, OverflowError):
+            began = datetime.fromisoformat(header.created) + timedelta(seconds=since_s)
+            header = replace(header, created=began.isoformat(timespec="milliseconds"))
+    rows, name = _rows(episode, steps), episode.path.name
+    return ExchangeEpisode(header=header, rows=rows, name=name, outcome=outcome)
+
+
+def _rows(episode: Episode, steps: Sequence[Step]) -> Iterator[ExchangeStep]:
+    kept = {step.index for step in episode.kept}
+    drops = [drop for drop in reversed(episode.drops) if not isinstance(drop, Keep)]
+    marks: dict[int, list[str]] = {}
+    for mark in episode.marks:
+        marks.setdefault(mark.step, []).append(mark.text)
+    frame = ""
+    for step in steps:
+        reasons = (drop.why for drop in drops if drop.first <= step.index <= drop.last)
+        yield ExchangeStep(
+            step=step,
+            jpeg=episode.jpeg(step) if step.frame != frame else None,
+            marks=tuple(marks.get(step.index, ())),
+            dropped=None if step.index in kept else next(reasons, ""),
+        )
+        frame = step.frame
+
+
+def _consecutive(
+    episodes: Sequence[tuple[Episode, Sequence[Step]]], form: Format, notes: list[str]
+) -> list[ExchangeEpisode]:
+    """Split episodes where steps are excluded or missing, and at pauses; add notes on it."""
+    parts: list[ExchangeEpisode] = []
+    pauses_s: list[float] = []
+    off_s: list[float] = []
+    missing = 0
+    for episode, steps in episodes:
+        hz, starts = episode.header.control_hz, [0] if steps else []
+        for number, (one, two) in enumerate(pairwise(steps), 1):
+            passed_s = _passed_s(one, two)
+            if two.index != one.index + 1:
+                missing += 1
+            elif passed_s > longest_period_s(hz):
+                pauses_s.append(passed_s)
+            else:
+                continue
+            starts.append(number)
+        for start, end in pairwise([*starts, len(steps)]):
+            run = steps[start:end]
+            outcome = episode.outcome if end == len(steps) else ""
+            since_s = _passed_s(episode.steps[0], run[0])
+            parts.append(_exchanged(episode, run, outcome, since_s))
+            by_s = max(abs(_passed_s(run[0], step, n / hz) - n / hz) for n, step in enumerate(run))
+            off_s += [by_s] if by_s > 0.5 / hz else []
+    whole = sum(bool(steps) for _, steps in episodes)
+    if len(parts) > whole:
+        where = [f"{counted(missing, 'gap')} of excluded or missing steps"] if missing else []
+        if pauses_s:
+            where.append(f"{counted(len(pauses_s), 'pause')} (up to {max(pauses_s):.4g} s)")
+        notes.append(
+            f"{form.title} takes each step for the successor of the one before, so episodes are "
+            f"split at {' and '.join(where)}: {whole} became {len(parts)}."
+        )
+    if off_s and not form.timed:
+        notes.append(
+            f"{form.title} takes the time of a step to be its number divided by the rate, which is "
+            f"off by more than half a period in {len(off_s)} of {len(parts)} episodes, by up to "
+            f"{max(off_s):.4g} s."
+        )
+    return parts
+
+
+def _passed_s(one: Step, two: Step, unknown_s: float = 0.0) -> float:
+    """Return the time between two steps on the robot's clock, s."""
+    for now, later in ((one.decided_ns, two.decided_ns), (one.captured_ns, two.captured_ns)):
+        if now is not None and later is not None:
+            return (later - now) / 1e9
+    return unknown_s
+
+
+def _require_alike(episodes: Sequence[ExchangeEpisode], title: str) -> None:
+    kinds: list[dict[str, object]] = []
+    for header in (episode.header for episode in episodes):
+        states = Layout.from_json(header.state_layout) if header.state_layout else ()
+        kind = {"actions": Layout.from_json(header.action_layout), "states": states}
+        kinds.append({what: [*map(str, features)] for what, features in kind.items()})
+        kinds[-1] |= {"images": header.image_size, "steps a second": f"{header.control_hz:g}"}
+    for episode, kind in zip(episodes, kinds, strict=True):
+        for what, value in kind.items():
+            if value != kinds[0][what]:
+                raise DemosError(
+                    f"{episode.name} has other {what} than {episodes[0].name}, but a {title} "
+                    "dataset has one kind of episode: export each kind to its own."
+                )
+
+
+def import_episodes(
+    path: Path, format: str = "auto", context: ImportContext | None = None
+) -> Iterator[ExchangeEpisode]:
+    """Read a recording in another format, without writing anything.
+
+    Args:
+        path: A folder in one of the `formats`.
+        format: Name of one of them, or "auto" to detect it.
+        context: Options; it collects what is left out. None to refuse a source that is incomplete
+            or contradicts itself.
+
+    Yields:
+        The episodes; their steps are read when they are iterated.
+
+    Raises:
+        DemosError: If something is damaged or missing, possibly not before it is read.
+        UnknownName: If there is no such format.
+        MissingExtra: If a package that the format needs is not installed.
+    """
+    context = ImportContext(strict=True) if context is None else context
+    for episode in _read(path, format, context)[1]:
+        if context.strict:
+            context.require_whole(path)
+        yield episode
+    if context.strict:
+        context.require_whole(path)
+
+
+def import_recording(
+    path: Path,
+    out: Path,
+    format: str = "auto",
+    *,
+    camera: str = "",
+    hz: float | None = None,
+    strict: bool = False,
+) -> Converted:
+    """Import a recording: what is whole, with a report on the rest.
+
+    Args:
+        path: A folder in one of the `formats`; it is not changed.
+        out: The recording to create, atomically.
+        format: Name of one of the formats, or "auto" to detect it.
+        camera: Which camera to take, such as "front"; "" for the only one. LeRobot and tubs only.
+        hz: Steps per second; None to read or measure them. Only for formats that do not state it.
+        strict: Whether to refuse a source that is incomplete or contradicts itself.
+
+    Raises:
+        DemosError: If nothing in `path` is whole, or with `strict` not all of it, or `out` exists
+            or lies in it.
+        UnknownName: If there is no such format.
+        OutputError: If `out` cannot be written.
+        MissingExtra: If a package that the format needs is not installed.
+    """
+    context = ImportContext(camera=camera, hz=hz, strict=strict)
+    found, read = _read(path, format, context)
+    now: datetime | None = None
+    episodes = steps = pictures = 0
+    with new_folder(out, path) as folder:
+        for episode in read:
+            # The folders of all episodes begin with the same time, so that their order is kept.
+            now = now or _began(episode.header)
+            written, added, shown = _write(episode, folder, now)
+            if context.left_out and not added:  # All its steps.
+                shutil.rmtree(written)
+                continue
+            episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
+        if strict:
+            context.require_whole(path)
+        lines = context.left_out_lines()
+        if not episodes:
+            raise DemosError(
+                f"There is nothing to import in {path}: {'; '.join(lines) or 'empty'}."
+            )
+    findings = map(tuple, (lines, context.warnings, context.notes))
+    return Converted(found, episodes, steps, pictures, *findings)
+
+
+def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterator[ExchangeEpisode]]:
+    """Return the format of a folder, and an iterator over its episodes."""
+    names = [name for name, form in formats().items() if form.read]
+    if format not in {"auto", *names}:
+        raise UnknownName("format", format, ("auto", *names))
+    form = formats()[find_format(path) if format == "auto" else format]
+    if form.name not in _formats_of(path):
+        raise DemosError(f"{path} is not {format}: expected {form.sign}; or omit --format.")
+    _require_options(form, camera=context.camera, hz=context.hz is not None)
+    if context.hz is not None and not 0.0 < context.hz < math.inf:
+        raise DemosError(f"--hz must be positive, got {context.hz:g}.")
+    assert form.read is not None
+    return form.name, form.read(path, context)
+
+
+def _began(header: EpisodeHeader) -> datetime:
+    """Return when an episode began; the current time if that is unknown."""
+    try:
+        return datetime.fromisoformat(header.created).astimezone(UTC)
+    except ValueError:
+        return datetime.now(UTC)
+
+
+def find_format(path: Path) -> str:
+    """Detect the format of a folder.
+
+    Raises:
+        DemosError: If there is no such folder, or it has none or several of the formats; the error
+            names what was found.
+    """
+    found = _formats_of(path)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise DemosError(f"{path} looks like {' and '.join(found)}: choose with --format.")
+    children = sorted(path.iterdir())
+    if any(map(is_episode, (path, *children))):
+        raise DemosError(f"{path} is a recording already: use it as it is.")
+    for child in children:
+        if child.is_dir() and (below := _formats_of(child)):
+            raise DemosError(f"{path} has none of the formats, but {child} in it is {below[0]}.")
+    signs = [f"{form.sign} ({name})" for name, form in formats().items() if form.read]
+    raise DemosError(f"{path} has nothing that can be imported: expected {' or '.join(signs)}.")
+
+
+def _formats_of(path: Path) -> list[str]:
+    if not path.is_dir():
+        where = f"is a file: give the folder that it is in, {path.parent}"
+        raise DemosError(f"{path} {where if path.exists() else 'does not exist'}.")
+    return [name for name, form in formats().items() if form.detect and form.detect(path)]
+
+
+def _write(episode: ExchangeEpisode, folder: Path, now: datetime) -> tuple[Path, int, int]:
+    """Write one episode of a recording; return its folder and numbers of steps and images."""
+    pictures = 0
+    excluded: dict[int, str] = {}
+    with EpisodeWriter.create(
+        folder, episode.header, now=lambda: now, created=episode.header.created
+    ) as writer:
+        for row in episode.rows:
+            try:
+                index = writer.add(row.step, row.jpeg)
+            except DemosError as error:
+                raise DemosError(f"{episode.name} cannot be imported: {error}") from error
+            pictures += row.jpeg is not None
+            for mark in row.marks:
+                writer.mark(mark)
+            if row.dropped is not None:
+                excluded[index] = row.dropped
+        if writer.is_full:
+            raise DemosError(
+                f"{episode.name} is longer than an episode may be, which is about an hour at 100 "
+                f"Hz: it has {writer.steps} steps. Split it."
+            )
+        writer.close(episode.outcome)
+    # Consecutive steps that were dropped for one reason become one line.
+    runs = groupby(enumerate(excluded.items()), key=lambda it: (it[1][1], it[1][0] - it[0]))
+    for (why, _), run in runs:
+        indexes = [index for _, (index, _) in run]
+        drop(writer.path, indexes[0], indexes[-1], why)
+    return writer.path, writer.steps, pictures

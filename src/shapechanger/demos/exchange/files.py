@@ -7,7 +7,6 @@ The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of 
 
 from __future__ import annotations
 
-import codecs
 import csv
 import io
 import json
@@ -17,7 +16,7 @@ import re
 import secrets
 import shutil
 from collections.abc import Generator, Iterable
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
@@ -32,7 +31,7 @@ from shapechanger.errors import (
     OutputError,
     translate_errors,
 )
-from shapechanger.files import cannot_write
+from shapechanger.files import writing
 from shapechanger.layout import Layout
 
 MAX_UNPACKED: Final = 64 << 20
@@ -69,16 +68,16 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
         raise DemosError(f"{out} lies in {source}, which is never changed: choose another place.")
     made = [parent for parent in out.absolute().parents if not parent.exists()]
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
-    with translate_errors(OSError, to=lambda error: cannot_write(out, error)):
-        part.mkdir(parents=True)
     try:
+        with writing(out):
+            part.mkdir(parents=True)
         yield part
-        with translate_errors(OSError, to=lambda error: cannot_write(out, error)):
+        with writing(out):
             part.rename(out)
     except BaseException as error:
         shutil.rmtree(part, ignore_errors=True)
-        for parent in made:
-            if parent.is_dir() and not any(parent.iterdir()):
+        with suppress(OSError):  # A folder that is not empty stays.
+            for parent in made:
                 parent.rmdir()
         if isinstance(error, DemosError | OutputError) and str(part) in str(error):
             # Name the folder that the user asked for.
@@ -103,13 +102,9 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
         named_by: Where the name stands, such as "steps.csv, line 3".
     """
     if not name or not is_inside(folder, name):
-        problem = "leaves the folder" if name else "is empty"
-        raise DemosError(f"{named_by}: the name {name!r} {problem}.")
+        raise DemosError(f"{named_by}: the name {name!r} leaves the folder.")
     if not (folder / name).is_file():
-        raise DemosError(
-            f"There is no {folder / name}: {named_by} names {name!r}, which is not in {folder}. "
-            "Restore it."
-        )
+        raise DemosError(f"There is no {folder / name}, which {named_by} names: restore it.")
     return folder / name
 
 
@@ -121,12 +116,12 @@ def read_bytes(path: Path) -> bytes:
 
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file without a byte order mark; line ends are kept."""
-    data = read_bytes(path)
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise DemosError(f"{path} is not text in UTF-8 but in UTF-16: save it as UTF-8.")
-    why = "{} is not text in UTF-8 (byte {}): save it as UTF-8."
-    with translate_errors(UnicodeDecodeError, to=lambda e: DemosError(why.format(path, e.start))):
-        return data.decode("utf-8-sig")
+    try:
+        return read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DemosError(
+            f"{path} is not text in UTF-8 (byte {error.start}): save it as UTF-8."
+        ) from error
 
 
 def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[str]]]]:
@@ -138,14 +133,11 @@ def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[
     # Decimal commas stand between semicolons, so the last one that fits separates.
     separator = stated[1] if stated else found[-1] if found else ","
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
-    lines: list[tuple[int, list[str]]] = []
     try:
-        for cells in reader:
-            if any(cell.strip() for cell in cells) and (lines or not stated or reader.line_num > 1):
-                lines.append((reader.line_num, cells))
+        lines = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
     except csv.Error as error:
         raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
-    return separator, lines
+    return separator, lines[1:] if stated else lines
 
 
 def parse_json(text: str, where: str) -> Any:
@@ -169,35 +161,30 @@ def own_fields(episode: ExchangeEpisode) -> dict[str, Any]:
     return episode.header.to_json() | {"outcome": episode.outcome}
 
 
-def own_header(fields: object, where: object) -> tuple[EpisodeHeader, str]:
+def own_header(fields: Any, where: object) -> tuple[EpisodeHeader, str]:
     """Return the header and the outcome of an episode that Shapechanger exported."""
     if not isinstance(fields, dict):
         raise DemosError(f"{where} has a header that is not a JSON object.")
     plain = cast("dict[str, Any]", fields)
-    with translate_errors(
-        DemosError, LayoutError, to=lambda error: DemosError(f"{where}: {error}")
-    ):
+    try:
         header = EpisodeHeader.from_json(plain)
         for layout in filter(None, (header.action_layout, header.state_layout)):
             Layout.from_json(layout)
+    except (DemosError, LayoutError) as error:
+        raise DemosError(f"{where}: {error}") from error
     return header, str(plain.get("outcome", ""))
 
 
-def own_episodes(section: object, where: object, count: int) -> list[Any]:
+def own_episodes(section: Any, where: object, count: int) -> list[Any]:
     """Return the `own_fields` of the `count` episodes of a dataset that Shapechanger exported."""
     fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
-    episodes = fields.get("episodes")
-    if fields.get("format") != 1 or not isinstance(episodes, list):
+    episodes = cast("list[Any]", fields.get("episodes"))
+    if fields.get("format") != 1 or type(episodes) is not list or len(episodes) != count:
         raise DemosError(
-            f"{where} was written by another version of Shapechanger: this one reads format 1 only."
+            f"{where} does not describe the {count} episodes of the dataset in format 1: remove "
+            "it if the dataset was edited."
         )
-    found = cast("list[Any]", episodes)
-    if len(found) != count:
-        raise DemosError(
-            f"{where} describes {len(found)} episodes, and the dataset has {count}: remove it if "
-            "the dataset was edited."
-        )
-    return found
+    return episodes
 
 
 def cannot_read(path: Path, error: OSError) -> DemosError:

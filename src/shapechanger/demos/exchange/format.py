@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Literal, cast
+from typing import Final, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,7 @@ from shapechanger.layout import Feature
 Kind = Literal["action", "state", "picture", "time", "number", "flag", "text", "json", "index"]
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
+class Column(NamedTuple):
     """A column of a step.
 
     Attributes:
@@ -56,23 +55,21 @@ dropped     | text    | dropped     | infos/step         |                      
 _ALIASES: Final[dict[str, dict[str, int]]] = {
     "frame": dict.fromkeys(("file", "image", "picture", "filename"), 1),
     "captured_ns": {
-        "timestamp": 10**9,
-        "time": 10**9,
-        "timestamp_ms": 10**6,
-        "milliseconds": 10**6,
+        **dict.fromkeys(("timestamp", "time"), 10**9),
+        **dict.fromkeys(("timestamp_ms", "milliseconds"), 10**6),
     },
     "terminated": {"done": 1},
 }
+_CELLS: Final = [[cell.strip() for cell in line.split("|")] for line in _NAMES.split("\n")[1:-1]]
 
-
-def _columns() -> Iterator[tuple[str, Column]]:
-    for line in _NAMES.strip().splitlines():
-        key, kind, *names = (cell.strip() for cell in line.split("|"))
-        named = {form: name for form, name in zip(FORMATS, names, strict=True) if name}
-        yield key, Column(cast("Kind", kind), named, _ALIASES.get(key, {}))
-
-
-COLUMNS: Final = dict(_columns())
+COLUMNS: Final = {
+    field: Column(
+        cast("Kind", kind),
+        {form: name for form, name in zip(FORMATS, names, strict=True) if name},
+        _ALIASES.get(field, {}),
+    )
+    for field, kind, *names in _CELLS
+}
 """All columns of a step by the names of their fields, in the order of `steps.csv`."""
 
 COMMANDS: Final = {
@@ -154,18 +151,16 @@ class ImportContext:
     notes: list[str] = field(default_factory=list[str])
 
     def leave_out(self, what: str, reason: str, name: object) -> None:
-        """Note that a part is left out."""
+        """Report that a part is left out."""
         self.left_out.setdefault((what, reason), []).append(str(name))
 
     def warn(self, sentence: str) -> None:
-        """Note a contradiction in the source, once."""
-        if sentence not in self.warnings:
-            self.warnings.append(sentence)
+        """Report a contradiction in the source, once."""
+        self.warnings += [sentence] if sentence not in self.warnings else []
 
     def note(self, sentence: str) -> None:
-        """Note a fact that is neither a loss nor a contradiction, once."""
-        if sentence not in self.notes:
-            self.notes.append(sentence)
+        """Report a fact that is neither a loss nor a contradiction, once."""
+        self.notes += [sentence] if sentence not in self.notes else []
 
     def left_out_lines(self) -> list[str]:
         """Return a line for each reason, such as "9 records with an empty image: 31, 32, ...".
@@ -272,16 +267,14 @@ def decoded_steps(
         pixels, where = None, f"of step {number} of {name}"
         if size is not None and row.jpeg is not None:
             jpeg, pixels = row.jpeg, decode_picture(row.jpeg, where)
-            if pixels.shape[1::-1] != size:
+            height, width, _ = pixels.shape
+            if (width, height) != size:
                 raise DemosError(
-                    "The image {} has {} x {} pixels, and not {} x {} like the others: a {} "
-                    "dataset has one size.".format(where, *pixels.shape[1::-1], *size, title)
+                    f"The image {where} has {width} x {height} pixels, and not {size[0]} x "
+                    f"{size[1]}: a {title} dataset has one size."
                 )
         if size is not None and not jpeg:
-            raise DemosError(
-                f"There is no image {where}, but {title} needs one at every step: drop the "
-                "steps before the first image, or export to csv."
-            )
+            raise DemosError(f"There is no image {where}, but {title} needs one at every step.")
         yield row, jpeg, pixels
 
 

@@ -14,7 +14,7 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import inf, isfinite
 from pathlib import Path
 from typing import Final
@@ -152,10 +152,9 @@ def with_pictures(
             except PictureError as error:
                 record.fault = str(error)
     common = Counter(sizes.values()).most_common(1)[0][0] if sizes else None
-    for place, size in sizes.items():
-        if common is not None and size != common:
-            records[place].fault = other_size(size, common)
-    for record in records:
+    for place, record in enumerate(records):
+        if common is not None and (size := sizes.get(place, common)) != common:
+            record.fault = other_size(size, common)
         if record.fault:
             context.leave_out(what, record.fault, record.name)
     if encoded:
@@ -177,26 +176,28 @@ def stretches(
         Records that follow each other without a pause, with their rate in Hz and whether their
         times are known and believed.
     """
-    times = [_times_ns(part, what, context) for part in parts]
-    periods = [  # From one record to the next, ns, per number that they are apart.
-        [
-            (later - now) / max(1, b.number - a.number)
-            for (now, later), (a, b) in zip(pairwise(ns), pairwise(part), strict=False)
-        ]
-        for ns, part in zip(times, parts, strict=True)
-    ]
-    names = [f"{what} {part[0].name}" for part in parts]
-    rates, believed = _rates(names, periods, context, stated_hz)
+    times_ns: list[list[int]] = []
+    periods_ns: list[list[float]] = []  # From one record to the next, per number that they differ.
+    for part in parts:
+        times = [ns for record in part if (ns := record.step.captured_ns) is not None]
+        if 0 < len(times) < len(part):
+            context.warn(
+                f"{len(part) - len(times)} of the {len(part)} {what}s from {part[0].name} have no "
+                "valid time: the times of the others are left out."
+            )
+            times = []
+        pairs = zip(pairwise(times), pairwise(part), strict=False)
+        periods_ns.append(
+            [(b - a) / max(1, two.number - one.number) for (a, b), (one, two) in pairs]
+        )
+        times_ns.append(times)
+    rates, are_believed = _rates(periods_ns, context, stated_hz)
     found: list[tuple[list[SourceRecord], float, bool]] = []
     pauses_s: list[float] = []
     backwards: list[tuple[float, str]] = []
-    for known, part, hz in zip(times, parts, rates, strict=True):
-        timed = bool(known) and believed
-        if not timed:
-            for record in part:
-                record.step = replace(record.step, captured_ns=None)
-        starts = [0]
-        for number, (now, later) in enumerate(pairwise(known if timed else ()), 1):
+    for times, part, hz in zip(times_ns, parts, rates, strict=True):
+        starts, is_timed = [0], are_believed and bool(times)
+        for number, (now, later) in enumerate(pairwise(times if is_timed else ()), 1):
             passed_s = (later - now) / _NS_PER_S
             if passed_s < 0.0:
                 backwards.append((-passed_s, part[number].name))
@@ -205,7 +206,9 @@ def stretches(
             else:
                 continue
             starts.append(number)
-        found += [(part[one:two], hz, timed) for one, two in pairwise([*starts, len(part)])]
+        for record in part if not is_timed else ():
+            record.step = replace(record.step, captured_ns=None)
+        found += [(part[one:two], hz, is_timed) for one, two in pairwise([*starts, len(part)])]
     if pauses_s:
         context.note(
             f"A new episode begins after {counted(len(pauses_s), 'pause')}, of "
@@ -219,55 +222,39 @@ def stretches(
     return found
 
 
-def _times_ns(part: Sequence[SourceRecord], what: str, context: ImportContext) -> list[int]:
-    """Return the time of each record, ns; an empty list if one is unknown."""
-    times = [ns for record in part if (ns := record.step.captured_ns) is not None]
-    if 0 < len(times) < len(part):
-        context.warn(
-            f"{len(part) - len(times)} of the {len(part)} {what}s from {part[0].name} have no "
-            "valid time: the times of the others are left out."
-        )
-    return times if len(times) == len(part) else []
-
-
 def _rates(
-    names: Sequence[str],
-    periods: Sequence[Sequence[float]],
-    context: ImportContext,
-    stated_hz: float | None,
+    periods_ns: Sequence[Sequence[float]], context: ImportContext, stated_hz: float | None
 ) -> tuple[list[float], bool]:
     """Return the rate of each session, and whether its times are believed."""
-    pool = [period for part in periods for period in part]
-    pooled = measured_hz(pool)
+    measured = measured_hz([*chain.from_iterable(periods_ns)])
     if (hz := context.hz or stated_hz) is not None:
-        if pooled is None or 1.0 / _RATE_RATIO < pooled / hz < _RATE_RATIO:
-            return [hz] * len(names), True
+        if measured is None or 1.0 / _RATE_RATIO < measured / hz < _RATE_RATIO:
+            return [hz] * len(periods_ns), True
         (context.warn if context.hz is None else context.note)(
-            f"The records are {_described(pooled)} by their times, and not the {hz:g} Hz that are "
-            "stated: these times are left out."
+            f"The records are {_described(measured)} by their times, and not the {hz:g} Hz that "
+            "are stated: these times are left out."
         )
-        return [hz] * len(names), False
-    if pooled is None:
+        return [hz] * len(periods_ns), False
+    if measured is None:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-        return [DEFAULT_HZ] * len(names), True
-    known = [measured_hz(part) if len(part) >= _MIN_PERIODS else None for part in periods]
-    measured = [(hz, name) for hz, name in zip(known, names, strict=True) if hz is not None]
-    (slow_hz, slow), (fast_hz, fast) = (end(measured, default=(0.0, "")) for end in (min, max))
-    rates = [_nominal_hz(pooled)] * len(names)
-    if fast_hz > _RATE_RATIO * slow_hz:
+        return [DEFAULT_HZ] * len(periods_ns), True
+    each = [measured_hz(part) if len(part) >= _MIN_PERIODS else None for part in periods_ns]
+    known = [hz for hz in each if hz is not None] or [measured]
+    rates = [_nominal_hz(measured)] * len(periods_ns)
+    if max(known) > _RATE_RATIO * min(known):
+        rates = [_nominal_hz(hz or measured) for hz in each]
         context.warn(
-            f"The drive from {slow} has {slow_hz:.3g} steps a second, and the drive from "
-            f"{fast} {fast_hz:.3g}: a policy learns from one rate at a time."
+            f"The drives have from {min(known):.3g} to {max(known):.3g} steps a second: a policy "
+            "learns from one rate at a time."
         )
-        rates = [_nominal_hz(pooled if hz is None else hz) for hz in known]
-    elif abs(pooled / rates[0] - 1.0) > _WHOLE[0][1]:
+    elif abs(measured / rates[0] - 1.0) > _WHOLE[0][1]:
         context.note(
-            f"The records are {_described(pooled)}, which is taken to be {rates[0]:g} Hz; --hz "
+            f"The records are {_described(measured)}, which is taken to be {rates[0]:g} Hz; --hz "
             "states another rate."
         )
-    for hz in sorted({rate for rate in rates if not _SLOWEST_HZ <= rate <= _FASTEST_HZ}):
+    if odd := [hz for hz in rates if not _SLOWEST_HZ <= hz <= _FASTEST_HZ]:
         context.warn(
-            f"The records are {_described(hz)}, which no robot has ({_SLOWEST_HZ:g} to "
+            f"The records are {_described(odd[0])}, which no robot has ({_SLOWEST_HZ:g} to "
             f"{_FASTEST_HZ:g} Hz): perhaps a conversion set their times. State the rate with --hz."
         )
     return rates, True

@@ -12,8 +12,7 @@
 Messages are JSON, and their schemas state the units. Log times are on the robot's clock, ns:
 of the capture for images and states, of the decision for actions, and never moved. Where a time
 is unknown, the step follows the one before at the rate of the episode, or precedes the first one
-with a time. The header of the episode is the metadata
-`shapechanger`. Format: mcap.dev/spec.
+with a time. The header of the episode is the metadata `shapechanger`. Format: mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -21,34 +20,30 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext, Format
 from shapechanger.layout import Layout
 
 _NS_PER_S: Final = 10**9
-_TEXT: Final = {"type": "string"}
-_WHOLE: Final = {"type": "integer"}
-_NUMBER: Final = {"type": "number"}
+_TEXT, _WHOLE, _NUMBER, _FLAG = (
+    {"type": kind} for kind in ("string", "integer", "number", "boolean")
+)
+_REWARD: Final[dict[str, Any]] = {"reward": _NUMBER, "terms": {"type": "object"}}
+_STEP: Final[dict[str, Any]] = {
+    **dict.fromkeys(("step", "wall_ns"), _WHOLE),
+    **dict.fromkeys(("driver", "stop_reason", "dropped"), _TEXT),
+    **dict.fromkeys(("terminated", "truncated"), _FLAG),
+    "marks": {"type": "array", "items": _TEXT},
+}
 # Foxglove's own, by which its panels know an image: github.com/foxglove/foxglove-sdk.
 _IMAGE: Final[dict[str, Any]] = {
     "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
-    "frame_id": _TEXT,
+    **dict.fromkeys(("frame_id", "format"), _TEXT),
     "data": {"type": "string", "contentEncoding": "base64"},
-    "format": _TEXT,
-}
-_STEP: Final[dict[str, Any]] = {
-    **{name: _WHOLE for name in ("step", "wall_ns")},
-    **{name: _TEXT for name in ("driver", "stop_reason", "dropped")},
-    **{name: {"type": "boolean"} for name in ("terminated", "truncated")},
-    "marks": {"type": "array", "items": _TEXT},
-}
-_REWARD: Final[dict[str, Any]] = {
-    "reward": _NUMBER,
-    "terms": {"type": "object", "additionalProperties": _NUMBER},
 }
 
 
@@ -59,7 +54,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
         with (folder / f"episode-{number:04d}.mcap").open("wb") as file:
             writer = library("mcap.writer").Writer(file)
             writer.start(profile="", library="shapechanger")
-            steps += _write_episode(episode, writer)
+            steps += _write_messages(episode, writer)
             outcome = episode.outcome.encode(errors="replace").decode()  # A lone surrogate.
             about = {"header": json.dumps(episode.header.to_json()), "outcome": outcome}
             writer.add_metadata("shapechanger", about)
@@ -67,31 +62,26 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     return steps
 
 
-def _write_episode(episode: ExchangeEpisode, writer: Any) -> int:
-    """Write the messages of an episode; return its number of steps."""
-    header = episode.header
+def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
+    header, steps = episode.header, 0
     actions = Layout.from_json(header.action_layout)
-    states = Layout.from_json(header.state_layout) if header.state_layout else None
-    schemas = {topic: ("Action", _properties(actions)) for topic in ("action", "applied", "wanted")}
-    schemas |= {"step": ("Step", _STEP), "reward": ("Reward", _REWARD)}
-    if states is not None:
-        schemas["state"] = ("State", _properties(states))
-    schemas = {topic: (f"shapechanger.{name}", parts) for topic, (name, parts) in schemas.items()}
+    layouts = {"state": Layout.from_json(header.state_layout)} if header.state_layout else {}
+    layouts |= {"action": actions, "applied": actions, "wanted": actions}
+    schemas = {topic: _properties(layout) for topic, layout in layouts.items()}
+    schemas |= {"reward": _REWARD, "step": _STEP}
     if header.image_size is not None:
-        schemas["camera"] = ("foxglove.CompressedImage", _IMAGE)
+        schemas["camera"] = _IMAGE
     channels: dict[str, int] = {}
-    for topic, (name, properties) in schemas.items():
+    for topic, properties in schemas.items():
+        kind = "Action" if topic in {"applied", "wanted"} else topic.title()
+        name = "foxglove.CompressedImage" if topic == "camera" else f"shapechanger.{kind}"
         schema = {"title": name, "type": "object", "properties": properties}
-        data = json.dumps(schema).encode()
-        number = writer.register_schema(name=name, encoding="jsonschema", data=data)
-        channels[topic] = writer.register_channel(
-            topic=f"/{topic}", message_encoding="json", schema_id=number
-        )
-    steps = 0
+        number = writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+        channels[topic] = writer.register_channel(f"/{topic}", "json", number)
     for row, seen_ns in _timed(episode):
         steps += 1
         acted_ns = max(seen_ns, row.step.decided_ns or 0)
-        for topic, message in _messages(row, seen_ns, actions, states).items():
+        for topic, message in _messages(row, seen_ns, layouts):
             at_ns = seen_ns if topic in {"camera", "state"} else acted_ns
             data = json.dumps(message, allow_nan=False).encode()
             writer.add_message(channels[topic], log_time=at_ns, publish_time=at_ns, data=data)
@@ -105,11 +95,13 @@ def _timed(episode: ExchangeEpisode) -> Iterator[tuple[ExchangeStep, int]]:
     at_ns = -period_ns
     for row in episode.rows:
         clock_ns = row.step.clock_ns
-        known = clock_ns is not None and clock_ns >= 0  # MCAP has no negative times.
-        if at_ns < 0 and not known and episode.header.clock != "none":
+        if clock_ns is not None and clock_ns >= 0:  # MCAP has no negative times.
+            at_ns = clock_ns
+        elif at_ns < 0 and episode.header.clock != "none":
             waiting.append(row)
             continue
-        at_ns = cast("int", clock_ns) if known else max(0, at_ns + period_ns)
+        else:
+            at_ns = max(0, at_ns + period_ns)
         for number, earlier in enumerate(waiting):
             yield earlier, max(0, at_ns - (len(waiting) - number) * period_ns)
         waiting.clear()
@@ -119,56 +111,44 @@ def _timed(episode: ExchangeEpisode) -> Iterator[tuple[ExchangeStep, int]]:
 
 
 def _messages(
-    row: ExchangeStep, seen_ns: int, actions: Layout, states: Layout | None
-) -> dict[str, dict[str, Any]]:
+    row: ExchangeStep, seen_ns: int, layouts: Mapping[str, Layout]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the topics and the messages of a step."""
     step = row.step
-    found: dict[str, dict[str, Any]] = {}
     if row.jpeg is not None:
         sec, nsec = divmod(seen_ns, _NS_PER_S)
-        found["camera"] = {
-            "timestamp": {"sec": sec, "nsec": nsec},
-            "frame_id": "camera",
-            "data": base64.b64encode(row.jpeg).decode(),
-            "format": "jpeg",
-        }
-    if states is not None:
-        found["state"] = _by_name(states, step.state)
-    for name in ("action", "applied", "wanted"):
-        if (values := getattr(step, name)) is not None:
-            found[name] = _by_name(actions, values)
+        about = {"timestamp": {"sec": sec, "nsec": nsec}, "frame_id": "camera", "format": "jpeg"}
+        yield "camera", about | {"data": base64.b64encode(row.jpeg).decode()}
+    for topic, layout in layouts.items():
+        if (values := getattr(step, topic)) is not None:
+            yield topic, _by_name(layout, values)
     if step.reward is not None:
         terms = {name: _known(value) for name, value in step.terms.items()}
-        found["reward"] = {"reward": _known(step.reward), "terms": terms}
-    about = {"step": step.index, "driver": step.driver}
-    about |= {"terminated": step.terminated, "truncated": step.truncated}
+        yield "reward", {"reward": _known(step.reward), "terms": terms}
+    always = {name: getattr(step, name) for name in ("driver", "terminated", "truncated")}
     more = {"stop_reason": step.stop_reason or None, "wall_ns": step.wall_ns}
     more |= {"marks": list(row.marks) or None, "dropped": row.dropped}
-    found["step"] = about | {name: value for name, value in more.items() if value is not None}
-    return found
+    known = {name: value for name, value in more.items() if value is not None}
+    yield "step", {"step": step.index} | always | known
 
 
 def _properties(layout: Layout) -> dict[str, Any]:
     """Return the JSON schema of each feature, with its unit and range as description."""
     found: dict[str, Any] = {}
     for feature in layout:
-        bounds = (feature.low, feature.high)
-        ends = ("" if math.isinf(bound) else f"{bound:g}" for bound in bounds)
+        ends = ("" if math.isinf(end) else f"{end:g}" for end in (feature.low, feature.high))
         about = {"description": f"[{feature.unit}] {' to '.join(ends)}".rstrip()}
-        kind = {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
-        found[feature.name] = about | kind
+        found[feature.name] = about | (
+            {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
+        )
     return found
 
 
 def _by_name(layout: Layout, values: Sequence[float]) -> dict[str, Any]:
     """Return values by the name of their feature; a number that is not finite is left out."""
-    found: dict[str, Any] = {}
-    for feature, place in zip(layout, layout.slices.values(), strict=True):
-        part = [_known(value) for value in values[place]]
-        if feature.shape:
-            found[feature.name] = part
-        elif part[0] is not None:
-            found[feature.name] = part[0]
-    return found
+    parts = {name: list(map(_known, values[place])) for name, place in layout.slices.items()}
+    named = {f.name: parts[f.name] if f.shape else parts[f.name][0] for f in layout}
+    return {name: part for name, part in named.items() if part is not None}
 
 
 def _known(value: float) -> float | None:
