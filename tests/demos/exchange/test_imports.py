@@ -65,7 +65,7 @@ def test_a_table_of_others_with_states(tmp_path: Path) -> None:
     )
     done = import_recording(tmp_path / "table", tmp_path / "data", hz=20.0)
     assert done.notes == ("Columns that are not imported: lap.",)
-    assert "throttle must be a number, got 'oops'" in done.left_out[0]
+    assert "line 4: it is not a valid step (Expected `float`" in done.left_out[0]
     (episode,) = all_of(tmp_path / "data")
     assert Layout.from_json(episode.header.action_layout).names == ("steering", "throttle")
     assert [step.action for step in episode.steps] == [(0.5, 1.0), (-1.0, 0.0)]

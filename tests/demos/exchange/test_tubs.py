@@ -91,7 +91,7 @@ def test_a_tub_of_version_1(tmp_path: Path) -> None:
     assert first.header.control_hz == pytest.approx(20.0)
     assert {step.wall_ns for step in first.steps} == {None}  # Times are relative to the start.
     (folder / "exclude.json").write_text('{"5": true}')
-    with pytest.raises(DemosError, match=r"numbers in .*exclude.json must be a list"):
+    with pytest.raises(DemosError, match=r"exclude.json is damaged: Expected `array`"):
         imported(folder)
 
 
@@ -109,21 +109,10 @@ def _lines(folder: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
             "with an image of 80 x 32 pixels, and not 40 x 32: 0",
             9,
         ),
-        (lambda f: _lines(f, lambda lines: [*lines, bytes(512)]), "line of NUL bytes, as", 10),
-        (lambda f: _lines(f, lambda lines: [*lines[:-1], lines[-1][:-9]]), "not valid JSON", 9),
-        (lambda f: _lines(f, lambda lines: [*lines, lines[4]]), "that repeats another: 4", 10),
-        (
-            lambda f: _lines(f, lambda ls: [*ls, ls[4].replace(b"0.04", b"0.9")]),
-            "2 records with the _index of another record: 4, 4",
-            9,
-        ),
-        (
-            lambda f: _lines(
-                f, lambda ls: [ls[0].replace(b'"_index": 0', b'"_index": "x"'), *ls[1:]]
-            ),
-            "1 record without a valid _index",
-            9,
-        ),
+        (lambda f: _lines(f, lambda lines: [*lines, bytes(512)]), "1 line that is damaged", 10),
+        (lambda f: _lines(f, lambda lines: [*lines[:-1], lines[-1][:-9]]), "1 line that is da", 9),
+        (lambda f: _lines(f, lambda lines: [*lines, lines[4]]), "of another record: 4, 4", 9),
+        (lambda f: _lines(f, lambda ls: [ls[0].replace(b": 0,", b': "x",'), *ls[1:]]), "1 line", 9),
     ],
 )
 def test_the_rest_of_a_damaged_tub_is_imported(
@@ -142,9 +131,15 @@ def test_the_rest_of_a_damaged_tub_is_imported(
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"user/angle": 1.5}, "with user/angle or user/throttle that is not a number from -1 to 1"),
-        ({"user/throttle": None}, "without user/throttle"),
-        ({"user/mode": "local"}, "without pilot/angle and pilot/throttle, although a pilot drove"),
+        (
+            {"user/angle": 1.5},
+            "with an invalid value (Expected `float` <= 1.0 - at `$.user/angle`)",
+        ),
+        ({"user/angle": True}, "got `bool` - at `$.user/angle`)"),
+        ({"pilot/angle": float("nan")}, "with an invalid value (Expected `float` >= -1.0"),
+        ({"_timestamp_ms": "soon"}, "got `str` - at `$._timestamp_ms`)"),
+        ({"user/throttle": None}, "without an action in the mode 'user'"),
+        ({"user/mode": "local"}, "without an action in the mode 'local'"),
         ({"cam/image_array": None}, "without an image"),
         ({"cam/image_array": "../1.jpg"}, "with an image name that leaves the folder"),
         ({"cam/image_array": "a\0b.jpg"}, "with an image name that leaves the folder"),
@@ -179,14 +174,12 @@ def test_catalogs_in_another_order(tmp_path: Path) -> None:
     manifest.write_text(manifest.read_text().replace(paths, other))
     episodes, done = imported(folder)
     assert episodes == [[0, 1, 2, 3, 4, 5]]
-    assert done.warnings == (
-        "The _index falls in 1 place, first from 5 to 0: the records are read in its order.",
-    )
+    assert done.warnings == ("The _index does not always rise: the records are read in its order.",)
     (folder / "catalog_1.catalog").unlink()
     episodes, done = imported(folder)
     assert episodes == [[0, 1, 4, 5]]
-    assert done.left_out == ("1 catalog that is missing: catalog_1.catalog",)
-    assert "2 of the records 0 to 5 are in no catalog: 2 to 3." in done.notes
+    assert "There is no" in done.left_out[0]
+    assert "2 of the records 0 to 5 are in no catalog." in done.notes
 
 
 def test_pictures_of_other_records(tmp_path: Path) -> None:
@@ -198,29 +191,22 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
     for n in range(8):
         (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
     _, done = imported(folder)
-    assert done.warnings == (
-        "6 records with the image of another number, up to 2 off (0, 1, 2, and 3 more): look "
-        "whether they belong together.",
-    )
+    assert done.warnings == ("6 records with the image of another number: 0, 1, 2, and 3 more.",)
 
 
-def test_a_damaged_manifest(tmp_path: Path) -> None:
-    """A power cut while it was written: catalogs are found, and deletions are unknown."""
+@pytest.mark.parametrize("lines", [0, 4])
+def test_a_damaged_manifest(tmp_path: Path, lines: int) -> None:
+    """After a power cut while it was written nothing tells which records were deleted."""
     folder = tub_folder(tmp_path / "tub", records(6), [0])
     manifest = folder / "manifest.json"
-    manifest.write_bytes(b"".join(manifest.read_bytes().splitlines(True)[:4]) + bytes(99))
-    episodes, done = imported(folder)
-    assert episodes == [[0, 1, 2, 3, 4, 5]]
-    assert "records that were deleted cannot be told" in done.warnings[0]
-    with pytest.raises(DemosError, match="cannot be told"):
-        imported(folder, strict=True)
-    manifest.write_bytes(b"")
-    assert imported(folder)[0] == [[0, 1, 2, 3, 4, 5]]
+    manifest.write_bytes(b"".join(manifest.read_bytes().splitlines(True)[:lines]) + bytes(99))
+    with pytest.raises(DemosError, match=r"manifest.json is damaged"):
+        imported(folder)
 
 
 def test_no_record_is_left(tmp_path: Path) -> None:
     out = tmp_path / "data"
-    with pytest.raises(DemosError, match=r"nothing to import .*: 3 records without user/angle"):
+    with pytest.raises(DemosError, match=r"nothing to import .*: 3 records without an action"):
         import_recording(tub_folder(tmp_path / "a", [{"speed": 1.0}] * 3), out)
     folder = tub_folder(tmp_path / "b", records(3), [0, 1, 2])
     with pytest.raises(DemosError, match="There is nothing to import"):
@@ -358,11 +344,10 @@ def test_cameras_of_other_names(tmp_path: Path) -> None:
         (folder / f"images/{n}_left.jpg").write_bytes(picture(n))
         (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
     _, done = imported(folder)
-    assert (done.pictures, done.notes) == (3, ("The images come from the column cam/left.",))
+    assert done.pictures == 3
     both = [r | {"cam/right": f"{r['_index']}_right.jpg"} for r in made]
-    two = tub_folder(
-        tmp_path / "two", both, inputs={"cam/left": "image_array", "cam/right": "jpeg"}
-    )
+    inputs = dict.fromkeys(("cam/left", "cam/right"), "image_array")
+    two = tub_folder(tmp_path / "two", both, inputs=inputs)
     for path in (folder / "images").iterdir():
         (two / "images" / path.name).write_bytes(path.read_bytes())
     with pytest.raises(DemosError, match=r"2 cameras \(cam/left, cam/right\).*--camera cam/left"):
@@ -382,20 +367,19 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
     made = [r | extra for r in records(3)]
     _, done = imported(tub_folder(tmp_path / "tub", made, inputs=inputs))
     assert done.notes == (
-        "Columns that are not imported: cam/depth_array (gray16_array), lidar (nparray), "
-        "gear (str).",
+        "Columns that are not imported: cam/depth_array (gray16_array), lidar (nparray), gear (?).",
     )
     alone = tub_folder(
         tmp_path / "deep", [r | {"cam/image_array": None} for r in made], inputs=inputs
     )
     _, done = imported(alone)
-    assert "those of cam/depth_array have 16 bits" in done.warnings[0]
+    assert "those of 16 bits are not imported" in done.warnings[0]
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:
     """Records without a time leave the drive without times, never with the import's."""
     made = [r | {"cam/image_array": None} for r in records(4)]
-    made[2]["_timestamp_ms"] = "soon"
+    made[2]["_timestamp_ms"] = None
     _, done = imported(tub_folder(tmp_path / "tub", made))
     assert "1 of the 4 records from 0 have no valid time" in done.warnings[0]
     for record in made:

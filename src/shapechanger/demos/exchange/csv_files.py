@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import chain
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import msgspec
 
@@ -27,13 +27,14 @@ from shapechanger.demos.exchange.format import (
     COLUMNS,
     COMMANDS,
     ExchangeEpisode,
+    ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
     value_names,
 )
 from shapechanger.demos.exchange.imports import SourceRecord
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Layout
 
 _TABLE: Final = "steps.csv"
@@ -41,14 +42,13 @@ _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
 _NAMES: Final = {field: column.names["csv"] for field, column in COLUMNS.items()}
 _VECTORS: Final = [f for f, column in COLUMNS.items() if column.kind in {"action", "state"}]
-_MUST_BE: Final = {"index": "an integer", "time": "a time", "flag": "true or false"}
-_JSON: Final[dict[str, tuple[Any, str]]] = {
-    "terms": (dict[str, float], "a JSON object of numbers"),
-    "marks": (list[str], "a JSON array of strings"),
-    "stop_reason": (str, "a JSON string"),
-    "dropped": (str, "a JSON string"),
+_IN_JSON: Final = ("terms", "stop_reason", "marks", "dropped")
+_KNOWN_AS: Final = {key: (_NAMES["action"] + one.name, 1) for key, one in COMMANDS.items()} | {
+    alias: (_NAMES[field], factor)
+    for field, column in COLUMNS.items()
+    for alias, factor in column.aliases.items()
 }
-_MAX_TIME: Final = 1 << 62  # ns, as in a step.
+"""Columns of `steps.csv`, each with its factor to their unit, by names in tables of others."""
 
 
 def _tables_of(folder: Path) -> list[Path]:
@@ -78,104 +78,90 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
     for number, episode in enumerate(episodes, 1):
         place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
         (place / _FRAMES).mkdir(parents=True)
-        steps += _write_episode(episode, place)
+        text = json.dumps(files.own_fields(episode), indent=1, ensure_ascii=False)
+        (place / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
+        columns, frame = _columns(episode.header), ""
+        with (place / _TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(chain.from_iterable(columns.values()))
+            for index, row in enumerate(episode.rows):
+                if row.jpeg is not None:
+                    frame = f"{index:06d}.jpg"
+                    (place / _FRAMES / frame).write_bytes(row.jpeg)
+                writer.writerow([index, frame, row.step.driver, *_cells(row, columns)])
+                steps += 1
     return steps
 
 
-def _write_episode(episode: ExchangeEpisode, folder: Path) -> int:
-    columns = _columns(episode.header)
-    text = json.dumps(files.own_fields(episode), indent=1, ensure_ascii=False)
-    (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
-    frame, number = "", 0
-    with (folder / _TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(chain.from_iterable(columns.values()))
-        for number, row in enumerate(episode.rows, 1):
-            if row.jpeg is not None:
-                frame = f"{number - 1:06d}.jpg"
-                (folder / _FRAMES / frame).write_bytes(row.jpeg)
-            cells = [str(number - 1), frame, row.step.driver]
-            for field, names in list(columns.items())[3:]:
-                value = getattr(row if field in {"marks", "dropped"} else row.step, field)
-                if field in _VECTORS:
-                    cells += [""] * len(names) if value is None else map(_cell, value)
-                elif field == "dropped" and value is not None:
-                    cells.append(json.dumps(value))
-                else:
-                    cells.append(_cell(value))
-            writer.writerow(cells)
-    return number
-
-
-def _cell(value: Any) -> str:
-    """Return a cell; an empty one for None, and for an empty text, list or dictionary."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case int() | float():
-            return repr(value)
-        case dict():  # JSON has neither NaN nor infinity.
-            numbers = cast("dict[str, float]", value)
-            value = {n: v if math.isfinite(v) else repr(v) for n, v in numbers.items()}
-        case _:
-            pass
-    return json.dumps(value) if value else ""
+def _cells(row: ExchangeStep, columns: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Yield the cells of a step after those of its index, image and driver."""
+    for field, names in list(columns.items())[3:]:
+        value: Any = getattr(row if field in {"marks", "dropped"} else row.step, field)
+        if field in _VECTORS:
+            yield from [""] * len(names) if value is None else map(repr, value)
+        elif field == "terms":  # JSON has neither NaN nor infinity.
+            terms = {n: v if math.isfinite(v) else repr(v) for n, v in value.items()}
+            yield json.dumps(terms) if terms else ""
+        elif field == "dropped":  # For an unknown reason, which is "".
+            yield "" if value is None else json.dumps(value)
+        elif field in _IN_JSON:
+            yield json.dumps(value) if value else ""
+        else:
+            yield "" if value is None else repr(value).lower()
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     for place in _tables_of(folder):
-        if (place / _HEADER).is_file():
-            yield _own(place, context)
-        else:
-            yield from _others(place, context)
+        read = _own if (place / _HEADER).is_file() else _others
+        yield from read(place, context)
 
 
-def _own(folder: Path, context: ImportContext) -> ExchangeEpisode:
+def _own(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     if context.hz is not None:
         raise DemosError("The format csv states the rate itself: leave out --hz.")
-    path = folder / _HEADER
+    path, where = folder / _HEADER, folder / _TABLE
     header, outcome = files.own_header(files.read_json_object(path), path)
     columns = _columns(header)
     expected = list(chain.from_iterable(columns.values()))
-    table = _Table(folder / _TABLE, context, len(expected))
-    table.columns = columns
-    if table.names != expected:
-        missing = [name for name in expected if name not in table.names]
-        surplus = [repr(name) for name in table.names if name not in expected]
-        problems = [f"lacks {', '.join(missing[:5])}"] if missing else []
-        problems += [f"has the unknown {', '.join(surplus[:5])}"] if surplus else []
-        what = " and ".join(problems) or "has its columns in another order"
-        raise DemosError(f"{table.path} {what}: the columns must be those of {_HEADER}.")
-    records = table.records(folder / _FRAMES)
+    table = files.read_table(where, len(expected))
+    names = table[1][0][1] if table[1] else []
+    if names != expected:
+        wrong = ", ".join(sorted(set(names) ^ set(expected))[:5]) or "their order"
+        raise DemosError(f"{where} has other columns than {path}: {wrong}.")
+    records = _records(folder / _FRAMES, where, table, columns, None, context)
     if header.image_size is None and any(record.frame for record in records):
-        raise DemosError(f"{table.path} has images, but {path} has no image_size.")
+        raise DemosError(f"{where} has images, but {path} has no image_size.")
     rows = imports.rows_of(records, header.image_size, context, "line")
-    return ExchangeEpisode(header=header, rows=rows, name=str(folder), outcome=outcome)
+    yield ExchangeEpisode(header=header, rows=rows, name=str(folder), outcome=outcome)
 
 
 def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a table without a header."""
-    table = _Table(folder / _TABLE, context)
-    table.factors = dict(map(_known_name, table.names))
-    table.names = [_known_name(name)[0] for name in table.names]
-    for field, name in _NAMES.items():
-        known = [other for other in table.names if other.startswith(name)]
-        table.columns[field] = known if field in _VECTORS else [name]
-    if not table.columns["action"]:
+    path = folder / _TABLE
+    table = files.read_table(path)
+    stated = [name.strip() for name in table[1][0][1]] if table[1] else []
+    known = [_KNOWN_AS.get(name.lower(), (name, 1)) for name in stated]
+    names = [name for name, _ in known]
+    columns = {
+        field: [n for n in names if (n.startswith(name) if field in _VECTORS else n == name)]
+        for field, name in _NAMES.items()
+    }
+    if not columns["action"]:
         raise DemosError(
-            f"There is no {_HEADER} next to {table.path}, and no column of an action: restore it, "
+            f"There is no {_HEADER} next to {path}, and no column of an action: restore it, "
             f"or name columns action/NAME, or {', '.join(COMMANDS)}."
         )
-    taken = set(chain.from_iterable(table.columns.values()))
-    if others := [name for name in table.names if name not in taken]:
-        context.note(f"Columns that are not imported: {', '.join(others)}.")
-    if len(set(table.names)) < len(table.names):
-        raise DemosError(f"{table.path} has two columns of one name: rename one of them.")
-    records, size = imports.with_pictures(table.records(folder), "line", context)
+    if len(set(names)) < len(names):
+        raise DemosError(f"{path} has two columns of one name: rename one of them.")
+    if others := set(names).difference(*columns.values()):
+        context.note(f"Columns that are not imported: {', '.join(sorted(others))}.")
+    table[1][0] = (1, names)
+    found = _records(folder, path, table, columns, dict(known), context)
+    records, size = imports.with_pictures(found, "line", context)
     layouts: list[str] = []
     for field in ("action", "state"):
-        names = [name.removeprefix(_NAMES[field]) for name in table.columns[field]]
-        features = [COMMANDS.get(name) or imports.features_of(name, 1)[0] for name in names]
+        values = [name.removeprefix(_NAMES[field]) for name in columns[field]]
+        features = [COMMANDS.get(name) or imports.features_of(name, 1)[0] for name in values]
         layouts.append(imports.as_json(features))
     for part, hz, timed in imports.stretches([records] if records else [], "line", context):
         header = EpisodeHeader(
@@ -190,119 +176,91 @@ def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         yield ExchangeEpisode(header=header, rows=rows, name=f"{folder}, from {part[0].name}")
 
 
-def _known_name(name: str) -> tuple[str, int]:
-    """Return the name of a column of others as in `steps.csv`, and its factor to that unit."""
-    plain = name.strip().lower()
-    if plain in COMMANDS:
-        return _NAMES["action"] + COMMANDS[plain].name, 1
-    for field, column in COLUMNS.items():
-        if plain in column.aliases:
-            return _NAMES[field], column.aliases[plain]
-    return name.strip(), 1
+def _records(
+    folder: Path,
+    path: Path,
+    table: tuple[str, list[tuple[int, list[str]]]],
+    columns: Mapping[str, Sequence[str]],
+    factors: Mapping[str, int] | None,
+    context: ImportContext,
+) -> list[SourceRecord]:
+    """Return the lines of a table that can be read, with their images; the others are left out.
 
-
-class _Table:
-    """A `steps.csv`.
-
-    With another separator than commas, numbers may have decimal commas.
-
-    Attributes:
-        path: The file.
-        names: Names of its columns.
-        columns: Names of the columns of each field of a step.
-        factors: Factors to ns; only of a table of others, which may lack columns.
+    An own table has no `factors` of columns, and the tables of others may lack columns.
     """
-
-    def __init__(self, path: Path, context: ImportContext, columns: int = 1) -> None:
-        self._separator, table = files.read_table(path, columns)
-        self.path = path
-        self.names = table[0][1] if table else []
-        self.columns: dict[str, list[str]] = {}
-        self.factors: Mapping[str, int] = {}
-        self._lines = table[1:]
-        self._context = context
-
-    def records(self, frames: Path) -> list[SourceRecord]:
-        """Return the lines that can be read, with their images; the others are left out."""
-        found: list[SourceRecord] = []
-        before, shown, known = -1, "", set[str]()
-        for position, (line, cells) in enumerate(self._lines):
-            try:
-                record = self._record(f"line {line}", position, cells)
-                if record.number <= before:
-                    raise DemosError(f"step {record.number} comes after step {before}.")
-            except DemosError as error:
-                reason = str(error).removesuffix(".")
-                self._context.leave_out("line", f"of {self.path}", f"line {line}: {reason}")
-                continue
-            before = record.number
-            found.append(record)
-            frame = cast("str", record.frame)
-            record.picture = frames / frame if frame else None
-            if frame and not files.is_inside(frames, frame):
-                record.fault = "with an image name that leaves the folder"
-            elif frame != shown and frame in known:
-                record.fault = f"that returns to the image {frame!r} of an earlier step"
-            elif not frame and shown:
-                record.fault = "without an image"
-            else:
-                shown = frame
-                known.add(frame)
-        return found
-
-    def _record(self, name: str, position: int, cells: Sequence[str]) -> SourceRecord:
-        if len(cells) != len(self.names):
-            hint = " (decimal commas need another separator)" if self._separator == "," else ""
-            raise DemosError(f"{len(cells)} cells instead of {len(self.names)}{hint}.")
-        found = dict(zip(self.names, cells, strict=True))
-        fields = {field: self._value(field, found) for field in COLUMNS}
-        number = position if self.factors else fields["step"]
-        if number is None or fields["action"] is None:
-            raise DemosError(f"the {'step' if number is None else 'action'} is empty.")
-        marks, dropped, frame, _ = map(fields.pop, ("marks", "dropped", "frame", "step"))
-        if fields["state"] is None:
-            fields["state"] = (math.nan,) * len(self.columns["state"])
-        known = {field: value for field, value in fields.items() if value is not None}
-        known.setdefault("driver", "person" if self.factors else "")
-        return SourceRecord(
-            name=name,
-            step=Step(**known),
-            number=number,
-            frame=frame or "",
-            marks=tuple(marks or ()),
-            dropped=dropped,
-        )
-
-    def _value(self, field: str, cells: Mapping[str, str]) -> Any:
-        names = self.columns[field]
-        if field not in _VECTORS:
-            cell = cells.get(names[0], "")
-            must_be_there = COLUMNS[field].kind == "flag" and not self.factors
-            return self._parsed(field, names[0], cell) if cell or must_be_there else None
-        values = [self._parsed(field, name, cells[name]) for name in names if cells[name]]
-        if values and len(values) < len(names):
-            raise DemosError(f"some values of {field} are empty, but not all.")
-        return tuple(values) or None
-
-    def _parsed(self, field: str, name: str, cell: str) -> Any:
-        kind, factor = COLUMNS[field].kind, self.factors.get(name, 1)
-        plain = cell.strip() if self._separator == "," else cell.strip().replace(",", ".")
+    separator, ((_, names), *lines) = table
+    records: list[SourceRecord] = []
+    shown, known = "", set[str]()
+    for position, (line, cells) in enumerate(lines):
         try:
-            if field in _JSON:
-                return msgspec.json.decode(cell, type=_JSON[field][0], strict=False)
-            if kind in {"text", "picture"}:
-                return cell
-            if kind == "flag":  # Spreadsheets write TRUE.
-                return msgspec.convert(plain, bool, strict=False)
-            if kind not in {"time", "index"}:
-                return float(plain)
-            value = Decimal(plain) * factor
-            if abs(value) <= _MAX_TIME and (factor > 1 or value == value.to_integral_value()):
-                return int(value)
-        except (ValueError, ArithmeticError, RecursionError, msgspec.MsgspecError):
-            pass
-        expected = _JSON[field][1] if field in _JSON else _MUST_BE.get(kind, "a number")
-        raise DemosError(f"{name} must be {expected}, got {cell[:60]!r}.")
+            if len(cells) != len(names):
+                hint = " (decimal commas need another separator)" if separator == "," else ""
+                raise ValueError(f"{len(cells)} cells instead of {len(names)}{hint}")
+            found = dict(zip(names, cells, strict=True))
+            record = _record(found, columns, factors, comma=separator != ",")
+            if factors is not None:
+                record.number = position
+            elif record.number <= (records[-1].number if records else -1):
+                raise ValueError(f"step {record.number} is not after the step before")
+        except (ValueError, RecursionError, msgspec.ValidationError) as error:
+            context.leave_out("line", f"of {path}", f"line {line}: {error}")
+            continue
+        record.name, frame = f"line {line}", str(record.frame)
+        records.append(record)
+        record.picture = folder / frame if frame else None
+        if frame and not files.is_inside(folder, frame):
+            record.fault = "with an image name that leaves the folder"
+        elif frame != shown and frame in known:
+            record.fault = f"that returns to the image {frame!r} of an earlier step"
+        elif not frame and shown:
+            record.fault = "without an image"
+        else:
+            shown = frame
+            known.add(frame)
+    return records
+
+
+def _record(
+    cells: Mapping[str, str],
+    columns: Mapping[str, Sequence[str]],
+    factors: Mapping[str, int] | None,
+    *,
+    comma: bool,
+) -> SourceRecord:
+    fields: dict[str, Any] = {} if factors is None else {"driver": "person"}
+    for field, names in columns.items():
+        kind = COLUMNS[field].kind
+        values = [cell for name in names if (cell := cells[name].strip())]
+        if comma and kind not in {"text", "picture", "json"}:
+            values = [value.replace(",", ".") for value in values]
+        factor = (factors or {}).get(names[0], 1) if names else 1
+        if field in _VECTORS:
+            fields |= {field: values} if values else {}
+        elif not values:
+            if factors is None and kind == "flag":
+                raise ValueError(f"{names[0]} is empty")
+        elif field in _IN_JSON:
+            fields[field] = json.loads(values[0])
+        elif factor > 1:
+            wrong = f"{names[0]} is not a time: {values[0]!r}"
+            with translate_errors(ArithmeticError, to=lambda _, wrong=wrong: ValueError(wrong)):
+                fields[field] = int((Decimal(values[0]) * factor).quantize(1))
+        else:
+            fields[field] = values[0]
+    sizes = [len(columns[field]) for field in ("action", "state")]
+    fields.setdefault("state", [math.nan] * sizes[1])
+    marks, dropped, frame = (fields.pop(name, None) for name in ("marks", "dropped", "frame"))
+    step = Step.from_json(fields)
+    if reason := step.refusal(*sizes):
+        raise ValueError(reason)
+    return SourceRecord(
+        name="",
+        step=step,
+        number=step.index,
+        frame=frame or "",
+        marks=msgspec.convert(marks or (), tuple[str, ...]),
+        dropped=msgspec.convert(dropped, str | None),
+    )
 
 
 FORMAT: Final = Format(

@@ -10,12 +10,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import os
 import re
 import secrets
 import shutil
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
@@ -190,65 +189,3 @@ def own_episodes(section: Any, where: object, count: int) -> list[Any]:
 def cannot_read(path: Path, error: OSError) -> DemosError:
     """Return the error to raise when a file cannot be read."""
     return DemosError(f"{path} cannot be read: {error.strerror or error}.")
-
-
-@contextmanager
-def open_hdf5(path: Path) -> Generator[Any]:
-    """Open an HDF5 file for reading, as an `h5py.File`."""
-    with translate_errors(
-        OSError, to=lambda error: DemosError(f"{path} is not an intact HDF5 file: {error}.")
-    ):
-        file = library("h5py").File(path, "r")
-    try:
-        yield file
-    except (OSError, RuntimeError) as error:  # Raised by h5py for inconsistent bytes.
-        raise DemosError(f"{path} is damaged: {error}.") from error
-    finally:
-        file.close()
-
-
-def chunk_of(columns: Iterable[Any], most: int) -> int:
-    """Return how many entries of columns to read at once: at most as many as fit, at least one."""
-    return max(1, min(most, MAX_UNPACKED // max(1, sum(map(_row_bytes, columns)))))
-
-
-def _row_bytes(column: Any) -> int:
-    return math.prod(column.shape[1:]) * column.dtype.itemsize
-
-
-def column(file: Any, name: str) -> Any:
-    """Return an array in an open `h5py.File` by its path there; no link is followed."""
-    h5py = library("h5py")
-    where, found, link = file.filename, file, None
-    for part in name.split("/"):
-        link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
-        if isinstance(link, h5py.SoftLink):  # It may lead through a link to another file.
-            raise DemosError(f"{where} has a link for {name!r}, and links are not followed.")
-        if isinstance(link, h5py.ExternalLink):
-            break
-        if link is None or (found := found.get(part)) is None:
-            raise DemosError(f"{where} has no {name!r}, so the dataset is incomplete.")
-    is_array = isinstance(found, h5py.Dataset)
-    if isinstance(link, h5py.ExternalLink) or (is_array and (found.external or found.is_virtual)):
-        raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
-    if not is_array or not found.shape:
-        raise DemosError(f"{where}: {name!r} is not an array.")
-    # HDF5 unpacks whole chunks, and a step may claim any shape.
-    unpacked = max(_row_bytes(found), math.prod(found.chunks or ()) * found.dtype.itemsize)
-    if unpacked > MAX_UNPACKED:
-        raise DemosError(
-            f"{where}: {name!r} unpacks to {unpacked} bytes at once, more than the limit of "
-            f"{MAX_UNPACKED}."
-        )
-    return found
-
-
-def names_in(file: Any, *groups: str) -> list[str]:
-    """Return the names in a group of groups; no link is followed."""
-    h5py = library("h5py")
-    found: Any = file
-    for part in groups:
-        is_there = isinstance(found.get(part, getlink=True), h5py.HardLink)
-        if not is_there or not isinstance(found := found[part], h5py.Group):
-            return []
-    return [str(name) for name in found]

@@ -1,17 +1,11 @@
 """Minari datasets: ours without a loss, and those of others as far as possible.
 
-An observation is the image, the state, or a dictionary of both. An image is stored as the JPEG
-that was recorded, which Minari decodes on reading; it is not encoded again. Images below 32
-pixels, which Minari does not store as JPEG, are stored as pixels, with the JPEG in `infos/jpeg`.
-Minari needs one observation more than there are steps, so the last one is repeated.
-
-Of the infos of a step, `frame` is the index of the image in the episode, the same for steps that
-share one, and `step` is everything without a column of its own, as JSON. The reward is NaN where
-it is unknown. The headers of the episodes, the layouts and the rate are in `metadata.json`.
-
-Of a dataset of others, at most one part of an observation may be an image; all other values become
-the state, in order. Images that are not JPEG are encoded with quality 100. The driver is unknown
-and taken to be an "expert". The rate is the key `control_hz`, `--hz`, or 20 Hz.
+An observation is the image, the state, or a dictionary of both; the last one is repeated, because
+Minari needs one more than there are steps. An image is stored as the JPEG that was recorded, which
+Minari decodes on reading. Images below 32 pixels, which Minari does not store as JPEG, are stored
+as pixels, with the JPEG in `infos/jpeg`. Of the infos, `frame` is the index of the image in the
+episode, the same for steps that share one, and `step` is everything without a column of its own,
+as JSON. The reward is NaN where it is unknown. `metadata.json` has the headers of the episodes.
 
 Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
 encodes each image again at JPEG quality 75, and needs the whole episode in memory.
@@ -23,24 +17,26 @@ import copy
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final, cast
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, imports, minari_spaces
+from shapechanger.demos.exchange import files, imports
+from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
 from shapechanger.demos.exchange.format import (
     DEFAULT_HZ,
     ExchangeEpisode,
-    ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
@@ -49,23 +45,50 @@ from shapechanger.demos.exchange.format import (
     name_in,
 )
 from shapechanger.demos.exchange.imports import SourceRecord
-from shapechanger.demos.jpeg import is_grey
-from shapechanger.errors import DemosError
+from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
+from shapechanger.errors import DemosError, translate_errors
+from shapechanger.layout import Feature, Layout
 
 _DATA: Final = "data"
 _METADATA: Final = "metadata.json"
 _MAIN: Final = "main_data.hdf5"
 _OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
-_FRAME, _JPEG = "infos/frame", "infos/jpeg"
-_OBSERVATIONS: Final = "observations"
-_ACTION, _STATE, _PICTURE, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
-    name_in("minari", field)
-    for field in ("action", "state", "frame", "reward", "terminated", "truncated", "driver")
+_OBSERVATIONS, _FRAME, _JPEG = "observations", "infos/frame", "infos/jpeg"
+_ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
+    name_in("minari", field) for field in ("action", "reward", "terminated", "truncated", "driver")
 )
 _IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys of a step that its JSON lacks.
 _STORAGE: Final = "minari.dataset.minari_storage"
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
+_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
+_CHANNELS: Final = (1, 3)
+_DEEP: Final = ("uint16", "int16", "uint32")
+_DESCRIPTION: Final = (
+    "Episodes recorded by Shapechanger, and exported without a change: images are JPEG as "
+    "recorded, numbers have 64 bits, the last observation of an episode is there twice."
+)
+_BAD_JSON: Final = (ValueError, TypeError, RecursionError, msgspec.DecodeError)
+
+
+class _Rest(msgspec.Struct):
+    """What a step of an own dataset has without a column, in its `infos/step`."""
+
+    step: dict[str, Any]
+    marks: tuple[str, ...]
+    dropped: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Parts:
+    """The columns of an episode; those of the action and the state with their number of values."""
+
+    header: EpisodeHeader
+    action: Mapping[str, int]
+    state: Mapping[str, int]
+    picture: str = ""
+    pixels: tuple[int, ...] = ()  # The shape of an image; () for JPEG.
+    infos: Sequence[str] = ()  # Of an own dataset.
 
 
 def _data_folder(folder: Path) -> Path | None:
@@ -73,246 +96,265 @@ def _data_folder(folder: Path) -> Path | None:
     return next((p for p in (folder / _DATA, folder) if (p / _METADATA).is_file()), None)
 
 
+@contextmanager
+def _opened(path: Path) -> Generator[Any]:
+    """Open an HDF5 file for reading; h5py raises one of these errors for inconsistent bytes."""
+    wrong = f"{path} is not an intact HDF5 file"
+    with (
+        translate_errors(OSError, RuntimeError, to=lambda error: DemosError(f"{wrong}: {error}.")),
+        library("h5py").File(path, "r") as file,
+    ):
+        yield file
+
+
+def _arrays(file: Any, number: int) -> dict[str, Any]:
+    """Return the arrays of an episode by their paths; no link or other file is followed."""
+    h5py, name, found = library("h5py"), f"episode_{number}", dict[str, Any]()
+    is_there = isinstance(file.get(name, getlink=True), h5py.HardLink)
+    if not is_there or not isinstance(file[name], h5py.Group):
+        raise DemosError(f"{file.filename} has no {name}.")
+    file[name].visititems(found.__setitem__)
+    return {
+        path: one
+        for path, one in found.items()
+        if isinstance(one, h5py.Dataset) and one.shape and not one.external and not one.is_virtual
+    }
+
+
+def _columns(file: Any, number: int, parts: _Parts) -> dict[str, Any]:
+    """Return the columns of an episode by name; refuse those that do not fit together."""
+    where, arrays = f"{file.filename}, episode_{number}", _arrays(file, number)
+    sizes = {_TERMINATED: 1, _TRUNCATED: 1, **parts.action, **parts.state}
+    sizes |= {_REWARD: 1} if parts.infos or _REWARD in arrays else {}
+    names = [*sizes, *parts.infos, *filter(None, [parts.picture])]
+    if missing := [name for name in names if name not in arrays]:
+        raise DemosError(f"{where} has no {missing[0]!r} that is an array in this file.")
+    columns = {name: arrays[name] for name in names}
+    steps = len(columns[_TERMINATED])
+    for name, one in columns.items():
+        # HDF5 unpacks whole chunks.
+        unpacked = max(
+            one.nbytes // max(1, len(one)), math.prod(one.chunks or ()) * one.dtype.itemsize
+        )
+        if unpacked > MAX_UNPACKED:
+            raise DemosError(f"{where}: {name!r} unpacks to {unpacked} bytes, more than the limit.")
+        # The last observation follows the last step.
+        if len(one) not in {steps, steps + name.startswith(_OBSERVATIONS)}:
+            raise DemosError(f"{where}: {name!r} has {len(one)} entries for {steps} steps.")
+        numeric = one.dtype.kind in "biuf" and math.prod(one.shape[1:]) == sizes.get(name)
+        if name in sizes and not numeric:
+            raise DemosError(f"{where}: {name!r} does not have {sizes[name]} numbers in a row.")
+        fits = one.dtype == np.uint8 and one.shape[1:] == parts.pixels
+        if name == parts.picture and parts.pixels and not fits:
+            raise DemosError(f"{where}: {name!r} has images that do not fit their space.")
+    stated = file[f"episode_{number}"].attrs.get("total_steps", steps)
+    if not np.array_equal(np.ravel(stated), [steps]):
+        raise DemosError(f"{where} has {steps} steps, and its total_steps says {stated}.")
+    return columns
+
+
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     place = _data_folder(folder) or folder
     path = place / _METADATA
     metadata = files.read_json_object(path)
     if metadata.get("data_format", "hdf5") != "hdf5":
-        raise DemosError(
-            f"{folder} is stored as {metadata['data_format']!r}, but only 'hdf5' is supported: "
-            "create it with data_format='hdf5'."
-        )
+        raise DemosError(f"{folder} is stored as {metadata['data_format']!r}: only 'hdf5' is read.")
     main = files.inside(place, _MAIN, path)
     count, most, claimed = metadata.get("total_episodes"), main.stat().st_size, 0
-    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= most:
+    if type(count) is not int or not 1 <= count <= most:
         raise DemosError(f"{path}: total_episodes must be a positive integer, got {count!r}.")
     ours = files.own_episodes(metadata[_OURS], path, count) if _OURS in metadata else []
-    theirs = None if ours else _foreign(main, path, metadata, context)
+    theirs = _parts(metadata, path, context)
+    others, outcome = set[str](), ""
     for number in range(count):
         try:
-            header, outcome = files.own_header(ours[number], path) if ours else (None, "")
-            with files.open_hdf5(main) as file:
-                parts = theirs if header is None else _own(file, number, header)
-                assert parts is not None
-                steps = parts.count_steps(file, number, context)
+            with _opened(main) as file:
+                infos = {name for name in _arrays(file, number) if name.startswith("infos/")}
+                parts = theirs
+                if ours:
+                    header, outcome = files.own_header(ours[number], path)
+                    picture = _JPEG if _JPEG in infos else theirs.picture
+                    named = (_STEP, _FRAME) if picture else (_STEP,)
+                    parts = replace(theirs, header=header, picture=picture, pixels=(), infos=named)
+                columns = _columns(file, number, parts)
+                steps = len(columns[_TERMINATED])
         except DemosError as error:
             context.leave_out("episode", imports.unreadable(error), number)
             continue
+        others |= set() if ours else infos
+        if _REWARD not in columns:
+            context.warn(f"{main.name} lacks rewards: the steps of such episodes have none.")
         # HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
         if (claimed := claimed + 3 * steps) > most:
             raise DemosError(f"{main} claims at least {claimed} values, but has {most} bytes.")
-        records, size = _records(main, number, steps, parts), parts.header.image_size
         rest = [f"{n} of episode_{number}" for n in range(steps)]
+        records, size = _records(main, number, parts), parts.header.image_size
         rows = imports.rows_of(records, size, context, "step", rest)
         name = f"{main}, episode_{number}"
         yield ExchangeEpisode(header=parts.header, rows=rows, name=name, outcome=outcome)
-    if not ours:
-        with files.open_hdf5(main) as file:
-            groups = [name for name in files.names_in(file) if name.startswith("episode_")]
-            more = {name for group in groups for name in files.names_in(file, group, "infos")}
-        if len(groups) != count:
-            context.warn(f"total_episodes is {count}, and {main.name} has {len(groups)} episodes.")
-        if more:
-            context.note(f"The infos are not imported: {few(sorted(more))}.")
+    with _opened(main) as file:
+        groups = sum(name.startswith("episode_") for name in file)
+    if groups != count:
+        context.warn(f"total_episodes is {count}, and {main.name} has {groups} episodes.")
+    if others:
+        context.note(f"The infos are not imported: {few(sorted(others))}.")
 
 
-@dataclass(frozen=True, slots=True)
-class _Parts:
-    """Columns of an episode, those of the action and the state with their number of values.
-
-    `picture` is "" without images, and `infos` empty in a dataset of others.
-    """
-
-    header: EpisodeHeader
-    action: Sequence[tuple[str, int]]
-    state: Sequence[tuple[str, int]]
-    picture: str
-    is_jpeg: bool
-    infos: Sequence[str] = ()
-
-    def columns(self, file: Any, number: int) -> dict[str, Any]:
-        """Return the columns by name; the rewards of others may be missing."""
-        group = f"episode_{number}"
-        names = [_TERMINATED, _TRUNCATED, *(name for name, _ in (*self.action, *self.state))]
-        names += [*self.infos, *([self.picture] if self.picture else [])]
-        if self.infos or _REWARD in files.names_in(file, group):
-            names.append(_REWARD)
-        return {name: files.column(file, f"{group}/{name}") for name in names}
-
-    def count_steps(self, file: Any, number: int, context: ImportContext) -> int:
-        """Return the number of steps; refuse an episode whose columns have different lengths."""
-        columns = self.columns(file, number)
-        ends = columns[_TERMINATED]
-        steps = int(ends.shape[0])
-        if _REWARD not in columns:
-            context.warn(f"{Path(file.filename).name} has no rewards: the steps have none.")
-        observed = {self.picture, *(name for name, _ in self.state)} - {_JPEG}
-        for name, found in columns.items():
-            have = found.shape[0]
-            if name in observed and have not in {steps, steps + 1}:
-                # The last observation follows the last step.
-                raise DemosError(f"{found.name!r} has {have} entries, but {steps + 1} are needed.")
-            if name not in observed and have != steps:
-                raise DemosError(f"{found.name!r} has {have} entries, but {ends.name!r} {steps}.")
-        stated = file[f"episode_{number}"].attrs.get("total_steps", steps)
-        if not np.array_equal(np.ravel(stated), [steps]):
-            raise DemosError(
-                f"episode_{number} has {steps} steps, and its total_steps says {stated}."
-            )
-        return steps
-
-
-def _own(file: Any, number: int, header: EpisodeHeader) -> _Parts:
-    """Return the parts of an episode that Shapechanger exported."""
-    infos = files.names_in(file, f"episode_{number}", "infos")
-    pictured = "frame" in infos
-    state, picture = _observed(pictured, bool(header.state_layout))
-    return _Parts(
-        header=header,
-        action=[(_ACTION, header.action_size)],
-        state=[(state, header.state_size)] if header.state_layout else [],
-        picture=(_JPEG if "jpeg" in infos else picture) if pictured else "",
-        is_jpeg=True,
-        infos=(_STEP, _FRAME) if pictured else (_STEP,),
-    )
-
-
-def _observed(picture: bool, state: bool) -> tuple[str, str]:
-    """Return the columns of the state and of the image in an own dataset."""
-    return (_STATE, _PICTURE) if picture and state else (_OBSERVATIONS, _OBSERVATIONS)
-
-
-def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportContext) -> _Parts:
-    """Return the parts of the episodes of a dataset of others."""
-    observed, acted = (
-        minari_spaces.leaves_in(metadata, f"{of}_space", path) for of in ("observation", "action")
-    )
-    sizes = {name: minari_spaces.picture_size_of(space) for name, space in observed.items()}
-    pictured = [name for name, size in sizes.items() if size is not None]
-    if len(pictured) > 1:
-        raise DemosError(
-            f"An observation in {main} has {len(pictured)} images ({', '.join(pictured)}), but "
-            "an episode has one camera: keep one of them in the dataset."
-        )
-    sensed = {
-        name: space
-        for name, space in observed.items()
-        if name not in pictured and minari_spaces.is_imported(name, space, context)
-    }
+def _parts(metadata: Mapping[str, Any], path: Path, context: ImportContext) -> _Parts:
+    """Return the columns of all episodes, by the spaces in the metadata."""
+    observed, acted = (_leaves(metadata, f"{of}_space", path) for of in ("observation", "action"))
+    pictures = {at: size for at, space in observed.items() if (size := _picture_size(space))}
+    if len(pictures) > 1:
+        raise DemosError(f"{path} has {len(pictures)} images ({', '.join(pictures)}): keep one.")
+    sensed = {at: space for at, space in observed.items() if at not in pictures}
+    states = _features(sensed, _OBSERVATIONS, context)
+    actions = _features(acted, _ACTION, context)
+    if len(actions) < len(acted):
+        names = "Box, Discrete, MultiDiscrete or MultiBinary"
+        raise DemosError(f"{path}: the action_space must consist of {names}.")
     hz = metadata.get("control_hz", context.hz)
-    known = isinstance(hz, int | float) and math.isfinite(hz) and hz > 0.0
+    known = type(hz) in {int, float} and math.isfinite(hz) and hz > 0.0
     if not known:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-    camera = "".join(pictured) if pictured else None
-    action_layout, state_layout = (
-        imports.as_json(
-            [f for name, leaf in leaves.items() for f in minari_spaces.features(name, leaf, what)]
-        )
-        for leaves, what in ((acted, "action"), (sensed, "observation"))
-    )
     header = EpisodeHeader(
-        action_layout=action_layout,
-        state_layout=state_layout,
-        image_size=None if camera is None else sizes[camera],
-        control_hz=float(cast("float", hz)) if known else DEFAULT_HZ,
+        action_layout=imports.as_json(list(chain(*actions.values()))),
+        state_layout=imports.as_json(list(chain(*states.values()))),
+        image_size=next(iter(pictures.values()), None),
+        control_hz=float(hz) if known else DEFAULT_HZ,
         clock="none",
         source="minari",
         notes={"dataset": str(metadata.get("dataset_id", "")), "rate_is_known": known},
     )
-
-    def places(leaves: dict[str, spaces.Space[Any]], part: str) -> list[tuple[str, int]]:
-        sizes = {name: max(1, math.prod(space.shape or ())) for name, space in leaves.items()}
-        return [(f"{part}/{name}" if name else part, size) for name, size in sizes.items()]
-
+    is_jpeg = bool(metadata.get("jpeg_encoding", True)) and all(
+        library(_STORAGE).is_image_space(observed[at]) for at in pictures
+    )
     return _Parts(
         header=header,
-        action=places(acted, _ACTION),
-        state=places(sensed, _OBSERVATIONS),
-        picture="" if camera is None else f"{_OBSERVATIONS}/{camera}".rstrip("/"),
-        is_jpeg=camera is not None
-        and bool(metadata.get("jpeg_encoding", True))
-        and files.library(_STORAGE).is_image_space(observed[camera]),
+        action={at: sum(one.size for one in features) for at, features in actions.items()},
+        state={at: sum(one.size for one in features) for at, features in states.items()},
+        picture="".join(_OBSERVATIONS + at for at in pictures),
+        pixels=() if is_jpeg else next((observed[at].shape or () for at in pictures), ()),
     )
 
 
-def _records(main: Path, number: int, steps: int, parts: _Parts) -> Iterator[SourceRecord]:
-    group, size = f"episode_{number}", parts.header.image_size
-    with files.open_hdf5(main) as file:
-        columns = parts.columns(file, number)
-        count = files.chunk_of(columns.values(), _CHUNK)
-        for start in range(0, steps, count):
-            part = slice(start, min(start + count, steps))
-            chunk = {name: values[part] for name, values in columns.items()}
-            actions, states = (_flat(chunk, places, main) for places in (parts.action, parts.state))
-            for place, step in enumerate(range(part.start, part.stop)):
-                at = {name: values[place] for name, values in chunk.items()}
-                reward = float(at[_REWARD]) if _REWARD in at else math.nan
-                record = SourceRecord(
-                    name=f"{step} of {group}",
-                    step=Step(
-                        action=tuple(actions[place].tolist()),
-                        driver="expert",
-                        state=tuple(states[place].tolist()),
-                        reward=None if math.isnan(reward) else reward,
-                        terminated=bool(at[_TERMINATED]),
-                        truncated=bool(at[_TRUNCATED]),
-                    ),
-                )
+def _leaves(metadata: Mapping[str, Any], name: str, path: Path) -> dict[str, spaces.Space[Any]]:
+    """Return the spaces without subspaces in one of the metadata, by their paths, as "/image"."""
+    text, where = metadata.get(name), f"The {name} in {path}"
+    if not isinstance(text, str):
+        raise DemosError(f"{path} has no {name}: create the dataset again with this space.")
+    read = library("minari.serialization").deserialize_space
+    # Its errors for invalid text are not documented.
+    with translate_errors(Exception, to=lambda e: DemosError(f"{where} cannot be read: {e}.")):
+        leaves = dict(_walked(json.loads(text)))
+        # Gymnasium fills arrays of any shape with its bounds.
+        if sum(abs(math.prod(leaf.get("shape", ()))) for leaf in leaves.values()) > MAX_UNPACKED:
+            raise ValueError(f"it claims more than {MAX_UNPACKED} values")
+        return {at: read(leaf) for at, leaf in leaves.items()}
+
+
+def _walked(space: Any, at: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the leaves of the JSON of a space, in the order and with the keys of the files."""
+    match space["type"]:
+        case "Dict":
+            named = sorted(space["subspaces"].items())
+        case "Tuple":
+            named = [(f"_index_{n}", inner) for n, inner in enumerate(space["subspaces"])]
+        case _:
+            yield at, space
+            return
+    for key, inner in named:
+        yield from _walked(inner, f"{at}/{key}")
+
+
+def _features(
+    leaves: Mapping[str, spaces.Space[Any]], part: str, context: ImportContext
+) -> dict[str, list[Feature]]:
+    """Return the features of each leaf of numbers, by its column; the others are reported."""
+    found: dict[str, list[Feature]] = {}
+    for at, space in leaves.items():
+        shape, what = space.shape or (), part.removesuffix("s")
+        name, size, ends = at.strip("/") or what, math.prod(shape), None
+        match space:
+            case spaces.Box():
+                ends = space.low, space.high
+            case spaces.Discrete():
+                ends = space.start, space.start + space.n - 1
+            case spaces.MultiDiscrete():
+                ends = space.start, space.start + space.nvec - 1
+            case spaces.MultiBinary():
+                ends = 0, 1
+            case _:
+                context.note(f"The {what} {name} ({space}) is not imported.")
+        if ends and (not 0 < size <= MAX_VALUES or (len(shape) > 1 and str(space.dtype) in _DEEP)):
+            reason = f"of no or more than {MAX_VALUES} values, or with images of depth"
+            context.leave_out(what, reason, f"{name} ({space})")
+        elif ends:
+            low, high = (
+                np.broadcast_to(np.ravel(end).astype(float), size).tolist() for end in ends
+            )
+            found[part + at] = imports.features_of(name, size, low=low, high=high)
+    return found
+
+
+def _picture_size(space: spaces.Space[Any]) -> tuple[int, int] | None:
+    """Return the width and height of the images of a space; None if it has no images."""
+    shape = space.shape or ()
+    if not isinstance(space, spaces.Box) or str(cast("Any", space).dtype) != "uint8":
+        return None
+    if len(shape) not in {2, 3}:
+        return None
+    height, width, *channels = list(shape[1:] if _colours_first(shape) else shape)
+    is_picture = not channels or channels[0] in _CHANNELS
+    fits = min(height, width) >= _MIN_PICTURE and height * width <= MAX_PIXELS
+    return (width, height) if is_picture and fits else None
+
+
+def _colours_first(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 3 and shape[0] in _CHANNELS and shape[2] not in _CHANNELS
+
+
+def _records(main: Path, number: int, parts: _Parts) -> Iterator[SourceRecord]:
+    with _opened(main) as file:
+        columns = _columns(file, number, parts)
+        steps, size = len(columns[_TERMINATED]), sum(one.nbytes for one in columns.values())
+        chunk = max(1, min(_CHUNK, steps * MAX_UNPACKED // max(1, size)))
+        for start in range(0, steps, chunk):
+            part = {name: at[start : min(start + chunk, steps)] for name, at in columns.items()}
+            for n, ended in enumerate(part[_TERMINATED]):
+                row = {name: values[n] for name, values in part.items()}
+                fields = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
+                rest = _Rest(step=fields, marks=(), dropped=None)
+                reward = _numbers(row, [_REWARD]) if _REWARD in row else [math.nan]
+                why = f"{_STEP} of step {start + n} of episode_{number} is damaged"
+                with translate_errors(*_BAD_JSON, to=lambda e, why=why: DemosError(f"{why}: {e}.")):
+                    if parts.infos:
+                        rest = msgspec.json.decode(row[_STEP], type=_Rest)
+                    if "reward" in rest.step or not (parts.infos or math.isnan(reward[0])):
+                        rest.step["reward"] = reward[0]
+                    values = {"action": parts.action, "state": parts.state}
+                    numbers = {field: _numbers(row, names) for field, names in values.items()}
+                    step = Step.from_json(rest.step | numbers | {"terminated": bool(ended)})
+                record = SourceRecord(name=f"{start + n} of episode_{number}", step=step)
+                record.marks, record.dropped = rest.marks, rest.dropped
                 if parts.picture:
-                    record.frame = int(at[_FRAME]) if _FRAME in at else step
-                    stored = at[parts.picture]
-                    record.picture = (
-                        bytes(stored) if parts.is_jpeg else minari_spaces.pixels_of(stored, size)
-                    )
-                    if record.picture is None:
-                        record.fault = "whose image does not fit its space"
-                if parts.infos:
-                    _add_rest(record, at[_STEP])
+                    stored = row[parts.picture]
+                    record.picture = _pixels(stored) if parts.pixels else bytes(stored)
+                    record.frame = int(row[_FRAME]) if parts.infos else start + n
                 yield record
 
 
-def _flat(
-    chunk: dict[str, Any], places: Sequence[tuple[str, int]], main: Path
-) -> NDArray[np.float64]:
-    """Return the values of some steps, shape (n, number of all values)."""
-    steps = len(chunk[_TERMINATED])
-    flat = [np.empty((steps, 0))]
-    for name, size in places:
-        try:
-            numbers = np.asarray(chunk[name], np.float64).reshape(steps, -1)
-        except (ValueError, TypeError) as error:
-            raise DemosError(f"{main}: {name!r} is not numeric ({error}).") from error
-        if numbers.shape[1] != size:
-            raise DemosError(
-                f"{main}: {name!r} has {numbers.shape[1]} values per step, but its space {size}."
-            )
-        flat.append(numbers)
-    return np.concatenate(flat, axis=1)
+def _numbers(row: Mapping[str, Any], names: Iterable[str]) -> list[float]:
+    return [value for name in names for value in np.ravel(row[name]).astype(float).tolist()]
 
 
-def _add_rest(record: SourceRecord, text: bytes) -> None:
-    """Complete a record of an own dataset; it has a fault if its JSON cannot be read."""
-    step = record.step
-    columns = {"action": step.action, "state": step.state, "terminated": step.terminated}
-    try:
-        rest = files.parse_json(text.decode(), _STEP)
-        fields = rest["step"] | columns
-        if "reward" in fields:
-            fields["reward"] = step.reward
-        record.step = Step.from_json(fields)
-        record.marks = tuple(map(str, rest["marks"]))
-        record.dropped = None if rest["dropped"] is None else str(rest["dropped"])
-    except (DemosError, ValueError, TypeError, LookupError) as error:
-        reason = str(error).removesuffix(".")
-        record.fault = f"whose {_STEP} cannot be read ({reason})"
+def _pixels(stored: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return an image with its three colours last."""
+    pixels = np.moveaxis(stored, 0, -1) if _colours_first(stored.shape) else np.atleast_3d(stored)
+    return np.repeat(pixels, 3 // pixels.shape[-1], -1)
 
 
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
-    """Write episodes into an existing folder, as one dataset, and return the number of steps.
-
-    Neither Minari's own folder nor the network is used. The name of the dataset, `context.out`,
-    ends in a version.
-    """
+    """Write episodes into an existing folder, as one dataset, and return the number of steps."""
     name = context.out.name
     if not _NAME.fullmatch(name):
         better = re.sub(r"[^\w-]+", "-", name).strip("-") or "drive"
@@ -320,128 +362,131 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
             f"Minari loads a dataset by its name, which must end in a version: call it "
             f"{context.out.with_name(f'{better}-v0')}, not {context.out}."
         )
-    h5py = files.library("h5py")
-    header = episodes[0].header
-    rows = [iter(episode.rows) for episode in episodes]
-    first = next(rows[0])
-    rows[0] = chain((first,), rows[0])
-    space, picture = minari_spaces.space_of(header, first.jpeg, episodes[0].name)
-    storage = files.library(_STORAGE).MinariStorage.new(
+    header, rows = episodes[0].header, iter(episodes[0].rows)
+    first = next(rows)
+    space, picture = _space_of(header, first.jpeg, episodes[0].name)
+    episodes = [replace(episodes[0], rows=chain((first,), rows)), *episodes[1:]]
+    storage = library(_STORAGE).MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=space,
-        action_space=minari_spaces.box_of(header.action_layout),
+        action_space=_box(header.action_layout),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
-    with h5py.File(folder / _DATA / _MAIN, "a", track_order=True) as file:
-        for number, (episode, remaining) in enumerate(zip(episodes, rows, strict=True)):
+    with library("h5py").File(folder / _DATA / _MAIN, "a", track_order=True) as file:
+        for number, episode in enumerate(episodes):
             group = file.create_group(f"episode_{number}")
-            steps = _write_episode(group, episode, remaining, picture)
-            drivers.update(step.driver for step in steps)
-            group.attrs["id"] = number
-            group.attrs["total_steps"] = len(steps)
+            steps = _write_episode(group, episode, picture)
+            group.attrs.update({"id": number, "total_steps": len(steps)})
             if episode.header.seed is not None:
                 group.attrs["seed"] = episode.header.seed
+            drivers.update(step.driver for step in steps)
             total += len(steps)
-    counts = {"total_episodes": len(episodes), "total_steps": total}
-    about = _metadata(name, episodes, drivers) | counts | {"dataset_size": storage.get_size()}
-    storage.update_metadata(about)
-    return total
-
-
-def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str]) -> dict[str, Any]:
-    header = episodes[0].header
     plain = header.to_json()
-    found: dict[str, Any] = {
+    about: dict[str, Any] = {
         "dataset_id": name,
         "minari_version": version("minari"),
         "algorithm_name": ", ".join(sorted(drivers)),
-        "description": (
-            "Episodes recorded by Shapechanger, and exported without a change: images are JPEG "
-            "as recorded, numbers have 64 bits, the last observation of an episode is there twice."
-        ),
+        "description": _DESCRIPTION,
         "action_layout": plain["action_layout"],
         "observation_layout": plain["state_layout"],
         "control_hz": header.control_hz,
         _OURS: {"format": 1, "episodes": list(map(files.own_fields, episodes))},
+        "total_episodes": len(episodes),
+        "total_steps": total,
+        "dataset_size": storage.get_size(),
     }
     envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
     if header.env in gym.registry and all(env == envs[0] for env in envs):
         spec = copy.deepcopy(gym.spec(header.env))  # For Minari's `recover_environment`.
         spec.kwargs.update(header.env_kwargs)
-        found["env_spec"] = spec.to_json()
+        about["env_spec"] = spec.to_json()
     if people := {episode.header.driver for episode in episodes if episode.header.driver}:
-        found["author"] = people
-    return found
+        about["author"] = people
+    storage.update_metadata(about)
+    return total
 
 
-def _write_episode(
-    group: Any, episode: ExchangeEpisode, rows: Iterable[ExchangeStep], picture: spaces.Box | None
-) -> list[Step]:
+def _box(layout: str) -> spaces.Box:
+    """Return the space of the values of a layout, in 64 bits, so that nothing is rounded."""
+    named = Layout.from_json(layout)
+    return spaces.Box(named.low, named.high, dtype=np.float64)
+
+
+def _space_of(
+    header: EpisodeHeader, jpeg: bytes | None, name: str
+) -> tuple[spaces.Space[Any], spaces.Box | None]:
+    """Return the space of all observations by the first image, and its part of the images."""
+    found: dict[str, spaces.Space[Any]] = {}
+    picture, where = None, f"of the first step of {name}"
+    if jpeg is not None or header.image_size is not None:
+        width, height = header.image_size or picture_size(jpeg or b"", where)
+        grey = bool(jpeg) and is_grey(jpeg, where)
+        shape = (height, width) if grey else (height, width, 3)
+        found["image"] = picture = spaces.Box(0, 255, shape, np.uint8)
+    if header.state_layout:
+        found["state"] = _box(header.state_layout)
+    if not found:
+        raise DemosError(f"{name} has neither images nor a state: export it to csv.")
+    return spaces.Dict(found) if len(found) > 1 else next(iter(found.values())), picture
+
+
+def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | None) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
     The last observation is repeated. An episode without an end is truncated at its last step: a
     learner must not take the next episode for its continuation.
     """
-    header, steps, rests, frames = episode.header, list[Step](), list[str](), list[int]()
-    state_at, picture_at = _observed(picture is not None, bool(header.state_layout))
-    size, grey = None, False
-    observed: list[Any] = []  # The columns of the images; the last one is Minari's.
-    if picture is not None:
-        size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
-        as_jpeg = files.library(_STORAGE).is_image_space(picture)
-        blob = files.library("h5py").vlen_dtype(np.uint8)
-        kinds = {picture_at if as_jpeg else _JPEG: ((), blob)}
-        kinds |= {} if as_jpeg else {picture_at: (picture.shape, np.uint8)}
-        observed = [
-            group.create_dataset(
-                at, shape=(0, *shape), maxshape=(None, *shape), dtype=dtype, chunks=True
-            )
-            for at, (shape, dtype) in kinds.items()
-        ]
-    frame, shown = -1, np.empty(0)
+    h5py, header = library("h5py"), episode.header
+    steps, rests, frames = list[Step](), list[str](), list[int]()
+    both = picture is not None and bool(header.state_layout)
+    state_at, picture_at = (_OBSERVATIONS + at * both for at in ("/state", "/image"))
+
+    def column(name: str, dtype: Any, values: Sequence[Any] = (), shape: Sequence[int] = ()) -> Any:
+        now, most = (len(values), *shape), (None, *shape)
+        made = group.create_dataset(name, now, dtype, maxshape=most, chunks=True)
+        if values:
+            made[:] = values
+        return made
 
     def append(at: Any, value: Any) -> None:
         at.resize(len(at) + 1, axis=0)
         at[-1] = value
 
-    for row, jpeg, pixels in decoded_steps(rows, size, episode.name, "Minari"):
+    size, grey, frame, shown = None, False, -1, np.empty(0)
+    observed: list[Any] = []  # The columns of the images; the last one is Minari's.
+    if picture is not None:
+        size, grey = (picture.shape[1], picture.shape[0]), len(picture.shape) == 2
+        as_jpeg = library(_STORAGE).is_image_space(picture)
+        observed = [column(picture_at if as_jpeg else _JPEG, h5py.vlen_dtype(np.uint8))]
+        observed += [] if as_jpeg else [column(picture_at, np.uint8, shape=picture.shape)]
+    for row, jpeg, pixels in decoded_steps(episode.rows, size, episode.name, "Minari"):
         if pixels is not None:
             frame, shown = frame + 1, pixels[..., 0] if grey else pixels
             where = f"of step {len(steps)} of {episode.name}"
             if is_grey(jpeg, where) != grey:
-                kind = "coloured" if grey else "grey"
-                raise DemosError(
-                    f"The image {where} is {kind}, and the first one is not: a Minari dataset "
-                    "has images of one kind."
-                )
+                kinds = "not grey as the first one" if grey else "grey, and the first one is not"
+                raise DemosError(f"The image {where} is {kinds}: Minari needs images of one kind.")
         for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
             append(at, value)
         steps.append(row.step)
         rest = {n: v for n, v in row.step.to_json().items() if n not in _IN_COLUMNS}
         rests.append(json.dumps({"step": rest, "marks": row.marks, "dropped": row.dropped}))
         frames.append(frame)
-
-    def write(name: str, values: Sequence[Any], dtype: Any) -> None:
-        data = np.array(values, dtype)
-        shape = (None, *data.shape[1:])
-        group.create_dataset(name, data=data, dtype=dtype, maxshape=shape, chunks=True)
-
+    last = steps[-1]
+    cut = [*(step.truncated for step in steps[:-1]), last.truncated or not last.terminated]
+    rewards = [math.nan if step.reward is None else step.reward for step in steps]
+    column(_ACTION, np.float64, [step.action for step in steps], (header.action_size,))
+    column(_REWARD, np.float64, rewards)
+    column(_TERMINATED, np.bool_, [step.terminated for step in steps])
+    column(_TRUNCATED, np.bool_, cut)
+    column(_STEP, h5py.string_dtype("utf-8"), rests)
+    if header.state_layout:
+        states = [step.state for step in (*steps, last)]
+        column(state_at, np.float64, states, (header.state_size,))
     if picture is not None:
         append(observed[-1], observed[-1][-1])
-        write(_FRAME, frames, np.int64)
-    if header.state_layout:
-        write(state_at, [*(step.state for step in steps), steps[-1].state], np.float64)
-    write(_ACTION, [step.action for step in steps], np.float64)
-    write(_REWARD, [math.nan if s.reward is None else s.reward for s in steps], np.float64)
-    ended = steps[-1].terminated
-    write(_TERMINATED, [step.terminated for step in steps], np.bool_)
-    write(
-        _TRUNCATED,
-        [*(step.truncated for step in steps[:-1]), not ended or steps[-1].truncated],
-        np.bool_,
-    )
-    write(_STEP, rests, files.library("h5py").string_dtype("utf-8"))
+        column(_FRAME, np.int64, frames)
     return steps
 
 

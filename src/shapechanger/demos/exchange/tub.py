@@ -20,13 +20,15 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from itertools import chain
+from itertools import groupby
 from pathlib import Path, PurePath
-from typing import Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
+import msgspec
+from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
@@ -43,64 +45,187 @@ from shapechanger.demos.exchange.format import (
     name_in,
 )
 from shapechanger.demos.exchange.imports import SourceRecord
-from shapechanger.demos.exchange.tub_records import (
-    IMAGES,
-    LOOP_HZ,
-    MANIFEST,
-    NS_PER_MS,
-    NS_PER_S,
-    RECORD_NAME,
-    Fields,
-    in_ns,
-    numbered,
-    read_v1,
-    read_v2,
-)
-from shapechanger.errors import DemosError
+from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Layout
 
-_PICTURE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
+_MANIFEST: Final = "manifest.json"
+_IMAGES: Final = "images"
+_LOOP_HZ: Final = "DRIVE_LOOP_HZ"  # Donkeycar's name of the rate.
+_RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
+_IMAGE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 _ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
 _USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
 _IMAGE, _MODE = name_in("tub", "frame"), name_in("tub", "driver")
-_PERSON_DRIVES: Final = "user"
 _CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
+_NS_PER_MS: Final = 1_000_000
+_NS_PER_S: Final = 1_000_000_000
 _NUMBERS: Final = ("float", "int", "boolean")
-_KINDS: Final[dict[type[object], str]] = {str: "str", bool: "boolean", int: "float", float: "float"}
 _PICTURES: Final = ("image_array", "image")
 _DEPTH: Final = "gray16_array"
-_KNOWN: Final = (*_NUMBERS, *_PICTURES, _DEPTH, "str", "list", "vector", "nparray")
-_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".bmp")
+
+Fields = dict[str, Any]
+Axis = Annotated[float, Meta(ge=-1.0, le=1.0)] | None
+_IN_TIME: Final = Meta(gt=-2 * 10**12, lt=2 * 10**12)
+Time = Annotated[int, _IN_TIME] | Annotated[float, _IN_TIME] | None
+
+
+class _Record(Struct):
+    """The columns that mean the same in all tubs."""
+
+    time_ms: Time = field(default=None, name="_timestamp_ms")
+    mode: str = field(default="user", name=_MODE)
+    user_angle: Axis = field(default=None, name=_USER[0])
+    user_throttle: Axis = field(default=None, name=_USER[1])
+    pilot_angle: Axis = field(default=None, name=_PILOT[0])
+    pilot_throttle: Axis = field(default=None, name=_PILOT[1])
+
+
+class _Catalogs(Struct):
+    """The last line of a manifest."""
+
+    paths: list[str]
+    deleted_indexes: list[int] = []
+    current_index: int = 0
+
+
+class _Meta(Struct):
+    """The `meta.json` of version 1."""
+
+    inputs: list[str] = []
+    types: list[str] = []
+    start: float | None = None  # Unix time, s.
+    loop_hz: Any = field(default=None, name=_LOOP_HZ)
+
+
+class _Tub(NamedTuple):
+    inputs: list[str]
+    types: list[str]
+    records: list[Fields]  # Each with a number as `_index`, which no other one has.
+    deleted: list[int]
+    stated_hz: Any
+    is_unix: bool = True  # Otherwise times begin at 0 with each start of the car.
+
+
+def _is_v2(folder: Path) -> bool:
+    return (folder / _MANIFEST).is_file()
+
+
+def _numbered(folder: Path) -> list[tuple[int, str]]:
+    """Return the numbers and files of the records of version 1."""
+    with translate_errors(OSError, to=lambda error: files.cannot_read(folder, error)):
+        names = [child.name for child in folder.iterdir()]
+    return sorted((int(m[1]), m[0]) for m in map(_RECORD_NAME.fullmatch, names) if m)
+
+
+def _decoded(text: bytes, kind: Any, where: object) -> Any:
+    try:
+        return msgspec.convert(json.loads(text), kind)
+    except (ValueError, RecursionError, msgspec.ValidationError) as error:
+        raise DemosError(f"{where} is damaged: {error}.") from error
+
+
+def _read_v2(folder: Path, context: ImportContext) -> _Tub:
+    path = folder / _MANIFEST
+    lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
+    kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
+    decoded = [_decoded(line, kind, path) for line, kind in zip(lines, kinds, strict=True)]
+    catalogs: _Catalogs = decoded[4]
+    if len(set(catalogs.paths)) < len(catalogs.paths):
+        context.warn(f"{path} names a catalog twice in its paths: it is read once.")
+    found: dict[int, list[Fields]] = {}
+    for name in dict.fromkeys(catalogs.paths):
+        try:
+            lines = files.read_bytes(files.inside(folder, name, path)).split(b"\n")
+        except DemosError as error:
+            context.leave_out("catalog", imports.unreadable(error), name)
+            continue
+        for number, line in enumerate(lines, 1):
+            try:
+                if line.strip():
+                    fields: Fields = _decoded(line, Fields, name)
+                    found.setdefault(msgspec.convert(fields["_index"], int), []).append(fields)
+            except (DemosError, LookupError, msgspec.ValidationError):
+                reason = "that is damaged or without a valid _index"
+                context.leave_out("line", reason, f"{name}, line {number}")
+    numbers = sorted(found)
+    if numbers != list(found):
+        context.warn("The _index does not always rise: the records are read in its order.")
+    last = max([*numbers, catalogs.current_index - 1])
+    if (missing := last + 1 - len(numbers)) > 0:
+        context.note(f"{missing} of the records 0 to {last} are in no catalog.")
+    if strange := [number for number in catalogs.deleted_indexes if number > last]:
+        context.warn(f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}.")
+    for number, same in found.items():
+        for _ in same if len(same) > 1 else ():
+            context.leave_out("record", "with the _index of another record", number)
+    records = [found[number][0] for number in numbers if len(found[number]) == 1]
+    inputs, types, metadata = decoded[:3]
+    stated_hz = dict(metadata).get(_LOOP_HZ)  # A tub without any has an empty list.
+    return _Tub(inputs, types, records, catalogs.deleted_indexes, stated_hz)
+
+
+def _read_v1(folder: Path, context: ImportContext) -> _Tub:
+    """Read a file for each record; without Unix times, each start of the car is a session."""
+    path, exclude = folder / "meta.json", folder / "exclude.json"
+    meta, deleted = _Meta(), list[int]()
+    if path.is_file():
+        meta = _decoded(files.read_bytes(path), _Meta, path)
+    if exclude.is_file():
+        deleted = _decoded(files.read_bytes(exclude), list[int], exclude)
+    starts, before_ms, records = 1, 0.0, list[Fields]()
+    for number, name in _numbered(folder):
+        text = files.read_bytes(files.inside(folder, name, folder))
+        try:
+            fields: Fields = _decoded(text, Fields, name)
+        except DemosError:
+            if number not in deleted:
+                context.leave_out("record", "that is damaged", number)
+            continue
+        time_ms = fields.pop("milliseconds", None)
+        if isinstance(time_ms, int | float):
+            starts, before_ms = starts + (time_ms < before_ms), time_ms
+            time_ms += 1e3 * (meta.start or 0.0)
+        session = f"start {starts}" if meta.start is None else ""
+        more = {"_index": number, "_timestamp_ms": time_ms, "_session_id": session}
+        records.append(fields | more)
+    is_unix = meta.start is not None
+    return _Tub(meta.inputs, meta.types, records, deleted, meta.loop_hz, is_unix)
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
-    tub = (read_v2 if (folder / MANIFEST).is_file() else read_v1)(folder, context)
-    if tub.deleted:
-        context.note(f"{counted(tub.deleted, 'record')} deleted in the tub, and not imported.")
-    columns: dict[str, str] = {}  # The type of each that a record has, declared or by its values.
-    for name, value in chain.from_iterable(fields.items() for fields in tub.records):
-        if not name.startswith("_") and columns.get(name) not in _KNOWN:
-            declared = tub.inputs.get(name, "")
-            columns[name] = declared if declared in _KNOWN else _kind_of(value)
-    camera = _camera(columns, folder, context) if tub.records else ""
-    sensed = [
-        name
-        for name, kind in (tub.inputs or columns).items()
-        if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
-    ]
-    taken = {"", camera, _MODE, *sensed, *_USER, *_PILOT}
-    if left := [f"{name} ({kind})" for name, kind in columns.items() if name not in taken]:
-        context.note(f"Columns that are not imported: {', '.join(left)}.")
-    records = [_record(fields, sensed, camera, context) for fields in tub.records]
+    tub = (_read_v2 if _is_v2(folder) else _read_v1)(folder, context)
+    if len(tub.inputs) != len(tub.types):
+        raise DemosError(f"{folder} has {len(tub.inputs)} inputs, but {len(tub.types)} types.")
+    types, deleted = dict(zip(tub.inputs, tub.types, strict=True)), set(tub.deleted)
+    kept = [fields for fields in tub.records if fields["_index"] not in deleted]
+    if gone := len(tub.records) - len(kept):
+        context.note(f"{counted(gone, 'record')} deleted in the tub, and not imported.")
+    there = {name: types.get(name, "?") for fields in kept for name in fields}
+    cameras = [name for name, kind in there.items() if kind in _PICTURES or name == _IMAGE]
+    camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
+    camera = camera or imports.choose_camera(folder, cameras, context)
+    if not camera and _DEPTH in there.values():
+        context.warn("The steps have no images, because those of 16 bits are not imported.")
+    numeric = [name for name, kind in types.items() if name and kind in _NUMBERS]
+    sensed = [name for name in numeric if not name.startswith(("user/", "pilot/", "_"))]
+    taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
+    if left := [n for n in there if n not in taken and not n.startswith("_")]:
+        named = ", ".join(f"{name} ({there[name]})" for name in left)
+        context.note(f"Columns that are not imported: {named}.")
+    records = [_record(fields, sensed, camera) for fields in kept]
     if camera:
-        _find_pictures(records, tub.images, context)
+        _find_pictures(records, folder / _IMAGES if _is_v2(folder) else folder, context)
     records, size = imports.with_pictures(records, "record", context)
-    sessions = {fields["_index"]: str(fields.get("_session_id", "")) for fields in tub.records}
-    parts = _parts(records, sessions, restarts=not tub.is_unix)
+    sessions = {fields["_index"]: str(fields.get("_session_id", "")) for fields in kept}
+    parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
     states = [feature for name in sensed for feature in imports.features_of(name, 1)]
-    for part, hz, timed in imports.stretches(parts, "record", context, tub.stated_hz):
-        began_ns = part[0].step.captured_ns if timed and tub.is_unix else tub.start_ns
+    stated_hz = _stated(tub.stated_hz)
+    for part, hz, timed in imports.stretches(parts, "record", context, stated_hz):
+        began = ""
+        if timed and tub.is_unix and (began_ns := part[0].step.captured_ns) is not None:
+            at = datetime.fromtimestamp(began_ns / _NS_PER_S, UTC)
+            began = at.isoformat(timespec="milliseconds")
         for record in part:
             wall_ns = record.step.captured_ns if tub.is_unix else None
             record.step = replace(record.step, wall_ns=wall_ns)
@@ -114,80 +239,45 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             clock="real" if timed else "none",
             source="tub",
             notes={"session": session} if session else {},
-            created=_iso_time(began_ns) if began_ns else "",
+            created=began,
         )
         name = f"{folder}, from record {part[0].name}"
         rows = imports.rows_of(part, size, context, "record")
         yield ExchangeEpisode(header=header, rows=rows, name=name)
 
 
-def _kind_of(value: object) -> str:
-    kind = _KINDS.get(type(value), "list")
-    is_picture = kind == "str" and str(value).lower().endswith(_ENDINGS)
-    return _PICTURES[0] if is_picture else kind
-
-
-def _iso_time(unix_ns: int) -> str:
-    """Return a Unix time as ISO 8601 in UTC; "" if it is beyond the calendar."""
-    with suppress(OverflowError, ValueError, OSError):
-        return datetime.fromtimestamp(unix_ns / NS_PER_S, UTC).isoformat(timespec="milliseconds")
-    return ""
-
-
-def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
-    """Return the column of the images; "" without images."""
-    cameras = [name for name, kind in columns.items() if kind in _PICTURES]
-    deep = [name for name, kind in columns.items() if kind == _DEPTH]
-    if deep and not cameras and not context.camera:
-        context.warn(
-            f"The steps have no images, because those of {few(deep)} have 16 bits, as of depth, "
-            "and only images of 8 bits can be imported."
-        )
-    if _IMAGE in cameras and not context.camera:
-        return _IMAGE
-    camera = imports.choose_camera(folder, cameras, context)
-    if camera not in {_IMAGE, context.camera}:
-        context.note(f"The images come from the column {camera}.")
-    return camera
-
-
-def _record(
-    fields: Fields, sensed: Sequence[str], camera: str, context: ImportContext
-) -> SourceRecord:
-    """Return a record; it has a fault if it has no valid action."""
-    mode = fields.get(_MODE, _PERSON_DRIVES)
-    by_person = mode == _PERSON_DRIVES
-    names = _USER if by_person else _PILOT
-    if mode == "local_angle":
-        names = [_PILOT[0], _USER[1]]
-    action, wanted, fault = _pair(fields, names), None, ""
-    if lacking := [name for name in names if fields.get(name) is None]:
-        driver = "" if by_person else ", although a pilot drove"
-        fault = f"without {' and '.join(lacking)}{driver}"
-    elif action is None:
-        fault = f"with {' or '.join(names)} that is not a number from -1 to 1"
-    elif by_person:
-        wanted = _pair(fields, _PILOT)
-        if wanted is None and None not in map(fields.get, _PILOT):
-            reason = "of the pilot that is not a number from -1 to 1, while a person drove"
-            context.leave_out("suggestion", reason, fields["_index"])
-    step = Step(
-        action=action or (0.0, 0.0),
-        driver="person" if by_person else "policy",
-        wanted=wanted,
-        state=tuple(_sensed(fields.get(name)) for name in sensed),
-        captured_ns=in_ns(fields.get("_timestamp_ms"), NS_PER_MS),
-    )
-    number, frame = fields["_index"], fields.get(camera)
-    return SourceRecord(name=str(number), number=number, step=step, frame=frame, fault=fault)
-
-
-def _pair(fields: Fields, names: Sequence[str]) -> tuple[float, float] | None:
-    """Return two numbers from -1 to 1; None for anything else."""
-    values: list[Any] = [fields.get(name) for name in names]
-    if all(type(value) in {int, float} and abs(value) <= 1.0 for value in values):
-        return float(values[0]), float(values[1])
+def _stated(rate: Any) -> float | None:
+    """Return a rate in Hz; None for anything that is not one."""
+    with suppress(TypeError, ValueError, OverflowError):
+        return hz if 0.0 < (hz := float(rate)) < math.inf else None
     return None
+
+
+def _record(fields: Fields, sensed: Sequence[str], camera: str) -> SourceRecord:
+    """Return a record; it has a fault if it has no valid action."""
+    known, fault = _Record(), ""
+    try:
+        known = msgspec.convert(fields, _Record)
+    except msgspec.ValidationError as error:
+        fault = f"with an invalid value ({error})"
+    pilot = (known.pilot_angle, known.pilot_throttle)
+    action = {
+        "user": (known.user_angle, known.user_throttle),
+        "local_angle": (known.pilot_angle, known.user_throttle),
+    }.get(known.mode, pilot)
+    by_person = known.mode == "user"
+    if None in action:
+        fault = fault or f"without an action in the mode {known.mode!r}"
+    step = Step(
+        action=(action[0] or 0.0, action[1] or 0.0),
+        driver="person" if by_person else "policy",
+        wanted=(pilot[0] or 0.0, pilot[1] or 0.0) if by_person and None not in pilot else None,
+        state=tuple(_sensed(fields.get(name)) for name in sensed),
+        captured_ns=None if known.time_ms is None else round(known.time_ms * _NS_PER_MS),
+    )
+    number = fields["_index"]
+    frame = fields.get(camera)
+    return SourceRecord(name=str(number), number=number, step=step, frame=frame, fault=fault)
 
 
 def _sensed(value: Any) -> float:
@@ -200,7 +290,7 @@ def _sensed(value: Any) -> float:
 def _find_pictures(records: Sequence[SourceRecord], images: Path, context: ImportContext) -> None:
     """Find the image of each record by its name, the `frame`; others get a fault."""
     shown = Counter(str(record.frame) for record in records if not record.fault)
-    offsets: dict[int, int] = {}
+    others: list[int] = []
     for record in records:
         name = record.frame
         if record.fault:
@@ -215,30 +305,11 @@ def _find_pictures(records: Sequence[SourceRecord], images: Path, context: Impor
             record.fault = "with an image name that leaves the folder"
         elif shown[name] > 1 and record.picture.is_file():
             record.fault = "with the image of another record"
-        elif (match := _PICTURE_NUMBER.match(name)) and int(match[1]) != record.number:
-            offsets[record.number] = int(match[1]) - record.number
-    if offsets:
-        context.warn(
-            f"{counted(len(offsets), 'record')} with the image of another number, up to "
-            f"{max(map(abs, offsets.values()))} off ({few(list(offsets))}): look whether they "
-            "belong together."
-        )
-
-
-def _parts(
-    records: Sequence[SourceRecord], sessions: Mapping[int, str], *, restarts: bool
-) -> list[list[SourceRecord]]:
-    """Return the records of each session, and of each start of the car if times restart with it."""
-    parts: list[list[SourceRecord]] = []
-    for record in records:
-        before = parts[-1][-1] if parts else None
-        was_ns, now_ns = before and before.step.captured_ns, record.step.captured_ns
-        falls = was_ns is not None and now_ns is not None and now_ns < was_ns
-        new = before is None or sessions[before.number] != sessions[record.number]
-        if new or (restarts and falls):
-            parts.append([])
-        parts[-1].append(record)
-    return parts
+        elif (match := _IMAGE_NUMBER.match(name)) and int(match[1]) != record.number:
+            others.append(record.number)
+    if others:
+        what = counted(len(others), "record")
+        context.warn(f"{what} with the image of another number: {few(others)}.")
 
 
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
@@ -246,49 +317,55 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
     Actions of people, experts and programs become the user's, those of policies the pilot's.
     """
-    states = [_state_names(episode) for episode in episodes]
-    if any(state != states[0] for state in states):
+    states = {_state_names(episode) for episode in episodes}
+    if len(states) > 1:
         raise DemosError("The episodes have different states: export each kind to its own tub.")
-    (folder / IMAGES).mkdir()
+    (state,) = states
+    (folder / _IMAGES).mkdir()
     records: list[Fields] = []
     began = [_began(episode.header) for episode in episodes]
     sessions = [f"{at:%y-%m-%d}_{number}" for number, at in enumerate(began)]
     for episode, at, session in zip(episodes, began, sessions, strict=True):
-        for step, jpeg, time_ns in _timed(episode, round(at.timestamp() * NS_PER_S)):
+        for step, jpeg, time_ns in _timed(episode, round(at.timestamp() * _NS_PER_S)):
+            index, fields = len(records), _fields(step, state, episode.name)
             if jpeg is None:
                 raise DemosError(f"A step of {episode.name} has no image: export it to csv.")
-            name = f"{len(records)}_cam_image_array_.jpg"
-            (folder / IMAGES / name).write_bytes(jpeg)
-            fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
-            fields |= {_IMAGE: name, "_session_id": session, "_index": len(records)}
-            records.append(fields | {"_timestamp_ms": round(time_ns / NS_PER_MS)})
+            name = f"{index}_cam_image_array_.jpg"
+            (folder / _IMAGES / name).write_bytes(jpeg)
+            fields |= {_IMAGE: name, "_session_id": session, "_index": index}
+            records.append(fields | {"_timestamp_ms": round(time_ns / _NS_PER_MS)})
     created_s = began[0].timestamp()
-    inputs = {_IMAGE: "image_array", _MODE: "str"}
-    inputs |= dict.fromkeys((*_USER, *_PILOT, *states[0]), "float")
-    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
+    paths: list[str] = []
+    for start in range(0, len(records), _CATALOG_LENGTH):
+        part = records[start : start + _CATALOG_LENGTH]
+        lines = [json.dumps(one, allow_nan=False, sort_keys=True) + "\n" for one in part]
+        paths.append(f"catalog_{len(paths)}.catalog")
+        (folder / paths[-1]).write_text("".join(lines), encoding="utf-8", newline="\n")
+        lengths = {"line_lengths": list(map(len, lines)), "created_at": created_s}
+        kept = lengths | {"path": f"{paths[-1]}_manifest", "start_index": start}
+        (folder / f"{paths[-1]}_manifest").write_text(json.dumps(kept) + "\n")
+    types = {_IMAGE: "image_array", _MODE: "str"}
+    types |= dict.fromkeys((*_USER, *_PILOT, *state), "float")
     rates = {episode.header.control_hz for episode in episodes}
-    catalogs: Fields = {"paths": _write_catalogs(folder, records, created_s)}
-    catalogs |= {"current_index": len(records), "max_len": _CATALOG_LENGTH, "deleted_indexes": []}
-    metadata = {LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {}
+    metadata = {_LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {}
+    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
+    catalogs = {"paths": paths, "current_index": len(records), "max_len": _CATALOG_LENGTH}
     more = {"created_at": created_s, "sessions": named}
-    lines = (list(inputs), list(inputs.values()), metadata, more, catalogs)
-    _write_lines(folder / MANIFEST, [json.dumps(line) for line in lines])
+    ends = (list(types), list(types.values()), metadata, more, catalogs | {"deleted_indexes": []})
+    (folder / _MANIFEST).write_text("".join(json.dumps(line) + "\n" for line in ends))
     return len(records)
 
 
 def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
-    names = Layout.from_json(episode.header.action_layout).names
-    if names != _ACTIONS.names:
+    header = episode.header
+    action = Layout.from_json(header.action_layout)
+    state = Layout.from_json(header.state_layout) if header.state_layout else None
+    if action.names != _ACTIONS.names or (state and state.size != len(state)):
         raise DemosError(
-            f"The actions of {episode.name} are {', '.join(names)}, but those of a tub are "
-            f"{', '.join(_ACTIONS.names)}: export it to minari or csv."
+            f"{episode.name} has the action {', '.join(action.names)}, or a state with arrays, but "
+            f"a tub {', '.join(_ACTIONS.names)} and single numbers: export it to minari or csv."
         )
-    if not episode.header.state_layout:
-        return ()
-    state = Layout.from_json(episode.header.state_layout)
-    if state.size != len(state):
-        raise DemosError(f"The state of {episode.name} has array features: export it to csv.")
-    return state.names
+    return state.names if state else ()
 
 
 def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
@@ -297,8 +374,7 @@ def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
         raise DemosError(f"{where}: the action {list(step.action)} is not from -1 to 1.")
     # A tub always contains the user's action; while a policy drives, it is 0.
     user, pilot = ((0.0, 0.0), step.action) if by_policy else (step.action, step.wanted)
-    fields: Fields = {_MODE: "local" if by_policy else _PERSON_DRIVES}
-    fields |= dict(zip(_USER, user, strict=True))
+    fields: Fields = {_MODE: "local" if by_policy else "user"} | dict(zip(_USER, user, strict=True))
     if pilot is not None and all(abs(value) <= 1.0 for value in pilot):
         fields |= dict(zip(_PILOT, pilot, strict=True))
     known = zip(state, step.state, strict=True)
@@ -321,42 +397,22 @@ def _timed(episode: ExchangeEpisode, began_ns: int) -> Iterator[tuple[Step, byte
         if is_simulated:
             at_ns = None if clock_ns is None else began_ns + clock_ns - (first_ns or 0)
         if at_ns is None or (last_ns is not None and at_ns <= last_ns):
-            at_ns = began_ns if last_ns is None else last_ns + round(NS_PER_S / header.control_hz)
+            at_ns = began_ns if last_ns is None else last_ns + round(_NS_PER_S / header.control_hz)
         last_ns = at_ns
         yield step, jpeg, at_ns
 
 
 def _began(header: EpisodeHeader) -> datetime:
-    try:
+    with suppress(ValueError):
         return datetime.fromisoformat(header.created)
-    except ValueError:
-        return datetime.fromtimestamp(0.0, UTC)
-
-
-def _write_catalogs(folder: Path, records: Sequence[Fields], created_s: float) -> list[str]:
-    """Write the catalogs, each with its manifest; return the names of the catalogs."""
-    paths: list[str] = []
-    for number, start in enumerate(range(0, len(records), _CATALOG_LENGTH)):
-        part = records[start : start + _CATALOG_LENGTH]
-        lines = [json.dumps(record, allow_nan=False, sort_keys=True) for record in part]
-        name = f"catalog_{number}.catalog"
-        paths.append(name)
-        _write_lines(folder / name, lines)
-        kept: Fields = {"created_at": created_s, "path": f"{name}_manifest", "start_index": start}
-        kept["line_lengths"] = [len(line) + 1 for line in lines]
-        _write_lines(folder / f"{name}_manifest", [json.dumps(kept, sort_keys=True)])
-    return paths
-
-
-def _write_lines(path: Path, lines: Sequence[str]) -> None:
-    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+    return datetime.fromtimestamp(0.0, UTC)
 
 
 FORMAT: Final = Format(
     name="tub",
     title="Donkeycar",
-    sign=f"{MANIFEST} or record_0.json",
-    detect=lambda path: (path / MANIFEST).is_file() or bool(numbered(path, RECORD_NAME)),
+    sign=f"{_MANIFEST} or record_0.json",
+    detect=lambda folder: _is_v2(folder) or bool(_numbered(folder)),
     read=_read,
     write=_write,
     options=frozenset({"camera", "hz"}),
