@@ -41,7 +41,7 @@ def test_a_partial_import_has_an_exit_code_of_its_own(
     assert ended.value.code == 3
     output = capsys.readouterr()
     assert "1 episode, 26 steps, 26 images" in output.out
-    assert "note: Columns that are not imported: lap (float).\n" in output.out
+    assert "note: Columns that are not imported: lap.\n" in output.out
     assert "which is taken to be 20 Hz; --hz states another rate.\n" in output.out
     assert output.err == "left out 4 records with an empty image: 3, 5, 8, and 1 more\n"
     with pytest.raises(SystemExit) as ended:

@@ -92,7 +92,7 @@ class _Parts:
 
 
 def _data_folder(folder: Path) -> Path | None:
-    """Return the folder with the files of a dataset: `data`, or `folder` itself; None for none."""
+    """Return the folder with the files of a dataset, `data` or `folder` itself; None for none."""
     return next((p for p in (folder / _DATA, folder) if (p / _METADATA).is_file()), None)
 
 

@@ -25,7 +25,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path, PurePath
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 
 import msgspec
 from msgspec import Meta, Struct, field
@@ -65,7 +65,8 @@ _DEPTH: Final = "gray16_array"
 
 Fields = dict[str, Any]
 Axis = Annotated[float, Meta(ge=-1.0, le=1.0)] | None
-_IN_TIME: Final = Meta(gt=-2 * 10**12, lt=2 * 10**12)
+_MAX_MS: Final = 2 * 10**12
+_IN_TIME: Final = Meta(gt=-_MAX_MS, lt=_MAX_MS)
 Time = Annotated[int, _IN_TIME] | Annotated[float, _IN_TIME] | None
 
 
@@ -88,21 +89,15 @@ class _Catalogs(Struct):
     current_index: int = 0
 
 
-class _Meta(Struct):
-    """The `meta.json` of version 1."""
+class _Tub(Struct):
+    """A tub; the fields with names of Donkeycar are those of `meta.json` of version 1."""
 
     inputs: list[str] = []
     types: list[str] = []
     start: float | None = None  # Unix time, s.
-    loop_hz: Any = field(default=None, name=_LOOP_HZ)
-
-
-class _Tub(NamedTuple):
-    inputs: list[str]
-    types: list[str]
-    records: list[Fields]  # Each with a number as `_index`, which no other one has.
-    deleted: list[int]
-    stated_hz: Any
+    rate: Any = field(default=None, name=_LOOP_HZ)
+    records: list[Fields] = []  # Each with a number as `_index`, which no other one has.
+    deleted: list[int] = []
     is_unix: bool = True  # Otherwise times begin at 0 with each start of the car.
 
 
@@ -158,38 +153,40 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
     for number, same in found.items():
         for _ in same if len(same) > 1 else ():
             context.leave_out("record", "with the _index of another record", number)
-    records = [found[number][0] for number in numbers if len(found[number]) == 1]
-    inputs, types, metadata = decoded[:3]
-    stated_hz = dict(metadata).get(_LOOP_HZ)  # A tub without any has an empty list.
-    return _Tub(inputs, types, records, catalogs.deleted_indexes, stated_hz)
+    return _Tub(
+        inputs=decoded[0],
+        types=decoded[1],
+        rate=dict(decoded[2]).get(_LOOP_HZ),
+        records=[found[number][0] for number in numbers if len(found[number]) == 1],
+        deleted=catalogs.deleted_indexes,
+    )
 
 
 def _read_v1(folder: Path, context: ImportContext) -> _Tub:
     """Read a file for each record; without Unix times, each start of the car is a session."""
     path, exclude = folder / "meta.json", folder / "exclude.json"
-    meta, deleted = _Meta(), list[int]()
-    if path.is_file():
-        meta = _decoded(files.read_bytes(path), _Meta, path)
+    tub = _decoded(files.read_bytes(path), _Tub, path) if path.is_file() else _Tub()
+    gone: list[int] = []
     if exclude.is_file():
-        deleted = _decoded(files.read_bytes(exclude), list[int], exclude)
-    starts, before_ms, records = 1, 0.0, list[Fields]()
+        gone = _decoded(files.read_bytes(exclude), list[int], exclude)
+    tub.deleted, tub.records, tub.is_unix = gone, [], tub.start is not None
+    starts, before_ms = 1, 0.0
     for number, name in _numbered(folder):
         text = files.read_bytes(files.inside(folder, name, folder))
         try:
             fields: Fields = _decoded(text, Fields, name)
         except DemosError:
-            if number not in deleted:
+            if number not in tub.deleted:
                 context.leave_out("record", "that is damaged", number)
             continue
         time_ms = fields.pop("milliseconds", None)
-        if isinstance(time_ms, int | float):
+        if type(time_ms) in {int, float} and abs(time_ms) < _MAX_MS:
             starts, before_ms = starts + (time_ms < before_ms), time_ms
-            time_ms += 1e3 * (meta.start or 0.0)
-        session = f"start {starts}" if meta.start is None else ""
+            time_ms += 1e3 * (tub.start or 0.0)
+        session = "" if tub.is_unix else f"start {starts}"
         more = {"_index": number, "_timestamp_ms": time_ms, "_session_id": session}
-        records.append(fields | more)
-    is_unix = meta.start is not None
-    return _Tub(meta.inputs, meta.types, records, deleted, meta.loop_hz, is_unix)
+        tub.records.append(fields | more)
+    return tub
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
@@ -201,18 +198,17 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     kept = [fields for fields in tub.records if fields["_index"] not in deleted]
     if gone := len(tub.records) - len(kept):
         context.note(f"{counted(gone, 'record')} deleted in the tub, and not imported.")
-    there = {name: types.get(name, "?") for fields in kept for name in fields}
-    cameras = [name for name, kind in there.items() if kind in _PICTURES or name == _IMAGE]
+    there = list(dict.fromkeys(name for fields in kept for name in fields))
+    cameras = [name for name in there if types.get(name) in _PICTURES or name == _IMAGE]
     camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
     camera = camera or imports.choose_camera(folder, cameras, context)
-    if not camera and _DEPTH in there.values():
+    if not camera and _DEPTH in map(types.get, there):
         context.warn("The steps have no images, because those of 16 bits are not imported.")
     numeric = [name for name, kind in types.items() if name and kind in _NUMBERS]
     sensed = [name for name in numeric if not name.startswith(("user/", "pilot/", "_"))]
     taken = {camera, _MODE, *sensed, *_USER, *_PILOT}
     if left := [n for n in there if n not in taken and not n.startswith("_")]:
-        named = ", ".join(f"{name} ({there[name]})" for name in left)
-        context.note(f"Columns that are not imported: {named}.")
+        context.note(f"Columns that are not imported: {', '.join(left)}.")
     records = [_record(fields, sensed, camera) for fields in kept]
     if camera:
         _find_pictures(records, folder / _IMAGES if _is_v2(folder) else folder, context)
@@ -220,15 +216,15 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     sessions = {fields["_index"]: str(fields.get("_session_id", "")) for fields in kept}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
     states = [feature for name in sensed for feature in imports.features_of(name, 1)]
-    stated_hz = _stated(tub.stated_hz)
+    rate = _float(tub.rate)
+    stated_hz = rate if 0.0 < rate < math.inf else None
     for part, hz, timed in imports.stretches(parts, "record", context, stated_hz):
-        began = ""
-        if timed and tub.is_unix and (began_ns := part[0].step.captured_ns) is not None:
-            at = datetime.fromtimestamp(began_ns / _NS_PER_S, UTC)
-            began = at.isoformat(timespec="milliseconds")
-        for record in part:
-            wall_ns = record.step.captured_ns if tub.is_unix else None
-            record.step = replace(record.step, wall_ns=wall_ns)
+        created = ""
+        if tub.is_unix and timed:
+            for record in part:
+                record.step = replace(record.step, wall_ns=record.step.captured_ns)
+            at = datetime.fromtimestamp((part[0].step.wall_ns or 0) / _NS_PER_S, UTC)
+            created = at.isoformat(timespec="milliseconds")
         session = sessions[part[0].number]
         header = EpisodeHeader(
             action_layout=_ACTIONS.to_json(),
@@ -239,18 +235,18 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             clock="real" if timed else "none",
             source="tub",
             notes={"session": session} if session else {},
-            created=began,
+            created=created,
         )
         name = f"{folder}, from record {part[0].name}"
         rows = imports.rows_of(part, size, context, "record")
         yield ExchangeEpisode(header=header, rows=rows, name=name)
 
 
-def _stated(rate: Any) -> float | None:
-    """Return a rate in Hz; None for anything that is not one."""
+def _float(value: Any) -> float:
+    """Return a number; NaN for anything else, also for one that is too large."""
     with suppress(TypeError, ValueError, OverflowError):
-        return hz if 0.0 < (hz := float(rate)) < math.inf else None
-    return None
+        return float(value)
+    return math.nan
 
 
 def _record(fields: Fields, sensed: Sequence[str], camera: str) -> SourceRecord:
@@ -272,19 +268,12 @@ def _record(fields: Fields, sensed: Sequence[str], camera: str) -> SourceRecord:
         action=(action[0] or 0.0, action[1] or 0.0),
         driver="person" if by_person else "policy",
         wanted=(pilot[0] or 0.0, pilot[1] or 0.0) if by_person and None not in pilot else None,
-        state=tuple(_sensed(fields.get(name)) for name in sensed),
+        state=tuple(_float(fields.get(name)) for name in sensed),
         captured_ns=None if known.time_ms is None else round(known.time_ms * _NS_PER_MS),
     )
     number = fields["_index"]
     frame = fields.get(camera)
     return SourceRecord(name=str(number), number=number, step=step, frame=frame, fault=fault)
-
-
-def _sensed(value: Any) -> float:
-    """Return a sensor value; NaN for anything that is not a number."""
-    with suppress(OverflowError):  # An integer of hundreds of digits.
-        return float(value) if isinstance(value, bool | int | float) else math.nan
-    return math.nan
 
 
 def _find_pictures(records: Sequence[SourceRecord], images: Path, context: ImportContext) -> None:
