@@ -190,6 +190,11 @@ def _leads_away(file: h5py.File) -> None:
     file["episode_0/actions"] = h5py.ExternalLink("other.hdf5", "x")
 
 
+def _frameless(file: h5py.File) -> None:
+    del file["episode_0/infos/frame"]
+    file["episode_0/infos/frame"] = ["x"] * 5
+
+
 def _short(file: h5py.File) -> None:
     file["episode_0/actions"].resize(2, axis=0)
 
@@ -215,6 +220,7 @@ def _with_rest(text: str) -> Callable[[Path], None]:
         (_edit("data/metadata.json", lambda b: b[:3000]), "is not valid JSON"),
         (_edit("data/metadata.json", lambda b: b.replace(b'"hdf5"', b'"arrow"')), "'arrow'"),
         (_in_file(lambda f: f.__delitem__("episode_0/rewards")), "has no 'rewards'"),
+        (_in_file(_frameless), "infos/step of step 0 of episode_0 is damaged: "),
         (_in_file(_leads_away), "has no 'actions' that is an array in this file"),
         (_edit("data/main_data.hdf5", lambda b: b.replace(b"SNOD", b"XXXX")), "not an intact"),
         (_in_file(_short), "has 2 entries for 5 steps"),

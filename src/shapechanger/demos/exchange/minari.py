@@ -193,9 +193,8 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         name = f"{main}, episode_{number}"
         yield ExchangeEpisode(header=parts.header, rows=rows, name=name, outcome=outcome)
     with _opened(main) as file:
-        groups = sum(name.startswith("episode_") for name in file)
-    if groups != count:
-        context.warn(f"total_episodes is {count}, and {main.name} has {groups} episodes.")
+        if (groups := sum(name.startswith("episode_") for name in file)) != count:
+            context.warn(f"total_episodes is {count}, and {main.name} has {groups} episodes.")
     if others:
         context.note(f"The infos are not imported: {few(sorted(others))}.")
 
@@ -324,22 +323,22 @@ def _records(main: Path, number: int, parts: _Parts) -> Iterator[SourceRecord]:
                 row = {name: values[n] for name, values in part.items()}
                 fields = {"driver": "expert", "truncated": bool(row[_TRUNCATED])}
                 rest = _Rest(step=fields, marks=(), dropped=None)
-                reward = _numbers(row, [_REWARD]) if _REWARD in row else [math.nan]
+                (reward,) = _numbers(row, [_REWARD]) if _REWARD in row else [math.nan]
                 why = f"{_STEP} of step {start + n} of episode_{number} is damaged"
                 with translate_errors(*_BAD_JSON, to=lambda e, why=why: DemosError(f"{why}: {e}.")):
                     if parts.infos:
                         rest = msgspec.json.decode(row[_STEP], type=_Rest)
-                    if "reward" in rest.step or not (parts.infos or math.isnan(reward[0])):
-                        rest.step["reward"] = reward[0]
-                    values = {"action": parts.action, "state": parts.state}
-                    numbers = {field: _numbers(row, names) for field, names in values.items()}
-                    step = Step.from_json(rest.step | numbers | {"terminated": bool(ended)})
+                    if "reward" in rest.step or not (parts.infos or math.isnan(reward)):
+                        rest.step["reward"] = reward
+                    action, state = (_numbers(row, names) for names in (parts.action, parts.state))
+                    known = {"action": action, "state": state, "terminated": bool(ended)}
+                    step = Step.from_json(rest.step | known)
+                    frame = int(row.get(_FRAME, start + n))
                 record = SourceRecord(name=f"{start + n} of episode_{number}", step=step)
                 record.marks, record.dropped = rest.marks, rest.dropped
                 if parts.picture:
-                    stored = row[parts.picture]
+                    record.frame, stored = frame, row[parts.picture]
                     record.picture = _pixels(stored) if parts.pixels else bytes(stored)
-                    record.frame = int(row[_FRAME]) if parts.infos else start + n
                 yield record
 
 
@@ -364,7 +363,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
         )
     header, rows = episodes[0].header, iter(episodes[0].rows)
     first = next(rows)
-    space, picture = _space_of(header, first.jpeg, episodes[0].name)
+    space, picture = _space_of(episodes[0], first.jpeg)
     episodes = [replace(episodes[0], rows=chain((first,), rows)), *episodes[1:]]
     storage = library(_STORAGE).MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
@@ -413,13 +412,11 @@ def _box(layout: str) -> spaces.Box:
     return spaces.Box(named.low, named.high, dtype=np.float64)
 
 
-def _space_of(
-    header: EpisodeHeader, jpeg: bytes | None, name: str
-) -> tuple[spaces.Space[Any], spaces.Box | None]:
+def _space_of(episode: ExchangeEpisode, jpeg: bytes | None) -> tuple[Any, spaces.Box | None]:
     """Return the space of all observations by the first image, and its part of the images."""
-    found: dict[str, spaces.Space[Any]] = {}
-    picture, where = None, f"of the first step of {name}"
+    header, found, picture = episode.header, dict[str, spaces.Space[Any]](), None
     if jpeg is not None or header.image_size is not None:
+        where = f"of the first step of {episode.name}"
         width, height = header.image_size or picture_size(jpeg or b"", where)
         grey = bool(jpeg) and is_grey(jpeg, where)
         shape = (height, width) if grey else (height, width, 3)
@@ -427,7 +424,7 @@ def _space_of(
     if header.state_layout:
         found["state"] = _box(header.state_layout)
     if not found:
-        raise DemosError(f"{name} has neither images nor a state: export it to csv.")
+        raise DemosError(f"{episode.name} has neither images nor a state: export it to csv.")
     return spaces.Dict(found) if len(found) > 1 else next(iter(found.values())), picture
 
 
