@@ -299,7 +299,7 @@ TUBS: dict[str, tuple[Callable[[Path], object], str]] = {
     "a catalog that is a pipe": (lambda f: pipe(f / "catalog_0.catalog"), "There is no"),
     "a catalog nested deeply": (
         lambda f: (f / "catalog_0.catalog").write_text("[" * 100_000),
-        "that is damaged",
+        "with damaged JSON",
     ),
     "a manifest that is cut off": (
         lambda f: (f / "manifest.json").write_text("[]\n[]\n"),

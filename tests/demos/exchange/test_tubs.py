@@ -14,12 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from shapechanger.demos.exchange import Converted, import_recording
+from shapechanger.demos.exchange import Imported, import_recording
 from shapechanger.demos.exchange.imports import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.exchange.small import all_of, picture, tub_folder
 
 T0_MS = 1_700_000_000_000
+NO_IMAGE: dict[str, Any] = {"cam/image_array": None}
 
 
 def records(
@@ -38,7 +39,7 @@ def records(
     ]
 
 
-def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Converted]:
+def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Imported]:
     """Import a tub, and return the numbers of the records of each episode, by their steering."""
     out = folder.with_name(f"{folder.name}-data-{len(list(folder.parent.iterdir()))}")
     done = import_recording(folder, out, **options)
@@ -65,7 +66,7 @@ def test_deletions_go_by_index(
     deleted = chosen.draw(st.sets(indexes.filter(lambda n: n != kept)))
     folder = tub_folder(
         tmp_path_factory.mktemp("tub") / "tub",
-        [r | {"cam/image_array": None} for r in records(count, first)],
+        records(count, first, **NO_IMAGE),
         sorted(deleted),
         per_catalog=per_catalog,
     )
@@ -139,10 +140,10 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
             "1 record with an image of 80 x 32 pixels, and not 40 x 32: 0",
             {0},
         ),
-        (lines(lambda ls: [*ls, bytes(512)]), "1 line that is damaged", set()),
+        (lines(lambda ls: [*ls, bytes(512)]), "1 line with damaged JSON", set()),
         (lines(lambda ls: [*ls[:-1], ls[-1][:-9]]), "catalog_0.catalog, line 6", {5}),
         (lines(lambda ls: [*ls, ls[4]]), "the _index of another record: 4, 4", {4}),
-        (field("_index", "x"), "2 lines that is damaged or without a valid _index", {0, 4}),
+        (field("_index", "x"), "2 lines with damaged JSON or without a valid _index", {0, 4}),
         (field("_index", 2), "with the _index of another record: 2, 2, 2", {0, 2, 4}),
         (field("user/angle", 1.5), "(Expected `float` <= 1.0 - at `$.user/angle`): 0, 4", {0, 4}),
         (field("user/angle", True), "got `bool` - at `$.user/angle`)", {0, 4}),
@@ -226,25 +227,40 @@ def test_no_record_is_left(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("period_ms", "hz", "measured"),
+    ("period_ms", "stated", "hz", "rate", "finding"),
     [
-        (50.0, 20.0, ""),
-        (51.0, 20.0, "19.61 a second"),
-        (33.34, 30.0, ""),
-        (100.9, 10.0, "9.911 a second"),
+        (50.0, None, None, 20.0, ""),
+        (51.0, None, None, 20.0, "19.61 a second"),
+        (33.34, None, None, 30.0, ""),
+        (100.9, None, None, 10.0, "9.911 a second"),
+        (52.0, "19.2", None, 19.2, ""),
+        (52.0, 20, None, 20.0, ""),
+        (52.0, "soon", None, 19.23, ""),
+        (52.0, "50", None, 50.0, "19.23 a second by their times, and not the 50 Hz"),
+        (3.0, None, None, 333.0, "State the rate with --hz"),
+        (3.0, None, 20.0, 20.0, "3 ms apart"),
     ],
 )
-def test_rates_by_times(tmp_path: Path, period_ms: float, hz: float, measured: str) -> None:
-    """Whole milliseconds do not round the rate; a loop's usual delay is named."""
-    made = [r | {"cam/image_array": None} for r in records(60, period_ms=period_ms)]
+def test_rates_by_times(
+    tmp_path: Path, period_ms: float, stated: object, hz: float | None, rate: float, finding: str
+) -> None:
+    """Whole milliseconds do not round the rate; times that contradict a stated one do not count."""
+    made = records(60, period_ms=period_ms, **NO_IMAGE)
     folder = tub_folder(tmp_path / "tub", made, range(20, 30))
-    _, done = imported(folder)
+    if stated is not None:
+        manifest = (folder / "manifest.json").read_text().splitlines()
+        manifest[2] = json.dumps({"DRIVE_LOOP_HZ": stated})
+        (folder / "manifest.json").write_text("\n".join(manifest))
+    _, done = imported(folder, hz=hz)
     (episode,) = all_of(next(p for p in tmp_path.iterdir() if p != folder))
-    assert episode.header.control_hz == pytest.approx(hz, rel=2e-3)
-    assert measured in "".join(done.notes)
-    # The ten deleted records took time, too.
-    assert episode.seconds == pytest.approx(60 * period_ms / 1e3, rel=0.01)
-    assert episode.header.created == "2023-11-14T22:13:20.000+00:00"
+    assert episode.header.control_hz == pytest.approx(rate, rel=2e-3)
+    assert finding in "".join((*done.warnings, *done.notes))
+    if "by their times" in "".join((*done.warnings, *done.notes)):
+        assert {step.clock_ns for step in episode.steps} == {None}
+        assert episode.header.created == ""
+    else:  # The ten deleted records took time, too.
+        assert episode.seconds == pytest.approx(60 * period_ms / 1e3, rel=0.01)
+        assert episode.header.created == "2023-11-14T22:13:20.000+00:00"
 
 
 @given(st.lists(st.floats(0.0, 1e12), min_size=1, max_size=30))
@@ -265,41 +281,6 @@ def test_periods_of_two_kinds() -> None:
     assert measured_hz([50e6] * 60 + [430e6] * 40) == pytest.approx(20.0)
 
 
-def test_times_of_a_conversion(tmp_path: Path) -> None:
-    """A rate that no robot has is reported; a stated rate replaces the times."""
-    made = [r | {"cam/image_array": None} for r in records(40, period_ms=3.0)]
-    folder = tub_folder(tmp_path / "tub", made)
-    _, done = imported(folder)
-    assert "State the rate with --hz" in done.warnings[0]
-    _, done = imported(folder, hz=20.0)
-    assert not done.warnings
-    assert "3 ms apart" in done.notes[0]
-    episodes = [e for p in sorted(tmp_path.iterdir()) if p != folder for e in all_of(p)]
-    assert {e.header.control_hz for e in episodes} == {333.0, 20.0}
-    stated = next(e for e in episodes if e.header.control_hz == 20.0)
-    assert {s.clock_ns for s in stated.steps} == {None}
-    assert stated.seconds == pytest.approx(2.0)
-    with pytest.raises(DemosError, match="--hz must be positive"):
-        imported(folder, hz=-1.0)
-
-
-def test_a_rate_in_the_metadata_counts(tmp_path: Path) -> None:
-    made = [r | {"cam/image_array": None} for r in records(40, period_ms=52.0)]
-    folder = tub_folder(tmp_path / "tub", made)
-    manifest = (folder / "manifest.json").read_text().splitlines()
-    for stated, warned in (("19.2", False), ("20", False), ("50", True), ("soon", False)):
-        manifest[2] = json.dumps({"DRIVE_LOOP_HZ": stated})
-        (folder / "manifest.json").write_text("\n".join(manifest))
-        _, done = imported(folder)
-        assert bool(done.warnings) == warned
-        if warned:
-            assert (
-                "52 ms apart, 19.23 a second by their times, and not the 50 Hz" in done.warnings[0]
-            )
-    rates = [all_of(p)[0].header.control_hz for p in tmp_path.iterdir() if p != folder]
-    assert sorted(rates) == [19.2, 19.23, 20.0, 50.0]
-
-
 def test_times_that_jump(tmp_path: Path) -> None:
     """A pause and a clock that was set back each begin an episode, and are reported by size."""
     made = records(30)
@@ -315,17 +296,14 @@ def test_times_that_jump(tmp_path: Path) -> None:
 
 
 def test_sessions_at_different_rates(tmp_path: Path) -> None:
-    made = records(24)
+    made = records(24, **NO_IMAGE)
     for n, record in enumerate(made):
-        record |= {"_session_id": "a" if n < 12 else "b", "cam/image_array": None}
-        record["_timestamp_ms"] = T0_MS + (50 * n if n < 12 else 100 * n)
+        record |= {"_session_id": n // 12, "_timestamp_ms": T0_MS + n * (50 if n < 12 else 100)}
     folder = tub_folder(tmp_path / "tub", made)
-    _, done = imported(folder)
-    assert done.warnings == (
-        "The drives have from 10 to 20 steps a second: a policy learns from one rate at a time.",
-    )
-    _, done = imported(folder, hz=20.0)
-    assert done.steps == 24
+    (warning,) = imported(folder)[1].warnings
+    assert warning.startswith("The drive from record 12 has 10 steps a second, and the drive from")
+    with pytest.raises(DemosError, match="--hz must be positive"):
+        imported(folder, hz=-1.0)
 
 
 @pytest.mark.parametrize(
@@ -344,28 +322,27 @@ def test_pictures_of_other_formats(tmp_path: Path, mode: str, form: str) -> None
 
 def test_cameras_of_other_names(tmp_path: Path) -> None:
     """The one camera is taken whatever its name, and of several one is chosen."""
-    key = {"cam/image_array": None}
-    made = [r | key | {"cam/left": f"{r['_index']}_left.jpg"} for r in records(3)]
-    folder = tub_folder(tmp_path / "one", made, inputs={"cam/left": "image_array"})
-    for n in range(3):
-        (folder / f"images/{n}_left.jpg").write_bytes(picture(n))
-        (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
-    _, done = imported(folder)
-    assert done.pictures == 3
-    both = [r | {"cam/right": f"{r['_index']}_right.jpg"} for r in made]
-    inputs = dict.fromkeys(("cam/left", "cam/right"), "image_array")
-    two = tub_folder(tmp_path / "two", both, inputs=inputs)
-    for path in (folder / "images").iterdir():
-        (two / "images" / path.name).write_bytes(path.read_bytes())
+    names = {"cam/left": "{}_left.jpg", "cam/right": "{}_right.jpg"}
+    for count in (1, 2):
+        cameras = list(names)[:count]
+        made = [
+            r | {name: names[name].format(r["_index"]) for name in cameras}
+            for r in records(3, **NO_IMAGE)
+        ]
+        inputs = dict.fromkeys(cameras, "image_array")
+        folder = tub_folder(tmp_path / f"tub{count}", made, inputs=inputs)
+        for n in range(3):
+            (folder / f"images/{n}_left.jpg").write_bytes(picture(n))
+            (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
+        if count == 1:
+            assert imported(folder)[1].pictures == 3
     with pytest.raises(DemosError, match=r"2 cameras \(cam/left, cam/right\).*--camera cam/left"):
-        imported(two)
-    _, done = imported(two, camera="cam/right")
-    assert (done.pictures, done.notes) == (
-        3,
-        ("Columns that are not imported: cam/left.",),
-    )
+        imported(folder)
+    _, done = imported(folder, camera="cam/right")
+    assert done.pictures == 3
+    assert done.notes == ("Columns that are not imported: cam/left.",)
     with pytest.raises(UnknownName, match="Did you mean 'cam/left'"):
-        imported(two, camera="cam/lefty")
+        imported(folder, camera="cam/lefty")
 
 
 def test_depth_and_lists_are_named(tmp_path: Path) -> None:
@@ -374,16 +351,13 @@ def test_depth_and_lists_are_named(tmp_path: Path) -> None:
     made = [r | extra for r in records(3)]
     _, done = imported(tub_folder(tmp_path / "tub", made, inputs=inputs))
     assert done.notes == ("Columns that are not imported: cam/depth_array, lidar, gear.",)
-    alone = tub_folder(
-        tmp_path / "deep", [r | {"cam/image_array": None} for r in made], inputs=inputs
-    )
-    _, done = imported(alone)
+    _, done = imported(tub_folder(tmp_path / "deep", [r | NO_IMAGE for r in made], inputs=inputs))
     assert "those of 16 bits are not imported" in done.warnings[0]
 
 
 def test_unknown_times_and_starts(tmp_path: Path) -> None:
     """Records without a time leave the drive without times, never with the import's."""
-    made = [r | {"cam/image_array": None} for r in records(4)]
+    made = records(4, **NO_IMAGE)
     made[2]["_timestamp_ms"] = None
     _, done = imported(tub_folder(tmp_path / "tub", made))
     assert "1 of the 4 records from 0 have no valid time" in done.warnings[0]

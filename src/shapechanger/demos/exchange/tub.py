@@ -140,7 +140,7 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
                     fields: Fields = _decoded(line, Fields, name)
                     found.setdefault(msgspec.convert(fields["_index"], int), []).append(fields)
             except (DemosError, LookupError, msgspec.ValidationError):
-                reason = "that is damaged or without a valid _index"
+                reason = "with damaged JSON or without a valid _index"
                 context.leave_out("line", reason, f"{name}, line {number}")
     numbers = sorted(found)
     if numbers != list(found):
@@ -177,7 +177,7 @@ def _read_v1(folder: Path, context: ImportContext) -> _Tub:
             fields: Fields = _decoded(text, Fields, name)
         except DemosError:
             if number not in tub.deleted:
-                context.leave_out("record", "that is damaged", number)
+                context.leave_out("record", "with damaged JSON", number)
             continue
         time_ms = fields.pop("milliseconds", None)
         if type(time_ms) in {int, float} and abs(time_ms) < _MAX_MS:
