@@ -90,7 +90,7 @@ class _Catalogs(Struct):
 
 
 class _Tub(Struct):
-    """A tub; the fields with names of Donkeycar are those of `meta.json` of version 1."""
+    """A tub; the first four fields are in the `meta.json` of version 1."""
 
     inputs: list[str] = []
     types: list[str] = []
