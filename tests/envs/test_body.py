@@ -132,7 +132,7 @@ def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
             UnknownName,
             "'faktor'. Did you mean 'factor'",
         ),
-        ("[1, 2]", MorphologyError, "An edit is an object"),
+        ("[1, 2]", MorphologyError, "A body is made of edits"),
         ("[", MorphologyError, "JSON list of edits"),
         (7, MorphologyError, "made of edits such as Stretch"),
         (None, MorphologyError, "made of edits such as Stretch"),

@@ -68,7 +68,7 @@ def _weights(model: str) -> Array:
     """Return the density of each geom, in compiled order."""
     spec = _named(model)
     by_name = {
-        geom.name: geom.density if np.isnan(geom.mass) else geom.mass / volume(spec, geom)
+        geom.name: geom.density if np.isnan(geom.mass) else geom.mass / volume(geom)
         for geom in spec.geoms
     }
     compiled = _before(model)

@@ -62,8 +62,11 @@ def test_invalid_json_is_refused(text: str | bytes) -> None:
 
 @pytest.mark.parametrize("text", ["1", '"stretch"', "[[]]", '[{"kind":"stretch"}]', "[null]"])
 def test_other_json_is_refused(text: str) -> None:
-    with pytest.raises(MorphologyError, match='An edit is an object with the key "edit", got '):
-        from_json(text)
+    for read in (from_json, lambda text: as_body(json.loads(text))):
+        with pytest.raises(
+            MorphologyError, match=r'A body .* with the key "edit", not of|JSON list'
+        ):
+            read(text)
 
 
 @pytest.mark.parametrize("kind", ["strech", "", None, 3, ["stretch"]])

@@ -32,7 +32,7 @@ from functools import partial
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Edit, Remove
-from shapechanger.morphology.edits.edit import part_of_the_way
+from shapechanger.morphology.edits import part_of_the_way
 from shapechanger.morphology.families import Axis, Family, length_axes
 from shapechanger.morphology.spec.elements import select
 

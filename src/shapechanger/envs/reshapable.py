@@ -297,8 +297,7 @@ class Reshapable(MujocoEnv):
         if self._starting:
             rules = self.start_rules()
             qpos = rules.feasible(qpos, self.data, self.init_qpos)
-            if rules.closure is not None:
-                qvel = rules.closure.still(qpos, qvel, self.data)
+            qvel = rules.still(qpos, qvel, self.data)
         cast("Any", super()).set_state(qpos, qvel)
         self._started = True
 

@@ -17,8 +17,7 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
-from shapechanger.morphology.edits import EDITS, Edit
-from shapechanger.morphology.edits.edit import part_of_the_way
+from shapechanger.morphology.edits import EDITS, Edit, part_of_the_way
 from shapechanger.morphology.spec.carried import carried
 from shapechanger.morphology.spec.elements import make_explicit
 
@@ -49,12 +48,11 @@ def from_json(text: str | bytes) -> Body:
         parsed: Any = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
     except (ValueError, RecursionError) as error:  # Not JSON, not UTF-8, or nested too deeply.
         raise MorphologyError(f"A body must be a JSON list of edits: {error}.") from error
-    items = cast("list[Any]", parsed if isinstance(parsed, list) else [parsed])
-    return tuple(_edit(item) for item in items)
+    return tuple(map(_edit, cast("list[Any]", parsed) if isinstance(parsed, list) else [parsed]))
 
 
 def as_body(value: Edit | Iterable[Edit] | str) -> Body:
-    """Return a body from one edit, several, or their JSON.
+    """Return a body from one edit, several, or their JSON, which may be parsed already.
 
     Raises:
         UnknownName: As of `from_json`.
@@ -62,25 +60,20 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
     """
     if isinstance(value, str):
         return from_json(value)
-    if isinstance(value, Edit):
-        return (value,)
     given: Any = value  # Not checked at run time.
-    edits: list[Edit] = []
-    for item in cast("Iterable[Any]", given) if isinstance(given, Iterable) else [given]:
-        # JSON is parsed already in options that hold a body.
-        edit = _edit(item) if isinstance(item, Mapping) else item
-        if not isinstance(edit, Edit):
-            raise MorphologyError(
-                f"A body is made of edits such as Stretch('shank_*', 1.5), not of {edit!r}."
-            )
-        edits.append(edit)
-    return tuple(edits)
+    one = isinstance(given, Edit | Mapping) or not isinstance(given, Iterable)
+    return tuple(map(_edit, [given] if one else cast("Iterable[Any]", given)))
 
 
 def _edit(item: Any) -> Edit:
-    """Return an edit from its parsed JSON."""
+    """Return an edit as it is, or from its parsed JSON."""
+    if isinstance(item, Edit):
+        return item
     if not isinstance(item, Mapping) or "edit" not in item:
-        raise MorphologyError(f'An edit is an object with the key "edit", got {item!r}.')
+        raise MorphologyError(
+            "A body is made of edits such as Stretch('shank_*', 1.5), in JSON objects with the key "
+            f'"edit", not of {item!r}.'
+        )
     fields = dict(cast("Mapping[str, Any]", item))
     kind = EDITS.get(str(fields["edit"]))
     if kind is None:

@@ -119,7 +119,6 @@ class Family:
             UnknownName: If the family has no such axis, place or part.
             MorphologyError: If a value lies beyond its axis.
         """
-        axes = {axis.name: axis for axis in self.axes}
         edits: list[Edit] = []
         for place, part in (parts or {}).items():
             if place not in self.parts:
@@ -127,6 +126,7 @@ class Family:
             if part not in self.parts[place]:
                 raise UnknownName(f"part of {place}", part, self.parts[place])
             edits += self.parts[place][part]
+        axes = {axis.name: axis for axis in self.axes}
         for name, value in values.items():
             if name not in axes:
                 raise UnknownName(f"axis of the family {self.name}", name, axes)

@@ -19,7 +19,6 @@ from shapechanger.morphology.pose import GROUND, robot_bodies, travelling_body
 _Array = NDArray[np.float64]
 _LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 _MOVES_ONE_WAY: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-
 _TO_JOINT: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 # A smaller moment, m or 1, is rounding.
 _NO_MOMENT: Final = 1e-9
@@ -143,10 +142,16 @@ def _limb_numbers(
     anchor: _Array = data.xanchor[joint]
     end, _ = _farthest(model, data, bodies, anchor)
     limited = bool(model.jnt_limited[joint])
-    lower, upper = model.jnt_range[joint] if limited else (0.0, 0.0)
     strength = 0.0
     if actuator is not None:
-        strength = _moment(model, data, actuator, dof) * _gain(model, actuator)
+        # The force for a control of 1, N or N·m. A muscle has a peak force; a negative one is
+        # derived from a scale and the inertia that it moves.
+        gain, strength = model.actuator_gainprm[actuator], _moment(model, data, actuator, dof)
+        if model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
+            moved = max(float(model.actuator_acc0[actuator]), _NO_MOMENT)
+            strength *= float(gain[2]) if gain[2] >= 0.0 else float(gain[3]) / moved
+        else:
+            strength *= abs(float(gain[0]))
     depth, above = 0, body
     while above:
         depth += int(above != trunk and model.body_jntnum[above] > 0)
@@ -156,7 +161,7 @@ def _limb_numbers(
         *(into_trunk @ data.xaxis[joint]),
         *_direction_and_length(into_trunk @ end),
         *(_decades(float(model.body_mass[bodies].sum())), _decades(model.body_subtreemass[body])),
-        *(data.qpos[model.jnt_qposadr[joint]], lower, upper),
+        *(data.qpos[model.jnt_qposadr[joint]], *(model.jnt_range[joint] if limited else (0, 0))),
         math.log10(1.0 + strength) / 2.0,
         math.log10(1.0 + model.dof_damping[dof]),
         math.log10(1.0 + model.dof_armature[dof]),
@@ -195,16 +200,6 @@ def _moment(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, dof: int)
         on_dof = data.actuator_moment[entries][data.moment_colind[entries] == dof]
         found = max(found, float(np.abs(on_dof).max(initial=0.0)))
     return found
-
-
-def _gain(model: mujoco.MjModel, actuator: int) -> float:
-    """Return the force of an actuator for a control of 1, N or N·m."""
-    gain: list[float] = model.actuator_gainprm[actuator].tolist()
-    if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_MUSCLE:
-        return abs(gain[0])
-    # Its peak force; a negative one is derived from a scale and the inertia that it moves.
-    moved = max(float(model.actuator_acc0[actuator]), _NO_MOMENT)
-    return gain[2] if gain[2] >= 0.0 else gain[3] / moved
 
 
 def _farthest(

@@ -13,7 +13,7 @@ from shapechanger.morphology import (
     compile_body,
     to_json,
 )
-from shapechanger.morphology.edits.edit import part_of_the_way
+from shapechanger.morphology.edits import part_of_the_way
 from tests.morphology.models import leg
 
 

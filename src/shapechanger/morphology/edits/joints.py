@@ -11,7 +11,7 @@ from typing import ClassVar, Final
 import mujoco
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import Edit, part_of_the_way, require_gear
+from shapechanger.morphology.edits import Edit, part_of_the_way, require_gear
 from shapechanger.morphology.spec.elements import require_free_name, select
 from shapechanger.morphology.spec.joints import (
     add_motor,
@@ -24,7 +24,6 @@ from shapechanger.morphology.spec.references import OF_JOINTS, remove_joint
 
 # MuJoCo needs a range above zero; that of a partly locked joint is at least this.
 _NARROWEST_RAD: Final = 1e-3
-_MOVES_ONE_WAY: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 # A motor that exists in part is never weaker than this share.
 _WEAKEST_PART: Final = 0.01
 
@@ -64,15 +63,15 @@ class JointRange(Edit, frozen=True):
                 # The smaller the amount, the wider.
                 reach = (self.upper - self.lower) / self.amount
                 old = self.lower - reach, self.upper + reach
-            new = [
+            lower, upper = (
                 o if n is None else part_of_the_way(o, n, self.amount)
                 for o, n in zip(old, (self.lower, self.upper), strict=True)
-            ]
-            if not new[0] < new[1]:
+            )
+            if not lower < upper:
                 raise MorphologyError(
-                    f"The range of {joint.name!r} would be {new[0]:.4g} to {new[1]:.4g}."
+                    f"The range of {joint.name!r} would be {lower:.4g} to {upper:.4g}."
                 )
-            set_limits(joint, *new)
+            set_limits(joint, lower, upper)
 
 
 class Lock(Edit, frozen=True):
@@ -94,15 +93,12 @@ class Lock(Edit, frozen=True):
         """Lock every joint that fits."""
         joints = select("joint", self.joint, spec.joints)
         positions = {joint.name: self._position_of(joint) for joint in joints}
-        if self.amount == 1.0:
-            displacements = {
-                joint.name: positions[joint.name] - reference_of(joint) for joint in joints
-            }
-            for joint in joints:
-                displace(spec, joint, displacements[joint.name])
-                remove_joint(spec, joint, displacements)
-            return
+        by = {joint.name: positions[joint.name] - reference_of(joint) for joint in joints}
         for joint in joints:
+            if self.amount == 1.0:
+                displace(joint, by[joint.name])
+                remove_joint(spec, joint, by)
+                continue
             position, far = positions[joint.name], 1.0 / self.amount
             lower, upper = limits(joint) or (position - far, position + far)
             narrow = max(1.0 - self.amount, _NARROWEST_RAD / (upper - lower))
@@ -145,19 +141,11 @@ class AddMotor(Edit, frozen=True):
             raise MorphologyError("The model has no joints, so there is nothing to add a motor to.")
         moved = {actuator.target for actuator in spec.actuators if actuator.trntype in OF_JOINTS}
         # Also of a model that makes two joints follow each other: one of them has a motor.
-        moved |= {
-            coupling.name1
-            for coupling in spec.equalities
-            if coupling.type == mujoco.mjtEq.mjEQ_JOINT
-            and coupling.name2
-            and coupling.active
-            and coupling.name1 != self.joint
-        }
-        joints = [
-            joint
-            for joint in select("joint", self.joint, spec.joints)
-            if joint.type in _MOVES_ONE_WAY and joint.name not in moved
-        ]
+        couplings = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT]
+        moved |= {e.name1 for e in couplings if e.name2 and e.active and e.name1 != self.joint}
+        one_way = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        found = select("joint", self.joint, spec.joints)
+        joints = [joint for joint in found if joint.type in one_way and joint.name not in moved]
         if not joints:
             raise MorphologyError(
                 f"Each hinge and slide that matches {self.joint!r} has a motor, or none matches; "
@@ -190,6 +178,5 @@ class AddFreeJoint(Edit, frozen=True):
             )
         # A body that MuJoCo has merged with the world cannot move.
         spec.compiler.fusestatic = False
-        name = f"{body.name}_free"
-        require_free_name(spec, "joint", name)
-        body.add_freejoint(name=name)
+        require_free_name(spec, "joint", f"{body.name}_free")
+        body.add_freejoint(name=f"{body.name}_free")

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import (
+from shapechanger.morphology.edits import (
     Edit,
     Positive,
     Ratio,
@@ -18,7 +18,6 @@ from shapechanger.morphology.edits.edit import (
     part_of_the_way,
     require_gear,
 )
-from shapechanger.morphology.spec.cutting import NearPart, Plane, shorten
 from shapechanger.morphology.spec.elements import (
     LEAST_MASS,
     require_free_name,
@@ -27,6 +26,8 @@ from shapechanger.morphology.spec.elements import (
 )
 from shapechanger.morphology.spec.geometry import (
     LONG,
+    NearPart,
+    Plane,
     anchor,
     far_end,
     held_at,
@@ -36,14 +37,14 @@ from shapechanger.morphology.spec.geometry import (
     resize_geom,
     scale_geom_mass,
     set_ends,
+    shorten,
     stretched,
     volume,
 )
 from shapechanger.morphology.spec.grafting import (
     copy_element,
     copy_limb,
-    move_limb,
-    move_point,
+    move,
     resize_limb,
     share_contacts,
 )
@@ -90,23 +91,24 @@ class Cut(Edit, frozen=True):
         """Cut every segment that fits."""
         for body in select_limbs(spec, self.body, "cut"):
             require_geometry(spec, body)
-            plane = Plane(spec, body, self.keep)
-            if self.keep < 1.0:
-                release_drawings(spec, {key_of(body)})
-                self._cut_geoms(spec, body, plane)
-                share = part_of_the_way(1.0, self.keep, self.amount)
-                for child in plane.children_beyond():
-                    if self.amount < 1.0:
-                        there = held_at(spec, child)
-                        child.pos = child.pos + (stretched(there, anchor(body), share) - there)
-                    _take_away(spec, child, self.amount)
-                for point in plane.points_beyond():
-                    if plane.is_at_end(point):
-                        move_by(point, share * plane.along - plane.along)
-                        continue
-                    require_unnamed(spec, key_of(point), "lies beyond the cut")
-                    if self.amount == 1.0:
-                        spec.delete(point)
+            plane = Plane(body, self.keep)
+            if self.keep == 1.0:
+                continue
+            release_drawings(spec, {key_of(body)})
+            self._cut_geoms(spec, body, plane)
+            share = part_of_the_way(1.0, self.keep, self.amount)
+            for child in plane.children_beyond():
+                if self.amount < 1.0:
+                    there = held_at(child)
+                    child.pos = child.pos + (stretched(there, anchor(body), share) - there)
+                _take_away(spec, child, self.amount)
+            for point in plane.points_beyond():
+                if plane.is_at_end(point):
+                    move_by(point, share * plane.along - plane.along)
+                    continue
+                require_unnamed(spec, key_of(point), "lies beyond the cut")
+                if self.amount == 1.0:
+                    spec.delete(point)
 
     def _cut_geoms(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, plane: Plane) -> None:
         """Shorten the geoms that the plane cuts, and remove those that lie beyond it."""
@@ -122,11 +124,9 @@ class Cut(Edit, frozen=True):
                 if self.amount == 1.0:
                     spec.delete(geom)
                 else:
-                    part = max(1.0 - self.amount, _SMALLEST_PART)
-                    resize_geom(spec, geom, place_of(geom), part)
+                    resize_geom(geom, place_of(geom), max(1.0 - self.amount, _SMALLEST_PART))
             elif piece.share < 1.0:
-                share = part_of_the_way(1.0, piece.share, self.amount)
-                shorten(spec, geom, piece.near, share, piece.axis)
+                shorten(geom, piece, part_of_the_way(1.0, piece.share, self.amount))
 
 
 class Remove(Edit, frozen=True):
@@ -178,50 +178,42 @@ class Split(Edit, frozen=True):
         """Split the segment."""
         body = next(select_limbs(spec, self.body, "split"))
         require_geometry(spec, body)
-        plane = Plane(spec, body, self.at)
+        plane = Plane(body, self.at)
         pieces = {geom.name: plane.piece_of(geom) for geom in body.geoms}
-        cut = [name for name, piece in pieces.items() if 0.0 < piece.share < 1.0]
-        require_divisible(spec, body, cut)
+        halves = {
+            n: f"{n}_of_{self.name}" for n, piece in pieces.items() if 0.0 < piece.share < 1.0
+        }
+        require_divisible(spec, body, halves)
         release_drawings(spec, {key_of(body)})
+        beyond = [spec.geom(name) for name, piece in pieces.items() if not piece.share]
         points, children = plane.points_beyond(), plane.children_beyond()
         part = _add_segment(spec, body, self, plane.place, self.amount)
-        for name, piece in pieces.items():
-            if not piece.share:
-                move_by(move_point(spec, spec.geom(name), part), -plane.place)
-        for point in points:
-            move_by(move_point(spec, point, part), -plane.place)
-        for name in cut:
-            self._divide(spec, spec.geom(name), pieces[name], part, plane.place)
+        for point in (*beyond, *points):
+            move_by(move(spec, point, part), -plane.place)
+        for name, half in halves.items():
+            geom, piece = spec.geom(name), pieces[name]
+            copy = copy_element(spec, geom, part, half)
+            self._divide(geom, copy, piece, plane.place)
         for child in children:
             offset = child.pos - plane.place
-            move_limb(spec, child, part).pos = offset
-        share_contacts(spec, body, part, {name: self._far_half(name) for name in cut})
-
-    def _far_half(self, geom: str) -> str:
-        """Return the name of the farther half of a geom that is cut in two."""
-        return f"{geom}_of_{self.name}"
+            move(spec, child, part).pos = offset
+        share_contacts(spec, body, part, halves)
 
     def _divide(
-        self,
-        spec: mujoco.MjSpec,
-        geom: mujoco.MjsGeom,
-        piece: NearPart,
-        part: mujoco.MjsBody,
-        place: np.ndarray,
+        self, geom: mujoco.MjsGeom, copy: mujoco.MjsGeom, piece: NearPart, place: np.ndarray
     ) -> None:
-        """Divide a geom between both parts."""
-        whole = volume(spec, geom)
-        copy = copy_element(spec, geom, part, self._far_half(geom.name))
+        """Divide a geom into its nearer half and, from a copy on the other body, its farther."""
+        whole = volume(geom)
         # About its near end, which then goes to where the geom is cut.
         move_by(copy, -piece.near)
-        shorten(spec, copy, np.zeros(3), 1.0 - piece.share, piece.axis)
+        shorten(copy, piece._replace(near=np.zeros(3)), 1.0 - piece.share)
         end = piece.near + 2.0 * (place_of(geom) - piece.near)
         offset = piece.near + piece.share * (end - piece.near) - place
         if float(np.linalg.norm(offset)) > _ON_THE_AXIS_M:
             move_by(copy, offset)
-        shorten(spec, geom, piece.near, piece.share, piece.axis)
+        shorten(geom, piece, piece.share)
         # The rounded ends at the split overlap. Their mass grows with the amount of the split.
-        volumes = [volume(spec, half) for half in (geom, copy)]
+        volumes = [volume(half) for half in (geom, copy)]
         rounded_end = 0.5 * (sum(volumes) - whole)
         for half, own in zip((geom, copy), volumes, strict=True):
             without = 1.0 - rounded_end / own
@@ -264,12 +256,12 @@ class AddSegment(Edit, frozen=True):
         """Add the segment."""
         body = select("body", self.body, spec.bodies[1:])[0]
         require_geometry(spec, body)
-        part = _add_segment(spec, body, self, far_end(spec, body), 1.0)
+        part = _add_segment(spec, body, self, far_end(body), 1.0)
         model_geom = next(geom for geom in body.geoms if geom.type in LONG)
         geom = copy_element(spec, model_geom, part, f"{self.name}_geom")
         geom.type = mujoco.mjtGeom.mjGEOM_CAPSULE
         if not math.isnan(geom.mass):
-            geom.density, geom.mass = geom.mass / volume(spec, model_geom), math.nan
+            geom.density, geom.mass = geom.mass / volume(model_geom), math.nan
         set_ends(geom, np.array([0.0, 0.0, 0.0, *self.end]))
         if self.radius is not None:
             geom.size = [self.radius, 0.0, 0.0]

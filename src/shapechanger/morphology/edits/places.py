@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import Edit, Positive, Vector, part_of_the_way
+from shapechanger.morphology.edits import Edit, Positive, Vector, part_of_the_way
 from shapechanger.morphology.pose import robot_bodies
 from shapechanger.morphology.spec.elements import (
     compiled,
@@ -22,6 +22,7 @@ from shapechanger.morphology.spec.elements import (
     select,
 )
 from shapechanger.morphology.spec.geometry import (
+    LONG,
     axis_ends,
     has_ends,
     move_by,
@@ -63,7 +64,7 @@ class PlaceBody(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Move every body that fits."""
         for body in select("body", self.body, spec.bodies[1:]):
-            body.pos = part_of_the_way(np.array(body.pos), np.array(self.to, float), self.amount)
+            body.pos = self._placed(body.pos)
 
     def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
         """Place the bodies that float in every keyframe too."""
@@ -72,7 +73,7 @@ class PlaceBody(Edit, frozen=True):
                 keyframes.change(joint.name, self._placed)
 
     def _placed(self, pose: np.ndarray) -> np.ndarray:
-        """Return the position of a free joint, shape (7,), at the new place."""
+        """Return a position that begins with x, y and z, at the new place."""
         place = part_of_the_way(pose[:3], np.array(self.to, float), self.amount)
         return np.concatenate([place, pose[3:]])
 
@@ -97,7 +98,7 @@ class StartHeight(Edit, frozen=True):
         """Raise or lower the trunks in every keyframe too, because robots start in one."""
         trunks = select("trunk", self.body, spec.worldbody.bodies)
         for joint in (joint for body in trunks for joint in body.joints):
-            axis = rotation(orientation(spec, joint.parent)) @ joint.axis
+            axis = rotation(orientation(joint.parent)) @ joint.axis
             vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
             if joint.type == _J.mjJNT_FREE:
                 keyframes.change(joint.name, self._raised)
@@ -150,37 +151,34 @@ class PlaceGeom(Edit, frozen=True):
             if geom.parent.parent is not None:
                 require_geometry(spec, geom.parent)
                 release_drawings(spec, {key_of(geom.parent)})
-            with same_density(spec, geom):
-                if self.start is not None and self.end is not None:
-                    self._place_ends(spec, geom, np.array([self.start, self.end], float))
+            with same_density(geom):
+                if self.start is not None:
+                    self._place_ends(geom)
                 if self.middle is not None:
                     place = place_of(geom)
                     to = np.array(self.middle, float)
                     move_by(geom, part_of_the_way(place, to, self.amount) - place)
                 if self.radius is not None:
-                    self._set_radius(geom, self.radius)
+                    if geom.type not in (_G.mjGEOM_SPHERE, *LONG):
+                        raise MorphologyError(
+                            f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
+                        )
+                    size = np.array(geom.size)
+                    size[0] = part_of_the_way(float(size[0]), self.radius, self.amount)
+                    geom.size = size
 
-    def _place_ends(self, spec: mujoco.MjSpec, geom: mujoco.MjsGeom, new: np.ndarray) -> None:
-        """Set both ends of the axis, shape (2, 3)."""
-        ends = axis_ends(spec, geom)
+    def _place_ends(self, geom: mujoco.MjsGeom) -> None:
+        """Set both ends of the axis."""
+        ends, new = axis_ends(geom), np.array([self.start, self.end], float)
         if ends is None:
             raise MorphologyError(f"{geom.name!r} is no capsule or cylinder, so it has no ends.")
         old = np.array(ends)
         # The ends of a geom that is given by its pose have no order: match the nearest.
-        if not has_ends(geom) and _apart(old, new) > _apart(old, new[::-1]):
+        here, turned = (np.linalg.norm(old - n, axis=1).sum() for n in (new, new[::-1]))
+        if not has_ends(geom) and here > turned:
             old = old[::-1]
         geom.size = [geom.size[0], 0.0, 0.0]
         set_ends(geom, part_of_the_way(old, new, self.amount))
-
-    def _set_radius(self, geom: mujoco.MjsGeom, radius: float) -> None:
-        """Set the radius of a round geom."""
-        if geom.type not in (_G.mjGEOM_SPHERE, _G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER):
-            raise MorphologyError(
-                f"{geom.name!r} is no sphere, capsule or cylinder, so it has no radius."
-            )
-        size = np.array(geom.size)
-        size[0] = part_of_the_way(float(size[0]), radius, self.amount)
-        geom.size = size
 
 
 class AddFloor(Edit, frozen=True):
@@ -230,8 +228,3 @@ class TotalMass(Edit, frozen=True):
         for body in spec.bodies[1:]:
             if body.name in names:
                 scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)
-
-
-def _apart(old: np.ndarray, new: np.ndarray) -> float:
-    """Return the sum of the distances between two pairs of points, m."""
-    return float(np.linalg.norm(old - new, axis=1).sum())

@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.edits.edit import Edit, Ratio, Vector, part_of_the_way, require_gear
+from shapechanger.morphology.edits import Edit, Ratio, Vector, part_of_the_way, require_gear
 from shapechanger.morphology.spec.elements import compiled, select
 from shapechanger.morphology.spec.geometry import (
     inertia_is_written_out,
@@ -69,10 +69,9 @@ class Mass(ValueEdit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
-        bodies = select("body", self.element, spec.bodies[1:])
         # Only the compiler knows the volume of every shape.
         whole = compiled(spec) if self.to is not None else None
-        for body in bodies:
+        for body in select("body", self.element, spec.bodies[1:]):
             # By name: an earlier edit may have changed the indices of the bodies.
             old = 1.0 if whole is None else float(whole.body(body.name).mass[0])
             if old <= 0.0:
@@ -85,20 +84,18 @@ class Density(ValueEdit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every body that fits."""
-        bodies = select("body", self.element, spec.bodies[1:])
-        for body in bodies:
-            if inertia_is_written_out(spec, body):
-                raise MorphologyError(
-                    f"{body.name!r} has its inertia written out, so its density has no effect: "
-                    "change its mass instead."
+        for body in select("body", self.element, spec.bodies[1:]):
+            written = [geom.name for geom in body.geoms if not math.isnan(geom.mass)]
+            if inertia_is_written_out(spec, body) or written:
+                what = (
+                    f"{written[0]!r} has its mass" if written else f"{body.name!r} has its inertia"
                 )
-        for geom in (geom for body in bodies for geom in body.geoms):
-            if not math.isnan(geom.mass):
                 raise MorphologyError(
-                    f"{geom.name!r} has its mass written out, so its density has no effect: "
-                    "change the mass of its body instead."
+                    f"{what} written out, so its density has no effect: change the mass of "
+                    f"{body.name!r} instead."
                 )
-            geom.density = self.changed(geom.density)
+            for geom in body.geoms:
+                geom.density = self.changed(geom.density)
 
 
 class Gear(ValueEdit, frozen=True):
@@ -121,27 +118,23 @@ class Gear(ValueEdit, frozen=True):
         """Change every actuator that fits."""
         factors: dict[str, float] = {}
         for actuator in select("actuator", self.element, spec.actuators):
-            if is_motor(actuator):
-                factors[actuator.name] = self._change_gear(actuator)
-            elif self.scale is None:
-                raise MorphologyError(
-                    f"{actuator.name!r} is no motor, so its gear is not its strength: give a scale "
-                    "instead of a value."
-                )
-            else:
-                factors[actuator.name] = factor = self.changed(1.0)
-                scale_strength(actuator, factor)
+            if not is_motor(actuator):
+                if self.scale is None:
+                    raise MorphologyError(
+                        f"{actuator.name!r} is no motor, so its gear is not its strength: give a "
+                        "scale instead of a value."
+                    )
+                factors[actuator.name] = self.changed(1.0)
+                scale_strength(actuator, factors[actuator.name])
+                continue
+            gear = np.array(actuator.gear)
+            strongest = float(gear[np.argmax(np.abs(gear))])
+            if not strongest:
+                raise MorphologyError(f"{actuator.name!r} has a gear of zero, so none can be set.")
+            new = self.changed(strongest)
+            factors[actuator.name] = new / strongest
+            actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
         scale_clamps(spec, factors)
-
-    def _change_gear(self, actuator: mujoco.MjsActuator) -> float:
-        """Change the gear of a motor, and return its new strength over the old one."""
-        gear = np.array(actuator.gear)
-        strongest = float(gear[np.argmax(np.abs(gear))])
-        if not strongest:
-            raise MorphologyError(f"{actuator.name!r} has a gear of zero, so none can be set.")
-        new = self.changed(strongest)
-        actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
-        return new / strongest
 
 
 class Damping(ValueEdit, frozen=True):
@@ -254,7 +247,7 @@ class Radius(Edit, frozen=True):
             require_geometry(spec, body)
             release_drawings(spec, {key_of(body)})
             for geom in body.geoms:
-                thicken_geom(spec, geom, factor)
+                thicken_geom(geom, factor)
 
 
 class Gravity(Edit, frozen=True):

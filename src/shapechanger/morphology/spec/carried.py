@@ -27,15 +27,12 @@ _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
 _D: Final = mujoco.mjtDisableBit
-_SIZES: Final = {_J.mjJNT_FREE: (7, 6), _J.mjJNT_BALL: (4, 3)}
-_FIELDS: Final = ("qpos", "qvel", "act", "ctrl", "mpos", "mquat")
-_ROUND: Final = (int(_W.mjWRAP_SPHERE), int(_W.mjWRAP_CYLINDER))
-# A tendon that is longer than its limit by less is within it, m or rad.
-_WITHIN: Final = 1e-6
 _FREE, _BALL = int(_J.mjJNT_FREE), int(_J.mjJNT_BALL)
 _WITHOUT: Final = _D.mjDSBL_CONTACT | _D.mjDSBL_LIMIT | _D.mjDSBL_FRICTIONLOSS
 _UNLIMITED: Final = np.array([[-np.inf], [np.inf]])
-_DRIVES: Final = [int(kind) for kind in OF_JOINTS]
+_FIELDS: Final = ("qpos", "qvel", "act", "ctrl", "mpos", "mquat")
+# A tendon that is longer than its limit by less is within it, m or rad.
+_WITHIN: Final = 1e-6
 # Residual of an equality that is closed, m or rad; above the rounding of a compiled model.
 _CLOSED: Final = 1e-9
 # Points of a closed loop coincide within this, m.
@@ -51,19 +48,14 @@ _SINGULAR: Final = 1e-6
 
 @contextmanager
 def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
-    """Take keyframes and pins out of the way of edits, and write them back after these.
-
-    Args:
-        spec: The specification, with its elements named and its frames resolved.
-
-    Yields:
-        Its keyframes.
+    """Take keyframes and pins out of the way of edits, yield the keyframes, and write all back.
 
     Raises:
         MorphologyError: If a loop cannot be closed, or a tendon does not fit its new path.
     """
     keyframes = Keyframes()
-    if not (spec.keys or spec.tendons or _has_loops(spec)):
+    loops = any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
+    if not (spec.keys or spec.tendons or loops):
         yield keyframes
         return
     for i, tendon in enumerate(spec.tendons):
@@ -71,17 +63,14 @@ def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
     model = compiled(spec)
     keyframes.take(spec, model)
     tendons, torn = _tendons(model), set[Element]()
-    if _has_loops(spec):
+    if loops:
         _mark_pins(spec, model)
         residuals = _residuals(spec, _posed(compiled(spec)))
         torn = {key for key, residual in residuals.items() if residual > _CLOSED}
     yield keyframes
-    if _has_loops(spec):
-        data, balls = _close_loops(spec, compiled(spec), torn)
-        for joint, turn in balls.items():
-            keyframes.change(joint, lambda pose, turn=turn: product(inverse(turn), pose))
-        _unmark_pins(spec, data)
-    if spec.tendons and tendons:
+    if any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities):
+        _unmark_pins(spec, _close_loops(spec, compiled(spec), torn, keyframes))
+    if spec.tendons:
         _follow_tendons(spec, tendons)
     keyframes.put_back(spec)
 
@@ -97,20 +86,22 @@ class Keyframes:
 
     def take(self, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
         """Take the keyframes out of a specification that compiles to the model."""
-        slices = _slices_of(model)
+        data = mujoco.MjData(model)
         for i, key in enumerate(list(spec.keys)):
-            values: dict[str, dict[str, Array]] = {}
-            for field in [field for field in _FIELDS if len(getattr(key, field))]:
-                row = getattr(model, f"key_{field}")[i].ravel()
-                values[field] = {name: row[at].copy() for name, at in slices[field].items()}
+            mujoco.mj_resetDataKeyframe(model, data, i)
+            numbers = _numbers(model, data)
+            values = {
+                field: {name: view.copy() for name, view in numbers[field].items()}
+                for field in _FIELDS
+                if len(getattr(key, field))
+            }
             self._values.append(({"name": key.name, "time": key.time}, values))
             spec.delete(key)
 
     def copy(self, originals: Mapping[str, str]) -> None:
         """Give copied joints, actuators and bodies the values of the elements that were copied.
 
-        Args:
-            originals: Names of the elements that were copied, by those of the copies.
+        `originals` has the names of the elements that were copied by those of the copies.
         """
         for known in (known for _, values in self._values for known in values.values()):
             known |= {new: known[old] for new, old in originals.items() if old in known}
@@ -118,9 +109,7 @@ class Keyframes:
     def change(self, joint: str, changed: Callable[[Array], Array]) -> None:
         """Change the position of a joint in every keyframe that gives positions.
 
-        Args:
-            joint: Name of the joint.
-            changed: Returns the new position (1, 4 or 7 numbers) from the old one.
+        `changed` returns the new position (1, 4 or 7 numbers) from the old one.
         """
         for _, values in self._values:
             positions = values.get("qpos", {})
@@ -132,40 +121,30 @@ class Keyframes:
         if not self._values:
             return
         model = compiled(spec)
-        slices = _slices_of(model)
-        data = mujoco.MjData(model)
         for about, values in self._values:
-            key = spec.add_key(**about)
+            data = mujoco.MjData(model)
+            numbers, key = _numbers(model, data), spec.add_key(**about)
             for field, known in values.items():
+                for name, view in numbers[field].items():
+                    if name in known and known[name].size == view.size:
+                        view[:] = known[name]
                 own = {"mpos": "mocap_pos", "mquat": "mocap_quat"}.get(field, field)
-                row = np.array(getattr(data, own)).ravel()
-                for name, at in slices[field].items():
-                    if name in known and known[name].size == row[at].size:
-                        row[at] = known[name]
-                setattr(key, field, row)
+                setattr(key, field, getattr(data, own).ravel())
 
 
-def _slices_of(model: mujoco.MjModel) -> dict[str, dict[str, slice]]:
-    """Return where each element's numbers are, by field of a keyframe and by name."""
-    found: dict[str, dict[str, slice]] = {field: {} for field in _FIELDS}
-    for i in range(model.njnt):
-        position, velocity = _SIZES.get(_J(model.jnt_type[i]), (1, 1))
-        name, at, dof = model.joint(i).name, model.jnt_qposadr[i], model.jnt_dofadr[i]
-        found["qpos"][name] = slice(at, at + position)
-        found["qvel"][name] = slice(dof, dof + velocity)
-    for i in range(model.nactuator):
-        name = model.actuator(i).name
-        for field, starts, counts in (
-            ("act", model.actuator_actadr, model.actuator_actnum),
-            ("ctrl", model.actuator_ctrladr, model.actuator_ctrlnum),
-        ):
-            if counts[i]:
-                found[field][name] = slice(starts[i], starts[i] + counts[i])
-    for body in np.flatnonzero(model.body_mocapid >= 0).tolist():
-        name, i = model.body(body).name, int(model.body_mocapid[body])
-        found["mpos"][name] = slice(3 * i, 3 * i + 3)
-        found["mquat"][name] = slice(4 * i, 4 * i + 4)
-    return found
+def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, dict[str, Array]]:
+    """Return each element's numbers in `data`, by field of a keyframe and by name."""
+    joints = [data.joint(i) for i in range(model.njnt)]
+    acts = zip(model.actuator_actadr, model.actuator_actnum, strict=True)
+    mocap = [(model.body(b).name, model.body_mocapid[b]) for b in range(model.nbody)]
+    return {
+        "qpos": {joint.name: joint.qpos for joint in joints},
+        "qvel": {joint.name: joint.qvel for joint in joints},
+        "act": {model.actuator(i).name: data.act[at : at + n] for i, (at, n) in enumerate(acts)},
+        "ctrl": {model.actuator(i).name: data.actuator(i).ctrl for i in range(model.nactuator)},
+        "mpos": {name: data.mocap_pos[i] for name, i in mocap if i >= 0},
+        "mquat": {name: data.mocap_quat[i] for name, i in mocap if i >= 0},
+    }
 
 
 # --- Tendons -----------------------------------------------------------------------------------
@@ -193,13 +172,15 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
     for i in range(model.ntendon):
         inside: list[bool] = []
         for j in range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]):
-            if model.wrap_type[j] not in _ROUND or model.wrap_prm[j] < 0.0:
+            kind, side = model.wrap_type[j], int(model.wrap_prm[j])
+            if kind not in (int(_W.mjWRAP_SPHERE), int(_W.mjWRAP_CYLINDER)) or side < 0:
                 continue
             geom = model.wrap_objid[j]
-            site = data.site_xpos[int(model.wrap_prm[j])] - data.geom_xpos[geom]
-            place = data.geom_xmat[geom].reshape(3, 3).T @ site
+            place = data.geom_xmat[geom].reshape(3, 3).T @ (
+                data.site_xpos[side] - data.geom_xpos[geom]
+            )
             # A cylinder has no ends for a tendon.
-            reach = place[:2] if model.wrap_type[j] == _W.mjWRAP_CYLINDER else place
+            reach = place[:2] if kind == _W.mjWRAP_CYLINDER else place
             inside.append(bool(np.linalg.norm(reach) < model.geom_size[geom, 0]))
         length = float(data.ten_length[i])
         low, high = model.tendon_range[i]
@@ -241,10 +222,6 @@ def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
 # --- Loops and couplings -----------------------------------------------------------------------
 
 
-def _has_loops(spec: mujoco.MjSpec) -> bool:
-    return any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
-
-
 def _mark_pins(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     """Replace the places of pins between bodies by sites, which edits carry along."""
     for i, equality in enumerate(spec.equalities):
@@ -263,15 +240,12 @@ def _mark_pins(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
 
 
 def _close_loops(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, torn: set[Element]
-) -> tuple[mujoco.MjData, dict[str, Array]]:
+    spec: mujoco.MjSpec, model: mujoco.MjModel, torn: set[Element], keyframes: Keyframes
+) -> mujoco.MjData:
     """Move the joints of the model's own pose until all pins and couplings hold that held before.
 
-    Positions of hinges and slides keep their meaning: their references move.
-
-    Returns:
-        The data of the model in its new pose, and the turns of ball joints by their names as
-        quaternions (w, x, y, z).
+    Positions of hinges and slides keep their meaning, since their references move, and so do those
+    of balls in the keyframes. Return the data of the model in its new pose.
 
     Raises:
         MorphologyError: If no pose of its joints closes a loop.
@@ -287,33 +261,34 @@ def _close_loops(
         names = [equality.name1, equality.name2]
         if name.startswith(MARK):
             names = [spec.site(end).parent.name for end in names]
-        ends = " and ".join(repr(end) for end in names if end)
-        loop = f"the {'coupling' if equality.type in COUPLINGS else 'pin'} of {ends}"
+        loop = f"the {'coupling' if equality.type in COUPLINGS else 'pin'} of "
         raise MorphologyError(
-            f"The edits leave {loop} open by {gap:.3g} m or rad, and no position "
-            "of its joints within their limits closes it: change its other links or joints too."
+            f"The edits leave {loop}{' and '.join(repr(end) for end in names if end)} open by "
+            f"{gap:.3g} m or rad, and no position of its joints within their limits closes it: "
+            "change its other links or joints too."
         )
-    balls: dict[str, Array] = {}
+    moved = False
     changes: dict[Element, float] = {}
     for i in range(model.njnt):
-        at = model.jnt_qposadr[i]
-        name, by = model.joint(i).name, float(data.qpos[at] - model.qpos0[at])
-        if model.jnt_type[i] == _J.mjJNT_BALL:
+        joint, at = spec.joint(model.joint(i).name), model.jnt_qposadr[i]
+        by = float(data.qpos[at] - model.qpos0[at])
+        if joint.type == _J.mjJNT_BALL:
             turn = data.qpos[at : at + 4].copy()
             if np.abs(turn - UPRIGHT).max() > _STILL:
-                balls[name] = turn
-                displace(spec, spec.joint(name), turn)
-        elif model.jnt_type[i] != _J.mjJNT_FREE and abs(by) > _STILL:
-            joint = spec.joint(name)
-            displace(spec, joint, by)
+                moved = True
+                displace(joint, turn)
+                keyframes.change(joint.name, lambda pose, turn=turn: product(inverse(turn), pose))
+        elif joint.type != _J.mjJNT_FREE and abs(by) > _STILL:
+            moved = True
+            displace(joint, by)
             set_reference(joint, reference_of(joint) + by)
-            changes[_O.mjOBJ_JOINT, name] = by
-    if changes or balls:
-        by_name = zip(range(model.ntendon), data.ten_length - lengths, strict=True)
-        changes |= {(_O.mjOBJ_TENDON, model.tendon(i).name): float(by) for i, by in by_name}
+            changes[_O.mjOBJ_JOINT, joint.name] = by
+    if moved:
+        longer = (data.ten_length - lengths).tolist()
+        changes |= {(_O.mjOBJ_TENDON, model.tendon(i).name): by for i, by in enumerate(longer)}
         for equality in spec.equalities:
             _shift_coupling(equality, changes)
-    return data, balls
+    return data
 
 
 def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
@@ -329,7 +304,7 @@ def _unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
             own[:3] = second.pos
             if own[6:10].any() or not (together and np.allclose(a.xmat, b.xmat, 0.0, _TOGETHER)):
                 own[3:6] = first.pos
-                own[6:10] = product(orientation(spec, first), inverse(orientation(spec, second)))
+                own[6:10] = product(orientation(first), inverse(orientation(second)))
         elif together:
             own[:3] = first.pos
         else:  # One that is switched off, and open: only sites can state both places.
@@ -361,8 +336,7 @@ def _keys(spec: mujoco.MjSpec) -> list[Element]:
 
 def _residuals(spec: mujoco.MjSpec, data: mujoco.MjData) -> dict[Element, float]:
     """Return by how much each active equality is open, m or rad."""
-    found: dict[Element, float] = {}
-    keys = _keys(spec)
+    found, keys = dict[Element, float](), _keys(spec)
     for row in range(data.ne):
         key = keys[int(data.efc_id[row])]
         found[key] = max(found.get(key, 0.0), float(abs(data.efc_pos[row])))
@@ -373,11 +347,10 @@ def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     """Move the joints to the nearest pose in which the equalities hold; return whether there is."""
     kinds = model.jnt_type
     # Whatever measures the turn of a ball would measure it from the new pose.
+    driven = model.actuator_trnid[np.isin(model.actuator_trntype, [int(t) for t in OF_JOINTS]), 0]
     measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
-    driven = model.actuator_trnid[np.isin(model.actuator_trntype, _DRIVES), 0]
     measured |= np.isin(np.arange(model.njnt), driven)
     still = (kinds == _FREE) | ((kinds == _BALL) & measured)
-    movable = ~still[model.dof_jntid]
     scalar = np.flatnonzero(kinds > _BALL)
     places, dofs = model.jnt_qposadr[scalar], model.jnt_dofadr[scalar]
     low, high = np.where(model.jnt_limited[scalar], model.jnt_range[scalar].T, _UNLIMITED)
@@ -388,17 +361,14 @@ def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
         if not residual.size or np.abs(residual).max() <= _CLOSED:
             return True
         jacobian = data.efc_J.reshape(-1, model.nv)[: data.ne]
-        step = np.zeros(model.nv)
-        turning = movable & ~at_limit
+        step, turning = np.zeros(model.nv), ~still[model.dof_jntid] & ~at_limit
         step[turning] = -np.linalg.pinv(jacobian[:, turning], _SINGULAR) @ residual
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max(initial=0.0)), _LONGEST_STEP))
-        pose = data.qpos.copy()
-        mujoco.mj_integratePos(model, pose, step, 1.0)
-        clipped = np.clip(pose[places], low, high)
+        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
+        clipped = np.clip(data.qpos[places], low, high)
         # A joint at its limit is left out of the next step, which the others must make.
-        at_limit[dofs] = clipped != pose[places]
-        pose[places] = clipped
-        data.qpos[:] = pose
+        at_limit[dofs] = clipped != data.qpos[places]
+        data.qpos[places] = clipped
         mujoco.mj_fwdPosition(model, data)
     return False
 
@@ -406,8 +376,7 @@ def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
 def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float]) -> None:
     """Keep the meaning of a coupling if references have moved, by these changes, rad or m."""
     kind = COUPLINGS.get(equality.type, _O.mjOBJ_UNKNOWN)
-    by_follower = changes.get((kind, equality.name1), 0.0)
-    by_leader = changes.get((kind, equality.name2), 0.0)
+    by_follower, by_leader = (changes.get((kind, n), 0.0) for n in (equality.name1, equality.name2))
     if by_follower or by_leader:
         data = np.array(equality.data)
         if not equality.name2:

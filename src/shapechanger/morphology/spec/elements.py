@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, TypeVar
 
 import mujoco
 import numpy as np
@@ -29,7 +29,6 @@ from shapechanger.morphology.spec.references import kind_of
 
 LEAST_MASS: Final = 1e-14
 """Ten times the mass and the inertia of a body that MuJoCo refuses, kg and kg·m²."""
-
 
 _N = TypeVar("_N", bound=Any)
 
@@ -56,11 +55,8 @@ def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
 def select_limbs(spec: mujoco.MjSpec, pattern: str, change: str) -> Iterator[mujoco.MjsBody]:
     """Yield the bodies that match and are there still, since a change may remove others.
 
-    The change, such as "cut", is for the message.
-
-    Raises:
-        UnknownName: If none matches.
-        MorphologyError: If one is a trunk: a body on the world, which carries the whole robot.
+    The change, such as "cut", is for the message that refuses a trunk: a body on the world, which
+    carries the whole robot.
     """
     for name in [body.name for body in select("body", pattern, spec.bodies[1:])]:
         body = spec.body(name)
@@ -75,11 +71,7 @@ def select_limbs(spec: mujoco.MjSpec, pattern: str, change: str) -> Iterator[muj
 
 
 def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
-    """Refuse a name that an element of the kind, such as "body", already has.
-
-    Raises:
-        MorphologyError: If `name` is empty or taken.
-    """
+    """Refuse a name that is empty, or that an element of the kind, such as "body", has."""
     elements = getattr(spec, {"body": "bodies", "equality": "equalities"}.get(kind, f"{kind}s"))
     if not name or any(element.name == name for element in elements):
         raise MorphologyError(f"A new {kind} needs an unused name, got {name!r}.")
@@ -96,11 +88,11 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
         bodies_by_joint: Names for unnamed bodies by the names of their joints.
     """
     chosen = bodies_by_joint or {}
-    body_name = unique_namer(body.name for body in spec.bodies)
+    free = unique_namer(body.name for body in spec.bodies)
     for body in spec.bodies[1:]:
         if not body.name:
             joint = next((j.name for j in body.joints if j.name), "")
-            body.name = body_name(chosen.get(joint, joint or f"{body.parent.name}_part"))
+            body.name = free(chosen.get(joint, joint or f"{body.parent.name}_part"))
     for elements in (spec.joints, spec.geoms, spec.sites, spec.cameras, spec.lights):
         free = unique_namer(element.name for element in elements)
         for element in elements:
@@ -111,12 +103,7 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
 
 
 def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str], str]:
-    """Return a function that returns the name it is given, numbered if that is taken.
-
-    Args:
-        taken: Names that are taken; so is each name that the function has returned.
-        numbered: Format of the number after the name.
-    """
+    """Return a function that returns the name it is given, `numbered` if that is taken by now."""
     used = set(taken)
 
     def free(name: str) -> str:
@@ -152,8 +139,7 @@ def make_explicit(spec: mujoco.MjSpec) -> None:
     name_elements(spec)
     resolve_frames(spec)
     if spec.compiler.settotalmass > 0.0:
-        total = spec.compiler.settotalmass
-        spec.compiler.settotalmass = -1.0
+        total, spec.compiler.settotalmass = spec.compiler.settotalmass, -1.0
         factor = total / float(spec.copy().compile().body_mass.sum())
         for body in spec.bodies[1:]:
             scale_mass(body, factor)
@@ -162,8 +148,7 @@ def make_explicit(spec: mujoco.MjSpec) -> None:
     fitted = [e for e in (*spec.geoms, *spec.sites) if e.meshname and e.type not in meshes]
     model: Any = compiled(spec) if fitted else None
     for element in fitted:
-        kind = model.geom if isinstance(element, mujoco.MjsGeom) else model.site
-        final = kind(element.name)
+        final = getattr(model, kind_of(element))(element.name)
         element.meshname = ""
         element.size, element.pos = final.size, final.pos
         set_orientation(element, final.quat)
@@ -205,48 +190,33 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
             raise MorphologyError(
                 f"The frame {frame.name!r} scales its elements: write the sizes out instead."
             )
-    frames = [frame for frame in spec.frames if not _is_trivial(frame)]
-    if not frames:
+    if all(not np.any(f.pos) and np.array_equal(orientation(f), UPRIGHT) for f in spec.frames):
         return
-    for element in (*spec.bodies[1:], *spec.geoms, *spec.sites, *spec.cameras):
-        if pose := _pose_of_frames(spec, element.frame):
-            _resolve(spec, element, pose)
-    for joint in spec.joints:
-        if pose := _pose_of_frames(spec, joint.frame):
-            joint.pos = pose.seen(joint.pos)
-            joint.axis = rotation(pose.turn) @ joint.axis
-    for light in spec.lights:
-        if pose := _pose_of_frames(spec, light.frame):
-            light.pos = pose.seen(light.pos)
-            light.dir = rotation(pose.turn) @ light.dir
-    for frame in frames:
+    points = (*spec.geoms, *spec.sites, *spec.cameras, *spec.joints, *spec.lights)
+    for element in (*spec.bodies[1:], *points):
+        frames: list[mujoco.MjsFrame] = []
+        frame: Any = element.frame
+        while frame is not None:
+            frames.append(frame)
+            frame = frame.frame
+        if frames:
+            turn, shift = orientation(frames[0]), np.array(frames[0].pos)
+            for around in frames[1:]:
+                outer = orientation(around)
+                turn, shift = product(outer, turn), around.pos + rotation(outer) @ shift
+            _resolve(element, turn, shift)
+    for frame in spec.frames:
         frame.pos = np.zeros(3)
         set_orientation(frame, UPRIGHT)
 
 
-def _is_trivial(frame: mujoco.MjsFrame) -> bool:
-    """Return whether a frame neither moves nor turns its elements."""
-    written = frame.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
-    return written and not np.any(frame.pos) and np.array_equal(frame.quat, UPRIGHT)
-
-
-class _Pose(NamedTuple):
-    """Pose of frames in their body's frame: quaternion (w, x, y, z) and position, m."""
-
-    turn: Array
-    shift: Array
-
-    def seen(self, point: Array) -> Array:
-        """Return a point of a frame relative to the body, m."""
-        return self.shift + rotation(self.turn) @ point
-
-
-def _resolve(spec: mujoco.MjSpec, element: Any, pose: _Pose) -> None:
-    """Express the pose of a body, geom, site or camera relative to its body."""
+def _resolve(element: Any, turn: Array, shift: Array) -> None:
+    """Express the pose of an element relative to its body."""
+    matrix = rotation(turn)
     if has_ends(element):
         first, last = element.fromto.reshape(2, 3)
         if element.type != mujoco.mjtGeom.mjGEOM_BOX:
-            element.fromto = np.concatenate([pose.seen(first), pose.seen(last)])
+            element.fromto = np.concatenate([shift + matrix @ first, shift + matrix @ last])
             return
         # The turn of a box about its axis follows from the frame: write its pose, as MuJoCo does.
         length, upwards = float(np.linalg.norm(first - last)), np.empty(4)
@@ -254,17 +224,9 @@ def _resolve(spec: mujoco.MjSpec, element: Any, pose: _Pose) -> None:
         element.pos, element.quat = 0.5 * (first + last), upwards
         element.size = [element.size[0], element.size[0], 0.5 * length]
         element.fromto = np.full(6, np.nan)
-    element.pos = pose.seen(element.pos)
-    set_orientation(element, product(pose.turn, orientation(spec, element)))
-
-
-def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> _Pose | None:
-    """Return the pose of nested frames relative to the body; None without a frame."""
-    pose = None
-    while frame is not None:
-        around = _Pose(orientation(spec, frame), np.array(frame.pos))
-        if pose is not None:
-            around = _Pose(product(around.turn, pose.turn), around.seen(pose.shift))
-        pose = around
-        frame = frame.frame
-    return pose
+    element.pos = shift + matrix @ element.pos
+    if hasattr(element, "quat"):
+        set_orientation(element, product(turn, orientation(element)))
+    for direction in ("axis", "dir"):
+        if hasattr(element, direction):
+            setattr(element, direction, matrix @ getattr(element, direction))

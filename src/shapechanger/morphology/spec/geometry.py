@@ -1,4 +1,4 @@
-"""Geometry of geoms and segments: pose, size, volume, mass, and how they stretch.
+"""Geometry of geoms, segments and joints: pose, size, volume, mass, and how they stretch.
 
 Points are in the frame of the body, shape (3,), m; quaternions are (w, x, y, z).
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,13 +20,21 @@ from shapechanger.morphology.spec.references import key_of, release_drawings
 Array = NDArray[np.float64]
 Point = mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsLight
 _G: Final = mujoco.mjtGeom
+_J: Final = mujoco.mjtJoint
 LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
+_QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
+# Its method needs a specification, and none of what that holds.
+_RESOLVER: Final = mujoco.MjSpec()
 _AXES: Final = {"x": 0, "y": 1, "z": 2}
-_TURNING: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
+# A joint without limits turns all the way round; a slide without limits has no such number.
+_FULL_TURN: Final = (-math.pi, math.pi)
 # Cosine above which a geom lies along an axis; the pole of the inverted pendulum leans by 1 mm on
 # 600.
-ALONG: Final = 0.999
+_ALONG: Final = 0.999
+# Shares of a length that differ by less are the same; rounding must not decide on which side of a
+# cut a point lies.
+_SAME: Final = 1e-9
 
 
 # --- Turns -------------------------------------------------------------------------------------
@@ -53,26 +61,25 @@ def inverse(quaternion: Array) -> Array:
     return result
 
 
-def orientation(spec: mujoco.MjSpec, element: Any, *, of_inertia: bool = False) -> Array:
-    """Return the quaternion of an element, or of a body's inertia, however it was written."""
-    written, quaternion = element.alt, element.quat
-    if of_inertia:
-        written, quaternion = element.ialt, element.iquat
-    if written.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
-        given = np.array(quaternion, dtype=np.float64)
-        return given / np.linalg.norm(given)
+def orientation(element: Any, quat: str = "quat", alt: str = "alt") -> Array:
+    """Return the unit quaternion of an element, however its orientation is written.
+
+    That of a body's inertia is in the fields `iquat` and `ialt`.
+    """
+    quaternion, written = getattr(element, quat), getattr(element, alt)
+    if written.type == _QUAT:
+        return quaternion / np.linalg.norm(quaternion)
     compiler = element.compiler
-    return np.array(
-        spec.resolve_orientation(
-            degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=written
-        )
+    resolved = _RESOLVER.resolve_orientation(
+        degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=written
     )
+    return np.array(resolved)
 
 
 def set_orientation(element: Any, quaternion: Array) -> None:
     """Set an element's quaternion, and drop any other form of its orientation."""
     element.quat = quaternion
-    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    element.alt.type = _QUAT
 
 
 # --- Geoms and points --------------------------------------------------------------------------
@@ -84,13 +91,13 @@ def has_ends(element: Any) -> bool:
     return shaped and not math.isnan(element.fromto[0])
 
 
-def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
+def axis_ends(geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
     """Return both ends of the axis of a capsule or cylinder; None for other shapes."""
     if geom.type not in LONG:
         return None
     if has_ends(geom):
         return np.array(geom.fromto[:3]), np.array(geom.fromto[3:])
-    half = rotation(orientation(spec, geom))[:, 2] * geom.size[1]
+    half = rotation(orientation(geom))[:, 2] * geom.size[1]
     return geom.pos - half, geom.pos + half
 
 
@@ -116,7 +123,7 @@ def move_by(element: Any, shift: Array) -> None:
         element.pos = element.pos + shift
 
 
-def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
+def volume(geom: mujoco.MjsGeom) -> float:
     """Return the volume of a primitive geom, m³."""
     a, b, c = (float(x) for x in geom.size)
     if has_ends(geom):
@@ -129,27 +136,25 @@ def volume(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> float:
         case _G.mjGEOM_BOX:
             return 8.0 * a * b * c
         case _:
-            ends = axis_ends(spec, geom)
+            ends = axis_ends(geom)
             length = float(np.linalg.norm(ends[1] - ends[0])) if ends else 0.0
             caps = 4.0 / 3.0 * math.pi * a**3 if geom.type == _G.mjGEOM_CAPSULE else 0.0
             return math.pi * a**2 * length + caps
 
 
 @contextmanager
-def same_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Generator[None]:
+def same_density(geom: mujoco.MjsGeom) -> Generator[None]:
     """Scale a mass that is written out with the volume of a geom whose shape is changed."""
-    before = volume(spec, geom)
+    before = volume(geom)
     yield
     if not math.isnan(geom.mass) and before > 0.0:
-        geom.mass *= volume(spec, geom) / before
+        geom.mass *= volume(geom) / before
 
 
 def scale_geom_mass(geom: mujoco.MjsGeom, factor: float) -> None:
     """Scale a geom's mass, whether it is given as a mass or as a density."""
-    if math.isnan(geom.mass):
-        geom.density *= factor
-    else:
-        geom.mass *= factor
+    field = "density" if math.isnan(geom.mass) else "mass"
+    setattr(geom, field, getattr(geom, field) * factor)
 
 
 def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
@@ -162,11 +167,74 @@ def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
         scale_geom_mass(geom, factor)
 
 
-def stretched(point: Array, held: Array, factor: float, axis: str | None = None) -> Array:
-    """Return a point of a segment that is `factor` times as long, along one axis or all three.
+def resize_geom(geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
+    """Scale a geom in every direction about the point `held`."""
+    with same_density(geom):
+        geom.size = geom.size * factor
+        _move_outwards(geom, held, factor)
 
-    The point `held` stays.
+
+def thicken_geom(geom: mujoco.MjsGeom, factor: float) -> None:
+    """Scale the thickness of a geom: its radius, or its two smaller half-sizes."""
+    with same_density(geom):
+        size = np.array(geom.size)
+        if geom.type in (*LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
+            size[0] *= factor
+        else:
+            size[np.arange(3) != np.argmax(size)] *= factor
+        geom.size = size
+
+
+# --- Segments ----------------------------------------------------------------------------------
+
+
+def anchor(body: mujoco.MjsBody) -> Array:
+    """Return the anchor of a segment: where its first hinge or ball holds it, or its origin."""
+    turning = (_J.mjJNT_HINGE, _J.mjJNT_BALL)
+    return next((np.array(j.pos) for j in body.joints if j.type in turning), np.zeros(3))
+
+
+def held_at(body: mujoco.MjsBody) -> Array:
+    """Return the anchor of a segment in its parent's frame, m."""
+    return body.pos + rotation(orientation(body)) @ anchor(body)
+
+
+def far_end(body: mujoco.MjsBody) -> Array:
+    """Return the point of a segment's axis farthest from its anchor.
+
+    Raises:
+        MorphologyError: If the body has no capsule or cylinder.
     """
+    held = anchor(body)
+    ends = [end for geom in body.geoms for end in axis_ends(geom) or ()]
+    if not ends:
+        raise MorphologyError(f"{body.name!r} has no capsule or cylinder, so it has no far end.")
+    return max(ends, key=lambda end: float(np.linalg.norm(end - held)))
+
+
+def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
+    """Return whether a body states its own mass and inertia instead of using those of its geoms."""
+    from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    return bool(body.explicitinertial) and not from_geoms
+
+
+def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+    """Refuse a body whose mass and inertia would not follow a new shape of its geoms."""
+    if inertia_is_written_out(spec, body):
+        raise MorphologyError(
+            f"{body.name!r} has its inertia written out, so it would not follow a new shape: "
+            "remove its <inertial> or set inertiafromgeom."
+        )
+    for geom in body.geoms:
+        if geom.type in (_G.mjGEOM_MESH, _G.mjGEOM_HFIELD, _G.mjGEOM_SDF):
+            raise MorphologyError(
+                f"{body.name!r} holds {geom.name!r}, a mesh; only spheres, capsules, cylinders, "
+                "boxes and ellipsoids can be reshaped."
+            )
+
+
+def stretched(point: Array, held: Array, factor: float, axis: str | None = None) -> Array:
+    """Return a point of a segment that is `factor` times as long; the point `held` stays."""
     scale = np.full(3, factor)
     if axis is not None:
         scale = np.ones(3)
@@ -181,97 +249,6 @@ def _move_outwards(element: Any, held: Array, factor: float, axis: str | None = 
         element.fromto = np.concatenate(ends)
     else:
         element.pos = stretched(element.pos, held, factor, axis)
-
-
-def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
-    """Scale a geom in every direction about the point `held`."""
-    with same_density(spec, geom):
-        geom.size = geom.size * factor
-        _move_outwards(geom, held, factor)
-
-
-def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
-    """Scale the thickness of a geom: its radius, or its two smaller half-sizes."""
-    with same_density(spec, geom):
-        size = np.array(geom.size)
-        if geom.type in (*LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
-            size[0] *= factor
-        else:
-            size[np.arange(3) != np.argmax(size)] *= factor
-        geom.size = size
-
-
-def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
-    """Scale the long half-size of a geom that is given by position and size."""
-    if geom.type == _G.mjGEOM_SPHERE:
-        return  # A sphere has no length.
-    size = np.array(geom.size)
-    place, direction = (1, 2) if geom.type in LONG else (int(np.argmax(size)),) * 2
-    if axis is not None:
-        # How much each axis of the geom lies along that of the body.
-        along = np.abs(rotation(orientation(spec, geom))[_AXES[axis]])
-        if geom.type not in LONG:
-            place = direction = int(np.argmax(along))
-        if along[direction] < 1.0 - ALONG:
-            return  # It lies across the axis.
-        if along[direction] < ALONG:
-            raise MorphologyError(
-                f"{geom.name!r} lies oblique to the axis {axis!r}: stretch it along all axes "
-                "instead."
-            )
-    size[place] *= factor
-    geom.size = size
-
-
-# --- Segments ----------------------------------------------------------------------------------
-
-
-def anchor(body: mujoco.MjsBody) -> Array:
-    """Return the anchor of a segment: where its first hinge or ball holds it, or its origin."""
-    return next((np.array(j.pos) for j in body.joints if j.type in _TURNING), np.zeros(3))
-
-
-def held_at(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
-    """Return the anchor of a segment in its parent's frame, m."""
-    return body.pos + rotation(orientation(spec, body)) @ anchor(body)
-
-
-def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
-    """Return the point of a segment's axis farthest from its anchor.
-
-    Raises:
-        MorphologyError: If the body has no capsule or cylinder.
-    """
-    held = anchor(body)
-    ends = [end for geom in body.geoms for end in axis_ends(spec, geom) or ()]
-    if not ends:
-        raise MorphologyError(f"{body.name!r} has no capsule or cylinder, so it has no far end.")
-    return max(ends, key=lambda end: float(np.linalg.norm(end - held)))
-
-
-def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
-    """Return whether a body states its own mass and inertia instead of using those of its geoms."""
-    from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    return bool(body.explicitinertial) and not from_geoms
-
-
-def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
-    """Refuse a body whose mass does not follow from its geoms, or that has meshes.
-
-    Raises:
-        MorphologyError: If its mass and inertia would not follow a new shape.
-    """
-    if inertia_is_written_out(spec, body):
-        raise MorphologyError(
-            f"{body.name!r} has its inertia written out, so it would not follow a new shape: "
-            "remove its <inertial> or set inertiafromgeom."
-        )
-    for geom in body.geoms:
-        if geom.type in (_G.mjGEOM_MESH, _G.mjGEOM_HFIELD, _G.mjGEOM_SDF):
-            raise MorphologyError(
-                f"{body.name!r} holds {geom.name!r}, a mesh; only spheres, capsules, cylinders, "
-                "boxes and ellipsoids can be reshaped."
-            )
 
 
 def stretch_segment(
@@ -290,15 +267,37 @@ def stretch_segment(
     release_drawings(spec, {key_of(body)})
     held = anchor(body)
     for geom in body.geoms:
-        with same_density(spec, geom):
+        with same_density(geom):
             if not has_ends(geom):
-                _lengthen(spec, geom, factor, axis)
+                _lengthen(geom, factor, axis)
             _move_outwards(geom, held, factor, axis)
-    carry_outwards(spec, body, held, factor, axis)
+    carry_outwards(body, held, factor, axis)
+
+
+def _lengthen(geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
+    """Scale the long half-size of a geom that is given by position and size."""
+    if geom.type == _G.mjGEOM_SPHERE:
+        return  # A sphere has no length.
+    size = np.array(geom.size)
+    place, direction = (1, 2) if geom.type in LONG else (int(np.argmax(size)),) * 2
+    if axis is not None:
+        # How much each axis of the geom lies along that of the body.
+        along = np.abs(rotation(orientation(geom))[_AXES[axis]])
+        if geom.type not in LONG:
+            place = direction = int(np.argmax(along))
+        if along[direction] < 1.0 - _ALONG:
+            return  # It lies across the axis.
+        if along[direction] < _ALONG:
+            raise MorphologyError(
+                f"{geom.name!r} lies oblique to the axis {axis!r}: stretch it along all axes "
+                "instead."
+            )
+    size[place] *= factor
+    geom.size = size
 
 
 def carry_outwards(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
+    body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
 ) -> None:
     """Move what is attached to a stretched segment: joints, sites, cameras, lights and bodies."""
     modes = mujoco.mjtCamLight
@@ -308,5 +307,116 @@ def carry_outwards(
     for element in (*body.joints, *body.sites, *mounted):
         _move_outwards(element, held, factor, axis)
     for child in body.bodies:
-        held_there = held_at(spec, child)
+        held_there = held_at(child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
+
+
+# --- Cuts --------------------------------------------------------------------------------------
+
+
+class NearPart(NamedTuple):
+    """The part of a geom that lies on the near side of a plane.
+
+    Attributes:
+        near: End of its axis on that side, in the body's frame, shape (3,), m.
+        share: Share of its length on that side: 1 for all of the geom, 0 for nothing of it.
+        axis: Index of the half-size that is its length.
+    """
+
+    near: Array
+    share: float
+    axis: int
+
+
+class Plane:
+    """A plane across a segment, at a share of the segment's length from its anchor.
+
+    Attributes:
+        along: From the anchor of the segment to its far end, in the body's frame, shape (3,), m.
+        place: Where it crosses the axis of the segment, in the body's frame, shape (3,), m.
+    """
+
+    def __init__(self, body: mujoco.MjsBody, part: float) -> None:
+        self._body, self._part = body, part
+        self._held = anchor(body)
+        self.along = far_end(body) - self._held
+        self.place = self._held + part * self.along
+
+    def _share(self, point: Array) -> float:
+        """Return the position of a point along the segment as a share of its length."""
+        return float((point - self._held) @ self.along) / float(self.along @ self.along)
+
+    def _is_beyond(self, point: Array) -> bool:
+        return self._share(point) > self._part + _SAME
+
+    def is_at_end(self, point: Point) -> bool:
+        """Return whether a point of the segment is at its far end or past it."""
+        return self._share(place_of(point)) > 1.0 - _SAME
+
+    def children_beyond(self) -> list[mujoco.MjsBody]:
+        """Return the bodies that are attached farther out than the plane."""
+        return [c for c in self._body.bodies if self._is_beyond(held_at(c))]
+
+    def points_beyond(self) -> list[Point]:
+        """Return the sites, cameras and lights of the segment farther out than the plane."""
+        points = (*self._body.sites, *self._body.cameras, *self._body.lights)
+        return [point for point in points if self._is_beyond(place_of(point))]
+
+    def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
+        """Return the part of a geom on the near side; one without a length goes by its middle.
+
+        Raises:
+            MorphologyError: If the plane cuts a box that lies oblique to it.
+        """
+        ends, axis = self._ends(geom)
+        if ends is None:
+            return NearPart(place_of(geom), float(not self._is_beyond(place_of(geom))), axis)
+        inner, outer = (self._share(end) for end in ends)
+        near = ends[0]
+        if inner > outer:
+            near, inner, outer = ends[1], outer, inner
+        if outer <= self._part + _SAME or inner >= self._part - _SAME:
+            return NearPart(near, float(outer <= self._part + _SAME), axis)
+        # Exact for a geom that spans the segment.
+        if np.allclose(near, self._held, 0.0, _SAME):
+            near, inner = self._held, 0.0
+        outer = 1.0 if abs(outer - 1.0) < _SAME else outer
+        return NearPart(near, (self._part - inner) / (outer - inner), axis)
+
+    def _ends(self, geom: mujoco.MjsGeom) -> tuple[tuple[Array, Array] | None, int]:
+        """Return both ends of a geom's length, and the index of the half-size that it is."""
+        if geom.type in LONG:
+            return axis_ends(geom), 1
+        if geom.type != _G.mjGEOM_BOX:
+            return None, 0
+        if has_ends(geom):
+            return (np.array(geom.fromto[:3]), np.array(geom.fromto[3:])), 2
+        axes = rotation(orientation(geom))
+        along = np.abs(self.along @ axes) / float(np.linalg.norm(self.along))
+        axis = int(np.argmax(along))
+        if along[axis] >= _ALONG:
+            half = axes[:, axis] * geom.size[axis]
+            return (geom.pos - half, geom.pos + half), axis
+        signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8)
+        corners = ((axes * geom.size) @ signs).T
+        if len({self._is_beyond(geom.pos + corner) for corner in corners}) == 2:
+            raise MorphologyError(
+                f"{geom.name!r} lies oblique to the plane that would cut it in two: cut "
+                f"{self._body.name!r} elsewhere."
+            )
+        return None, axis
+
+
+def shorten(geom: mujoco.MjsGeom, piece: NearPart, share: float) -> None:
+    """Shorten a geom to a share of its length, at the same thickness and density.
+
+    The near end of the piece stays.
+    """
+    with same_density(geom):
+        if has_ends(geom):
+            geom.fromto = (piece.near + share * (geom.fromto.reshape(2, 3) - piece.near)).ravel()
+        else:
+            size = np.array(geom.size)
+            size[piece.axis] *= share
+            geom.size = size
+            geom.pos = piece.near + share * (geom.pos - piece.near)

@@ -13,7 +13,6 @@ import numpy as np
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import require_free_name, resolve_frames
 from shapechanger.morphology.spec.geometry import (
-    Point,
     anchor,
     carry_outwards,
     has_ends,
@@ -26,7 +25,6 @@ from shapechanger.morphology.spec.geometry import (
 from shapechanger.morphology.spec.joints import scale_resistance, scale_strength
 from shapechanger.morphology.spec.references import (
     COUPLINGS,
-    Element,
     elements_of,
     elements_on,
     key_of,
@@ -40,86 +38,13 @@ from shapechanger.morphology.spec.references import (
 )
 
 _O: Final = mujoco.mjtObj
+_W: Final = mujoco.mjtWrap
 # In a name while another element still has it; no name of a model has it.
 _OLD: Final = "~old"
 # Set apart: names are unique, and orientations are written in units that belong to each element.
 _APART: Final = frozenset(
     {"name", "alt", "ialt", "quat", "iquat", "classname", "childclass", "info"}
 )
-_IN_DEGREES: Final = ("range", "ref", "springref")
-
-
-def copy_limb(
-    spec: mujoco.MjSpec, limb: mujoco.MjsBody, suffix: str, angle: float
-) -> mujoco.MjsBody:
-    """Add a turned copy of a limb, with a copy of all that names its elements.
-
-    Points of the body that carries the limb, where tendons and pins begin, are copied and turned
-    with it; any other element that is named together with one of the limb is shared.
-
-    Args:
-        spec: Specification that contains it.
-        limb: First body of the limb.
-        suffix: Appended to the names of all copied elements.
-        angle: Turn about the z axis of the limb's parent, rad.
-
-    Returns:
-        The first body of the copy.
-
-    Raises:
-        MorphologyError: If a new name is taken, or an element cannot be copied.
-    """
-    turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
-    inside = elements_of(limb)
-    release_drawings(spec, inside, skins=False)
-    copied = _Copies(spec, limb, suffix, turn, inside)
-    copy = _copy_body(spec, limb, limb.parent.add_frame(quat=turn), lambda name: name + suffix)
-    resolve_frames(spec)
-    copied.copy_holders()
-    return copy
-
-
-def move_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, parent: mujoco.MjsBody) -> mujoco.MjsBody:
-    """Attach a limb to another body, at the same pose in its frame; what names it still does.
-
-    Returns:
-        The new body; the old handle is invalid.
-    """
-    # References are by name: under another name the old elements go without them.
-    for body in subtree(limb):
-        for element in (body, *elements_on(body)):
-            element.name += _OLD
-    moved = _copy_body(spec, limb, parent, lambda name: name.removesuffix(_OLD))
-    spec.delete(limb)
-    return moved
-
-
-def move_point(spec: mujoco.MjSpec, point: Point, body: mujoco.MjsBody) -> Any:
-    """Move a site, geom, camera or light to another body, to the same pose in its frame.
-
-    Returns:
-        The new element; the old handle is invalid.
-    """
-    name = point.name
-    point.name = name + _OLD  # References are by name.
-    moved = copy_element(spec, point, body, name)
-    spec.delete(point)
-    return moved
-
-
-def _copy_body(
-    spec: mujoco.MjSpec,
-    body: mujoco.MjsBody,
-    place: mujoco.MjsBody | mujoco.MjsFrame,
-    renamed: Callable[[str], str],
-) -> mujoco.MjsBody:
-    """Copy a body with all that hangs on it."""
-    copy = copy_element(spec, body, place, renamed(body.name))
-    for element in elements_on(body):
-        copy_element(spec, element, copy, element.name and renamed(element.name))
-    for child in body.bodies:
-        _copy_body(spec, child, copy, renamed)
-    return copy
 
 
 def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> Any:
@@ -143,14 +68,14 @@ def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> An
     for field in _fields_of(element.__class__):
         setattr(copy, field, getattr(element, field))
     if hasattr(element, "quat"):
-        copy.quat = orientation(spec, element)
+        copy.quat = orientation(element)
     if isinstance(element, mujoco.MjsBody):
-        copy.iquat = orientation(spec, element, of_inertia=True)
+        copy.iquat = orientation(element, "iquat", "ialt")
     # Limits of attached models can have other units than those of elements that are added.
     turns = isinstance(element, mujoco.MjsJoint) and element.type != mujoco.mjtJoint.mjJNT_SLIDE
     if turns and element.compiler.degree != copy.compiler.degree:
         convert = np.rad2deg if copy.compiler.degree else np.deg2rad
-        for field in _IN_DEGREES:
+        for field in ("range", "ref", "springref"):
             setattr(copy, field, convert(getattr(element, field)))
     copy.name = name
     return copy
@@ -163,6 +88,39 @@ def _fields_of(kind: type) -> tuple[str, ...]:
     return tuple(name for name in settable if name not in _APART)
 
 
+def _copy_body(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, place: Any, renamed: Callable[[str], str]
+) -> mujoco.MjsBody:
+    """Copy a body with all that hangs on it."""
+    copy = copy_element(spec, body, place, renamed(body.name))
+    for element in elements_on(body):
+        copy_element(spec, element, copy, element.name and renamed(element.name))
+    for child in body.bodies:
+        _copy_body(spec, child, copy, renamed)
+    return copy
+
+
+def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
+    """Attach a limb or a point to another body, at the same pose in its frame.
+
+    What names it still does.
+
+    Returns:
+        The new element; the old handle is invalid.
+    """
+    # References are by name: under another name the old elements go without them.
+    if isinstance(element, mujoco.MjsBody):
+        for body in subtree(element):
+            for each in (body, *elements_on(body)):
+                each.name += _OLD
+        moved = _copy_body(spec, element, parent, lambda name: name.removesuffix(_OLD))
+    else:
+        name, element.name = element.name, element.name + _OLD
+        moved = copy_element(spec, element, parent, name)
+    spec.delete(element)
+    return moved
+
+
 def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
     """Scale a limb in size and strength, in place, with everything attached to it.
 
@@ -173,8 +131,8 @@ def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> Non
         require_geometry(spec, body)
         held = anchor(body)
         for geom in body.geoms:
-            resize_geom(spec, geom, held, factor)
-        carry_outwards(spec, body, held, factor)
+            resize_geom(geom, held, factor)
+        carry_outwards(body, held, factor)
         for joint in body.joints:
             scale_resistance(joint, factor)
     elements = elements_of(limb)
@@ -196,123 +154,6 @@ def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> Non
             scale_strength(mention.holder, factor)
 
 
-# --- Elements that name others -----------------------------------------------------------------
-
-
-class _Copies:
-    """Copies of all that names the elements of a limb, with the arguments of `copy_limb`."""
-
-    def __init__(
-        self,
-        spec: mujoco.MjSpec,
-        limb: mujoco.MjsBody,
-        suffix: str,
-        turn: np.ndarray,
-        inside: set[Element],
-    ) -> None:
-        self._spec, self._suffix, self._turn = spec, suffix, turn
-        # The elements of the limb; those that are copied with it are added.
-        self._parent, self._inside = limb.parent, inside
-        # Points of the parent that have been copied and turned.
-        self._turned: set[Element] = set()
-        # Before there is a copy, whose cameras name elements too.
-        self._references = references(spec)
-
-    def copy_holders(self) -> None:
-        """Copy tendons, then equalities, contacts, actuators and sensors, and aim the cameras."""
-        spec, inside = self._spec, self._inside
-        for tendon in [each for each in spec.tendons if self._names_inside(each)]:
-            self._copy_tendon(tendon)
-            inside.add(key_of(tendon))
-        for equality in spec.equalities:
-            self._require_own_follower(equality)
-        # Sensors last: they may name the others.
-        holders = (*spec.equalities, *spec.excludes, *spec.pairs, *spec.actuators, *spec.sensors)
-        for holder in holders:
-            # An actuator whose other end alone is on the limb moves another limb.
-            moves = isinstance(holder, mujoco.MjsActuator)
-            if self._names_inside(holder, *(("target", "slidersite") if moves else ())):
-                self._copy_holder(holder)
-                inside.add(key_of(holder))
-        for mention in self._references:
-            aims = mention.kind in ("camera", "light") and key_of(mention.holder) in inside
-            if aims and mention.element in inside:
-                copy = getattr(spec, mention.kind)(mention.holder.name + self._suffix)
-                copy.targetbody = mention.element[1] + self._suffix
-
-    def _names_inside(self, holder: Any, *fields: str) -> bool:
-        """Return whether an element names one of the limb, in some of its fields or in any."""
-        return any(
-            each.element in self._inside
-            for each in self._references
-            if each.holder == holder and (not fields or each.field in fields)
-        )
-
-    def _require_own_follower(self, equality: mujoco.MjsEquality) -> None:
-        """Refuse a coupling that would lead an element outside of the limb twice."""
-        kind = COUPLINGS.get(equality.type)
-        if kind is None or (kind, equality.name1) in self._inside:
-            return
-        if (kind, equality.name2) in self._inside:
-            raise MorphologyError(
-                f"{equality.name1!r} follows {equality.name2!r}, and cannot follow a copy of it "
-                "too: copy a limb that holds both."
-            )
-
-    def _copy_holder(self, holder: Any) -> Any:
-        """Copy an element that names one of the limb, without the path of a tendon."""
-        name = holder.name and holder.name + self._suffix
-        copy = copy_element(self._spec, holder, self._spec, name)
-        tied = isinstance(holder, mujoco.MjsEquality | mujoco.MjsActuator)
-        for mention in self._references:
-            if mention.holder == holder and mention.kind != "tendon":
-                own = self._suffix if mention.element in self._inside else ""
-                new = self._name(*mention.element) if tied else mention.element[1] + own
-                setattr(copy, mention.field, new)
-        return copy
-
-    def _copy_tendon(self, tendon: mujoco.MjsTendon) -> None:
-        """Copy a tendon, with the points of its path outside of the limb turned."""
-        copy = self._copy_holder(tendon)
-        kinds = mujoco.mjtWrap
-        for wrap in path_of(tendon):
-            if wrap.type == kinds.mjWRAP_PULLEY:
-                copy.wrap_pulley(wrap.divisor)
-                continue
-            name = wrap.target.name
-            if wrap.type == kinds.mjWRAP_JOINT:
-                copy.wrap_joint(self._name(_O.mjOBJ_JOINT, name), wrap.coef)
-            elif wrap.type == kinds.mjWRAP_SITE:
-                copy.wrap_site(self._name(_O.mjOBJ_SITE, name))
-            else:
-                side = wrap.sidesite
-                side_site = self._name(_O.mjOBJ_SITE, side.name) if side else ""
-                copy.wrap_geom(self._name(_O.mjOBJ_GEOM, name), side_site)
-
-    def _name(self, kind: mujoco.mjtObj, name: str) -> str:
-        """Return the name of the copy of an element; of one that is shared, its own.
-
-        A site or geom of the body that carries the limb is copied when it is first asked for.
-        """
-        new = name + self._suffix
-        if (kind, name) in self._inside or (kind, name) in self._turned:
-            return new
-        finders = {_O.mjOBJ_SITE: self._spec.site, _O.mjOBJ_GEOM: self._spec.geom}
-        point = finders[kind](name) if kind in finders else None
-        if point is None or point.parent != self._parent or self._parent.parent is None:
-            return name
-        copy = copy_element(self._spec, point, self._parent, new)
-        matrix = rotation(self._turn)
-        if has_ends(copy):
-            copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
-        copy.pos = matrix @ copy.pos
-        copy.quat = product(self._turn, copy.quat)
-        if isinstance(copy, mujoco.MjsGeom):  # A tendon bends around it; that needs no second mass.
-            copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
-        self._turned.add((kind, name))
-        return new
-
-
 def share_contacts(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, part: mujoco.MjsBody, cut: dict[str, str]
 ) -> None:
@@ -326,3 +167,111 @@ def share_contacts(
         if far := halves.get(mention.element):
             name = mention.holder.name and f"{mention.holder.name}_of_{part.name}"
             setattr(copy_element(spec, mention.holder, spec, name), mention.field, far)
+
+
+def copy_limb(
+    spec: mujoco.MjSpec, limb: mujoco.MjsBody, suffix: str, angle: float
+) -> mujoco.MjsBody:
+    """Add a turned copy of a limb, with a copy of all that names its elements.
+
+    Points of the body that carries the limb, where tendons and pins begin, are copied and turned
+    with it; any other element that is named together with one of the limb is shared.
+
+    Args:
+        spec: Specification that contains it.
+        limb: First body of the limb.
+        suffix: Appended to the names of all copied elements.
+        angle: Turn about the z axis of the limb's parent, rad.
+
+    Returns:
+        The first body of the copy.
+
+    Raises:
+        MorphologyError: If a new name is taken, or an element cannot be copied.
+    """
+    turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
+    inside, parent = elements_of(limb), limb.parent
+    # Before there is a copy, whose cameras name elements too.
+    mentions = references(spec)
+    turned: set[tuple[mujoco.mjtObj, str]] = set()
+    release_drawings(spec, inside, skins=False)
+    first = _copy_body(spec, limb, parent.add_frame(quat=turn), lambda name: name + suffix)
+    resolve_frames(spec)
+
+    def name_of(kind: mujoco.mjtObj, name: str) -> str:
+        """Return the name of the copy of an element; of one that is shared, its own.
+
+        A site or geom of the body that carries the limb is copied when it is first asked for.
+        """
+        new = name + suffix
+        if (kind, name) in inside or (kind, name) in turned:
+            return new
+        finders = {_O.mjOBJ_SITE: spec.site, _O.mjOBJ_GEOM: spec.geom}
+        point = finders[kind](name) if kind in finders else None
+        if point is None or point.parent != parent or parent.parent is None:
+            return name
+        copy, matrix = copy_element(spec, point, parent, new), rotation(turn)
+        if has_ends(copy):
+            copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
+        copy.pos, copy.quat = matrix @ copy.pos, product(turn, copy.quat)
+        if kind == _O.mjOBJ_GEOM:  # A tendon bends around it; that needs no second mass.
+            copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
+        turned.add((kind, name))
+        return new
+
+    # Sensors last: they may name the others.
+    holders = (*spec.tendons, *spec.equalities, *spec.excludes, *spec.pairs)
+    for holder in (*holders, *spec.actuators, *spec.sensors):
+        own = [mention for mention in mentions if mention.holder == holder]
+        # An actuator whose other end alone is on the limb moves another limb.
+        moves = [m for m in own if kind_of(holder) != "actuator" or m.field != "refsite"]
+        if not any(mention.element in inside for mention in moves):
+            continue
+        if isinstance(holder, mujoco.MjsEquality):
+            _require_own_follower(holder, inside)
+        copy = copy_element(spec, holder, spec, holder.name and holder.name + suffix)
+        if isinstance(holder, mujoco.MjsTendon):
+            _copy_path(holder, copy, name_of)
+            own = []
+        for mention in own:
+            kind, name = mention.element
+            if isinstance(holder, mujoco.MjsEquality | mujoco.MjsActuator):
+                name = name_of(kind, name)
+            elif mention.element in inside:
+                name += suffix
+            setattr(copy, mention.field, name)
+        inside.add(key_of(holder))
+    for mention in mentions:
+        aims = mention.kind in ("camera", "light") and key_of(mention.holder) in inside
+        if aims and mention.element in inside:
+            copy = getattr(spec, mention.kind)(mention.holder.name + suffix)
+            copy.targetbody = mention.element[1] + suffix
+    return first
+
+
+def _require_own_follower(equality: mujoco.MjsEquality, inside: set[Any]) -> None:
+    """Refuse to copy a coupling that would lead an element outside of the limb twice."""
+    kind = COUPLINGS.get(equality.type)
+    if kind and (kind, equality.name1) not in inside and (kind, equality.name2) in inside:
+        raise MorphologyError(
+            f"{equality.name1!r} follows {equality.name2!r}, and cannot follow a copy of it "
+            "too: copy a limb that holds both."
+        )
+
+
+def _copy_path(
+    tendon: mujoco.MjsTendon, copy: mujoco.MjsTendon, name_of: Callable[[mujoco.mjtObj, str], str]
+) -> None:
+    """Give a copy the path of a tendon, along the copies of its elements."""
+    for wrap in path_of(tendon):
+        match wrap.type:
+            case _W.mjWRAP_PULLEY:
+                copy.wrap_pulley(wrap.divisor)
+            case _W.mjWRAP_JOINT:
+                copy.wrap_joint(name_of(_O.mjOBJ_JOINT, wrap.target.name), wrap.coef)
+            case _W.mjWRAP_SITE:
+                copy.wrap_site(name_of(_O.mjOBJ_SITE, wrap.target.name))
+            case _:
+                side = wrap.sidesite
+                side_site = name_of(_O.mjOBJ_SITE, side.name) if side else ""
+                copy.wrap_geom(name_of(_O.mjOBJ_GEOM, wrap.target.name), side_site)

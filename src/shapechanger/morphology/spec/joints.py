@@ -26,12 +26,10 @@ _GAIN: Final = mujoco.mjtGain
 _BIAS: Final = mujoco.mjtBias
 # A joint without limits turns all the way round; a slide without limits has no such number.
 _FULL_TURN: Final = (-math.pi, math.pi)
-_LINEAR_GAINS: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE)
-_LINEAR_BIASES: Final = (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
-# Constant, length and velocity terms of an affine gain or bias.
-_TERMS: Final = slice(0, 3)
-# Peak force and, where that is negative, the force that it is derived from.
-_MUSCLE_FORCE: Final = slice(2, 4)
+_LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE), (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
+
+
+# --- Positions ---------------------------------------------------------------------------------
 
 
 def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
@@ -71,7 +69,6 @@ def set_reference(joint: mujoco.MjsJoint, position: float) -> None:
 
 
 def _in_degrees(joint: mujoco.MjsJoint) -> bool:
-    """Return whether the model writes this joint's angles in degrees."""
     return bool(joint.compiler.degree) and joint.type == _J.mjJNT_HINGE
 
 
@@ -88,42 +85,35 @@ def _as_written(joint: mujoco.MjsJoint, position: float) -> float:
     return next((degrees for degrees in candidates if math.radians(degrees) == position), near)
 
 
-def displace(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, by: float | Array) -> None:
+def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
     """Change the pose of a joint's body as if the joint had moved.
 
     Args:
-        spec: Specification that contains it.
         joint: A hinge, slide or ball.
         by: Angle, rad, or distance, m; of a ball, the turn as a quaternion (w, x, y, z).
     """
-    body = joint.parent
-    turn, shift = np.eye(3), np.zeros(3)
-    quaternion = UPRIGHT.copy()
-    if joint.type == _J.mjJNT_SLIDE:
-        shift = np.array(joint.axis) / np.linalg.norm(joint.axis) * by
-    else:
-        if joint.type == _J.mjJNT_BALL:
-            quaternion = np.array(by)
-        else:
-            axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-            mujoco.mju_axisAngle2Quat(quaternion, axis, float(by))
-        turn = rotation(quaternion)
-        shift = joint.pos - turn @ joint.pos
+    body, quaternion = joint.parent, UPRIGHT.copy()
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    if joint.type == _J.mjJNT_BALL:
+        quaternion = np.array(by)
+    elif joint.type == _J.mjJNT_HINGE:
+        mujoco.mju_axisAngle2Quat(quaternion, axis, float(by))
+    turn = rotation(quaternion)
+    shift = axis * by if joint.type == _J.mjJNT_SLIDE else joint.pos - turn @ joint.pos
     # The body's joints act in order; those before this one are now seen from the turned frame.
     for earlier in body.joints[: [j.name for j in body.joints].index(joint.name)]:
         earlier.axis = turn.T @ earlier.axis
         earlier.pos = turn.T @ (earlier.pos - shift)
-    parent = orientation(spec, body)
+    parent = orientation(body)
     body.pos = body.pos + rotation(parent) @ shift
     set_orientation(body, product(parent, quaternion))
 
 
-def add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
-    """Add a motor to the joint of its name; its gear is the N·m or N for a control of 1.
+# --- Strengths ---------------------------------------------------------------------------------
 
-    Raises:
-        MorphologyError: If an actuator has the name.
-    """
+
+def add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
+    """Add a motor to the joint of its name; its gear is the N·m or N for a control of 1."""
     require_free_name(spec, "actuator", name)
     motor = spec.add_actuator(
         name=name,
@@ -155,13 +145,13 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
         return
     gain, bias = np.array(actuator.gainprm), np.array(actuator.biasprm)
     if actuator.gaintype == _GAIN.mjGAIN_MUSCLE and actuator.biastype == _BIAS.mjBIAS_MUSCLE:
-        for parameters in (gain, bias):
-            force = parameters[_MUSCLE_FORCE]
-            # A negative peak force stands for an automatic one.
-            parameters[_MUSCLE_FORCE] = np.where(force > 0.0, force * factor, force)
-    elif actuator.gaintype in _LINEAR_GAINS and actuator.biastype in _LINEAR_BIASES:
-        gain[_TERMS] *= factor
-        bias[_TERMS] *= factor
+        # The peak force, and what it is derived from where it is negative.
+        for force in (gain[2:4], bias[2:4]):
+            force[force > 0.0] *= factor
+    elif actuator.gaintype in _LINEAR[0] and actuator.biastype in _LINEAR[1]:
+        # Constant, length and velocity terms.
+        gain[:3] *= factor
+        bias[:3] *= factor
     else:
         raise MorphologyError(
             f"{actuator.name!r} is an actuator whose gains have no common scale, so its strength "
@@ -186,7 +176,5 @@ def scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
 
 def scale_resistance(element: Any, factor: float) -> None:
     """Scale the armature, damping, stiffness and friction of a joint or tendon."""
-    element.armature *= factor
-    element.damping = element.damping * factor
-    element.stiffness = element.stiffness * factor
-    element.frictionloss *= factor
+    for field in ("armature", "damping", "stiffness", "frictionloss"):
+        setattr(element, field, getattr(element, field) * factor)

@@ -1,9 +1,7 @@
 """References between the elements of a model, and the one rule for edits that touch them.
 
-An edit carries along, or refuses in a sentence, whatever names an element that it touches.
-`references` is the table of all that can name an element of a body. Every edit that moves, removes,
-locks or copies elements goes through the functions of this module; points that loops hold are sites
-meanwhile, and keyframes are kept by name (`loops`, `carried`).
+An edit carries along, or refuses in a sentence, whatever names an element that it touches. Points
+that loops hold are sites meanwhile, and keyframes are kept by name (`carried`).
 """
 
 from __future__ import annotations
@@ -20,6 +18,7 @@ _O: Final = mujoco.mjtObj
 _T: Final = mujoco.mjtTrn
 _W: Final = mujoco.mjtWrap
 _E: Final = mujoco.mjtEq
+_S: Final = mujoco.mjtSensor
 
 Element = tuple[mujoco.mjtObj, str]
 """Kind and name of an element."""
@@ -28,7 +27,6 @@ OF_JOINTS: Final = (_T.mjTRN_JOINT, _T.mjTRN_JOINTINPARENT)
 PINS: Final = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
 COUPLINGS: Final = {_E.mjEQ_JOINT: _O.mjOBJ_JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 """Equalities y - y0 = p(x - x0) of a follower y and a leader x, and the kind of both."""
-
 MARK: Final = "pin~"
 """Prefix of the sites that stand for the ends of loops while edits are applied."""
 
@@ -48,9 +46,23 @@ _WRAPS: Final = {
 }
 # Sensors of all geoms of a body, so of both parts after a split.
 _OF_ALL_GEOMS: Final = (
-    *(mujoco.mjtSensor.mjSENS_GEOMDIST, mujoco.mjtSensor.mjSENS_GEOMNORMAL),
-    *(mujoco.mjtSensor.mjSENS_GEOMFROMTO, mujoco.mjtSensor.mjSENS_CONTACT),
+    *(_S.mjSENS_GEOMDIST, _S.mjSENS_GEOMNORMAL, _S.mjSENS_GEOMFROMTO, _S.mjSENS_CONTACT),
 )
+# Two positions of one joint that differ by less are the same, rad or m.
+_SAME: Final = 1e-6
+# The lists of a specification, the name of their kind in messages, and the fields that name others.
+_HOLDERS: Final = {
+    "equalities": ("equality", "name1", "name2"),
+    "excludes": ("exclusion", "bodyname1", "bodyname2"),
+    "pairs": ("contact pair", "geomname1", "geomname2"),
+    "actuators": ("actuator", "target", "refsite", "slidersite"),
+    "sensors": ("sensor", "objname", "refname"),
+    "cameras": ("camera", "targetbody"),
+    "lights": ("light", "targetbody"),
+    "skins": ("skin", "bodyname"),
+    "flexes": ("flex", "vertbody", "nodebody"),
+    "tuples": ("tuple", "objname"),
+}
 
 
 class Mention(NamedTuple):
@@ -73,6 +85,57 @@ class Mention(NamedTuple):
             return f"the {self.kind} {self.holder.name!r}"
         name = self.element[1]
         return f"the {self.kind}" if name.startswith(MARK) else f"the {self.kind} of {name!r}"
+
+
+def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
+    """Return every reference to an element of a body, a tendon or an actuator.
+
+    `kinds` are those of the holders, such as "actuator", by default all.
+    """
+    found = [
+        Mention(tendon, "tendon", "path", element)
+        for tendon in spec.tendons
+        for element in path_elements(tendon)
+    ]
+    for elements, (kind, *fields) in _HOLDERS.items():
+        for holder in getattr(spec, elements):
+            for field in fields:
+                value: str | list[str] = getattr(holder, field)
+                names = [value] if isinstance(value, str) else list(value)
+                named = _kind_named(holder, field)
+                # A tuple has one kind for each name.
+                targets = [named] * len(names) if isinstance(named, _O) else list(named)
+                for target, name in zip(targets, names, strict=True):
+                    found.append(Mention(holder, kind, field, (_plain(_O(target)), name)))
+    return [each for each in found if each.element[1] and (not kinds or each.kind in kinds)]
+
+
+def _kind_named(holder: Any, field: str) -> Any:
+    """Return the kind of the elements that a field names, or the kinds of each."""
+    match field:
+        case "name1" | "name2":
+            coupled = COUPLINGS.get(holder.type, _O.mjOBJ_FLEX)
+            return holder.objtype if holder.type in PINS else coupled
+        case "target":
+            return _TARGETS.get(holder.trntype, _O.mjOBJ_UNKNOWN)
+        case "objname":
+            return holder.objtype
+        case "refname":
+            return holder.reftype
+        case "refsite" | "slidersite":
+            return _O.mjOBJ_SITE
+        case "geomname1" | "geomname2":
+            return _O.mjOBJ_GEOM
+        case _:
+            return _O.mjOBJ_BODY
+
+
+def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
+    """Return a body for either frame of a body, which sensors distinguish."""
+    return _O.mjOBJ_BODY if kind == _O.mjOBJ_XBODY else kind
+
+
+# --- Kinds, limbs and paths --------------------------------------------------------------------
 
 
 def kind_of(element: Any) -> str:
@@ -102,6 +165,11 @@ def elements_of(limb: mujoco.MjsBody) -> set[Element]:
     return {key_of(each) for body in subtree(limb) for each in (body, *elements_on(body))}
 
 
+def path_of(tendon: mujoco.MjsTendon) -> list[Any]:
+    """Return the parts of a tendon's path, in order."""
+    return [tendon.path[i] for i in range(len(tendon.path))]
+
+
 def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
     """Return the elements that a tendon passes, side sites included, in order."""
     found: list[Element] = []
@@ -113,76 +181,36 @@ def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
     return found
 
 
-def path_of(tendon: mujoco.MjsTendon) -> list[Any]:
-    """Return the parts of a tendon's path, in order."""
-    return [tendon.path[i] for i in range(len(tendon.path))]
+def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Element]) -> bool:
+    """Return whether a tendon moves nothing but the limb with these elements."""
+    staying = {*path_elements(tendon)} - elements
+    if any(kind == _O.mjOBJ_JOINT for kind, _ in staying):
+        return False
+    # All points elsewhere are on bodies that are fixed to each other.
+    carriers: set[str] = set()
+    for kind, name in staying:
+        body = (spec.site(name) if kind == _O.mjOBJ_SITE else spec.geom(name)).parent
+        while body.parent is not None and not body.joints:
+            body = body.parent
+        carriers.add(body.name)
+    return len(carriers) < 2
 
 
-def _bound(equality: mujoco.MjsEquality) -> mujoco.mjtObj:
-    if equality.type in PINS:
-        return equality.objtype
-    return COUPLINGS.get(equality.type, _O.mjOBJ_FLEX)
+def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
+    """Return whether a tendon acts or is used; the humanoid's do neither."""
+    lower, upper = tendon.range
+    automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
+    acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
+    if tendon.limited == mujoco.mjtLimited.mjLIMITED_TRUE or automatic or acts or tendon.armature:
+        return True
+    return any(each.element == key_of(tendon) for each in references(spec))
 
 
-def _driven(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
-    return _TARGETS.get(actuator.trntype, _O.mjOBJ_UNKNOWN)
-
-
-# The elements of a specification, the name of their kind in messages, and the fields in which they
-# name others: the kind of the named ones, the field that holds it, or a function that returns it.
-_HOLDERS: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
-    ("equalities", "equality", {"name1": _bound, "name2": _bound}),
-    ("excludes", "exclusion", {"bodyname1": _O.mjOBJ_BODY, "bodyname2": _O.mjOBJ_BODY}),
-    ("pairs", "contact pair", {"geomname1": _O.mjOBJ_GEOM, "geomname2": _O.mjOBJ_GEOM}),
-    (
-        "actuators",
-        "actuator",
-        {"target": _driven, "refsite": _O.mjOBJ_SITE, "slidersite": _O.mjOBJ_SITE},
-    ),
-    ("sensors", "sensor", {"objname": "objtype", "refname": "reftype"}),
-    ("cameras", "camera", {"targetbody": _O.mjOBJ_BODY}),
-    ("lights", "light", {"targetbody": _O.mjOBJ_BODY}),
-    ("skins", "skin", {"bodyname": _O.mjOBJ_BODY}),
-    ("flexes", "flex", {"vertbody": _O.mjOBJ_BODY, "nodebody": _O.mjOBJ_BODY}),
-    ("tuples", "tuple", {"objname": "objtype"}),
-)
-
-
-def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
-    """Return every reference to an element of a body, a tendon or an actuator.
-
-    Keyframes refer to joints and actuators by their order; see `carried`. The kinds of holders,
-    such as "actuator", are all by default.
-    """
-    found = [
-        Mention(tendon, "tendon", "path", element)
-        for tendon in spec.tendons
-        for element in path_elements(tendon)
-    ]
-    for elements, kind, fields in _HOLDERS:
-        for holder in getattr(spec, elements):
-            for field, of in fields.items():
-                value: str | list[str] = getattr(holder, field)
-                names = [value] if isinstance(value, str) else list(value)
-                target: Any = getattr(holder, of) if isinstance(of, str) else of
-                target = target(holder) if callable(target) else target
-                # A tuple has one kind for each name.
-                targets = [target] * len(names) if isinstance(target, _O) else list(target)
-                for named, name in zip(targets, names, strict=True):
-                    found.append(Mention(holder, kind, field, (_plain(_O(named)), name)))
-    return [each for each in found if each.element[1] and (not kinds or each.kind in kinds)]
-
-
-def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
-    """Return a body for either frame of a body, which sensors distinguish."""
-    return _O.mjOBJ_BODY if kind == _O.mjOBJ_XBODY else kind
-
-
-# --- Elements that change their shape ---------------------------------------------------------
+# --- Elements that change or go ----------------------------------------------------------------
 
 
 def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool = True) -> None:
-    """Remove the skins over bodies that change; they have no physical effect.
+    """Remove the skins over bodies that change, which have no effect, and refuse parts of a flex.
 
     Raises:
         MorphologyError: If one of the bodies carries a part of a flex.
@@ -198,16 +226,10 @@ def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool 
         spec.delete(skin)
 
 
-# --- Elements that go -------------------------------------------------------------------------
-
-
 def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str) -> None:
     """Refuse to change an element that another names, by some kinds of references or by any.
 
     `why` ends the sentence on the element, such as "lies beyond the cut".
-
-    Raises:
-        MorphologyError: If anything names the element.
     """
     for mention in references(spec, *kinds):
         if mention.element == element:
@@ -218,38 +240,20 @@ def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str
             )
 
 
-def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
-    """Remove a limb with all that has no meaning without it.
-
-    Motors, sensors, exclusions, contact pairs, pins and followers go with the limb, and so do the
-    tendons that move it alone. Cameras and lights that aim at it aim at the body that carried it.
-
-    Raises:
-        MorphologyError: If an element elsewhere would lose what moves it.
-    """
-    require_removable(spec, limb)
-    gone = elements_of(limb)
-    release_drawings(spec, gone)
-    for aimed in (*spec.cameras, *spec.lights):
-        if (_O.mjOBJ_BODY, aimed.targetbody) in gone:
-            aimed.targetbody = limb.parent.name
-    for group in list(spec.tuples):
-        members = zip(group.objtype, group.objname, group.objprm, strict=True)
-        kept = [member for member in members if (_plain(_O(member[0])), member[1]) not in gone]
-        if not kept:
-            spec.delete(group)
-        elif len(kept) < len(group.objname):
-            kinds, names, values = zip(*kept, strict=True)
-            group.objtype, group.objname, group.objprm = list(kinds), list(names), list(values)
-    spec.delete(limb)
+def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[str]) -> None:
+    """Refuse to divide what names a whole segment, or one of its geoms that would be `cut`."""
+    for name in cut:
+        require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", "tendon", "sensor")
+    for mention in references(spec, "actuator", "sensor"):
+        whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
+        if whole and mention.element == key_of(body):
+            raise MorphologyError(
+                f"{body.name!r} cannot be split: {mention} is about all of its geoms."
+            )
 
 
 def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
-    """Refuse to remove a limb without which an element elsewhere would lose what moves it.
-
-    Raises:
-        MorphologyError: If a tendon, coupling or actuator ties it to what stays.
-    """
+    """Refuse to remove a limb without which an element elsewhere would lose what moves it."""
     gone = elements_of(limb)
     for tendon in spec.tendons:
         if gone.isdisjoint(path_elements(tendon)):
@@ -268,46 +272,32 @@ def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
                 "of them first."
             )
     for actuator in spec.actuators:
-        if actuator.trntype != _T.mjTRN_SITE or (_O.mjOBJ_SITE, actuator.target) in gone:
-            continue
-        if (_O.mjOBJ_SITE, actuator.refsite) in gone:
+        stays = actuator.trntype == _T.mjTRN_SITE and (_O.mjOBJ_SITE, actuator.target) not in gone
+        if stays and (_O.mjOBJ_SITE, actuator.refsite) in gone:
             raise MorphologyError(
                 f"The actuator {actuator.name!r} acts relative to {actuator.refsite!r}, which "
                 "would be removed."
             )
 
 
-def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Element]) -> bool:
-    """Return whether a tendon moves nothing but the limb with these elements."""
-    staying = {*path_elements(tendon)} - elements
-    if any(kind == _O.mjOBJ_JOINT for kind, _ in staying):
-        return False
-    # All points elsewhere are on bodies that are fixed to each other.
-    finders = {_O.mjOBJ_SITE: spec.site, _O.mjOBJ_GEOM: spec.geom}
-    return len({_carrier(finders[kind](name).parent).name for kind, name in staying}) < 2
+def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
+    """Remove a limb with all that has no meaning without it.
 
-
-def _carrier(body: mujoco.MjsBody) -> mujoco.MjsBody:
-    """Return the nearest body towards the world that has a joint, or the world."""
-    while body.parent is not None and not body.joints:
-        body = body.parent
-    return body
-
-
-def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
-    """Return whether a tendon acts or is used; the humanoid's do neither."""
-    lower, upper = tendon.range
-    automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
-    acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
-    if tendon.limited == mujoco.mjtLimited.mjLIMITED_TRUE or automatic or acts or tendon.armature:
-        return True
-    return any(each.element == key_of(tendon) for each in references(spec))
-
-
-# --- Joints that are locked -------------------------------------------------------------------
-
-# Two positions of one joint that differ by less are the same, rad or m.
-_SAME: Final = 1e-6
+    Motors, sensors, exclusions, contact pairs, pins and followers go with the limb, and so do the
+    tendons that move it alone. Cameras and lights that aim at it aim at the body that carried it.
+    """
+    require_removable(spec, limb)
+    gone = elements_of(limb)
+    release_drawings(spec, gone)
+    for aimed in (*spec.cameras, *spec.lights):
+        if (_O.mjOBJ_BODY, aimed.targetbody) in gone:
+            aimed.targetbody = limb.parent.name
+    for group in spec.tuples:
+        members = zip(group.objtype, group.objname, group.objprm, strict=True)
+        kept = [member for member in members if (_plain(_O(member[0])), member[1]) not in gone]
+        if 0 < len(kept) < len(group.objname):  # MuJoCo deletes one that loses any, as it is.
+            group.objtype, group.objname, group.objprm = map(list, zip(*kept, strict=True))
+    spec.delete(limb)
 
 
 def remove_joint(
@@ -317,19 +307,13 @@ def remove_joint(
 
     Its motor and its sensors go with it, and so does a tendon whose joints are all locked, at these
     displacements from their references, rad or m.
-
-    Raises:
-        MorphologyError: If a tendon ties the joint to others, or a coupling contradicts the lock.
     """
     name = joint.name
     _hold(spec, _E.mjEQ_JOINT, name, displacements[name])
     gone = {key_of(joint)}
     for tendon in list(spec.tendons):
-        coefficients = {
-            wrap.target.name: float(wrap.coef)
-            for wrap in path_of(tendon)
-            if wrap.type == _W.mjWRAP_JOINT
-        }
+        wraps = [wrap for wrap in path_of(tendon) if wrap.type == _W.mjWRAP_JOINT]
+        coefficients = {wrap.target.name: float(wrap.coef) for wrap in wraps}
         if name not in coefficients:
             continue
         if coefficients.keys() <= displacements.keys():
@@ -354,53 +338,26 @@ def remove_joint(
 
 def _hold(spec: mujoco.MjSpec, kind: mujoco.mjtEq, name: str, locked: float) -> None:
     """Hold what is coupled to a joint or tendon that is `locked`, rad or m, from its reference."""
-    for equality in [e for e in spec.equalities if e.type == kind]:
-        polynomial = np.array(equality.data[:5])
-        if equality.name2 == name:
-            held = float(np.polynomial.polynomial.polyval(locked, polynomial))
-            _set_constant(equality, equality.name1, held)
-        elif equality.name1 == name:
-            # Of an equality of one element, the constant alone counts.
-            slope = polynomial[1] if equality.name2 else 0.0
-            if equality.name2 and np.any(polynomial[2:]):
-                raise MorphologyError(
-                    f"{name!r} follows {equality.name2!r} by a curve, so it cannot be locked: lock "
-                    f"{equality.name2!r} instead."
-                )
-            if slope:
-                held = float((locked - polynomial[0]) / slope)
-                _set_constant(equality, equality.name2, held)
-                continue
-            if abs(locked - polynomial[0]) > _SAME:
-                raise MorphologyError(
-                    f"{name!r} is held {polynomial[0]:.4g} from its reference by a coupling, so it "
-                    f"cannot be locked {locked:.4g} from it."
-                )
-            spec.delete(equality)
-
-
-def _set_constant(equality: mujoco.MjsEquality, name: str, held: float) -> None:
-    """Turn a coupling into one that holds a single element."""
-    equality.name1, equality.name2 = name, ""
-    data = np.array(equality.data)
-    data[:5] = [held, 0.0, 0.0, 0.0, 0.0]
-    equality.data = data
-
-
-# --- Segments that are split ------------------------------------------------------------------
-
-
-def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[str]) -> None:
-    """Refuse to divide what names a whole segment, or a geom that would be cut in two.
-
-    Raises:
-        MorphologyError: If a reference would mean one of the parts only.
-    """
-    for name in cut:
-        require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", "tendon", "sensor")
-    for mention in references(spec, "actuator", "sensor"):
-        whole = mention.kind == "actuator" or mention.holder.type in _OF_ALL_GEOMS
-        if whole and mention.element == key_of(body):
+    for equality in [e for e in spec.equalities if e.type == kind and name in (e.name1, e.name2)]:
+        leader, polynomial = equality.name2, np.array(equality.data[:5])
+        # Of an equality of one element, the constant alone counts.
+        slope = polynomial[1] if leader else 0.0
+        if leader == name:
+            held, by = equality.name1, np.polynomial.polynomial.polyval(locked, polynomial)
+        elif leader and np.any(polynomial[2:]):
             raise MorphologyError(
-                f"{body.name!r} cannot be split: {mention} is about all of its geoms."
+                f"{name!r} follows {leader!r} by a curve, so it cannot be locked: lock {leader!r} "
+                "instead."
             )
+        elif slope:
+            held, by = leader, (locked - polynomial[0]) / slope
+        elif abs(locked - polynomial[0]) > _SAME:
+            raise MorphologyError(
+                f"{name!r} is held {polynomial[0]:.4g} from its reference by a coupling, so it "
+                f"cannot be locked {locked:.4g} from it."
+            )
+        else:
+            spec.delete(equality)
+            continue
+        equality.name1, equality.name2 = held, ""
+        equality.data = np.concatenate([[float(by)], np.zeros(4), equality.data[5:]])
