@@ -16,7 +16,7 @@ import tyro
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Edit, from_json, interpolate, to_json
-from shapechanger.morphology.spec.elements import select
+from shapechanger.morphology.spec import select
 
 
 class TurnHinge(Edit, frozen=True):

@@ -16,8 +16,6 @@ from shapechanger.morphology import (
     AddSegment,
     Body,
     Cut,
-    Friction,
-    Mass,
     Stretch,
     compile_body,
     to_json,
@@ -37,15 +35,6 @@ def test_bodies_are_found_by_name() -> None:
         UnknownName, match=r"No body of the family Leg matches 'LongLegs'\. Did you"
     ):
         FAMILY.body("LongLegs")
-
-
-def test_bodies_can_be_edits_or_json() -> None:
-    edits = (Stretch("thigh", 2.0), Mass("shin", scale=2.0))
-    text = to_json(edits)
-    for value in (edits, list(edits), iter(edits), text, f"  {text}\n"):
-        assert FAMILY.body(value) == edits
-    assert FAMILY.body(edits[0]) == edits[:1]
-    assert FAMILY.body('{"edit":"stretch","body":"thigh","factor":2}') == edits[:1]
 
 
 def test_a_model_is_loaded_with_names(tmp_path: Path) -> None:
@@ -105,11 +94,6 @@ def test_drawn_bodies_compile_stand_and_differ(env: str, split: str) -> None:
             with gym.make(f"shapechanger/{env}-v1", body=body) as drawn:
                 assert cast("Any", drawn.unwrapped).standing_height > 0.1
                 assert certify(cast("Any", own), cast("Any", drawn)).changes
-
-
-def test_a_body_at_named_values() -> None:
-    body = ANT.body_at({"length of shank_4": 1.5, "friction": 0.5}, {"leg 2": "stump"})
-    assert body == (Cut("shank_2", 0.25), Stretch("shank_4", 1.5), Friction("*", 0.5))
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:

@@ -34,7 +34,7 @@ from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Edit, Remove
 from shapechanger.morphology.edits import part_of_the_way
 from shapechanger.morphology.families import Axis, Family, length_axes
-from shapechanger.morphology.spec.elements import select
+from shapechanger.morphology.spec import select
 
 
 class Soften(Edit, frozen=True):

@@ -80,12 +80,6 @@ def test_geoms_without_contact_are_no_floor(floor: str, ball: str) -> None:
     np.testing.assert_array_equal(start_pose(model), model.qpos0)
 
 
-def test_fixed_bodies_have_no_standing_height() -> None:
-    for spec in (pendulum(), gantry()):
-        model = built(spec)
-        assert standing_height(model) is None
-
-
 def test_the_trunk_has_the_first_free_joint() -> None:
     model = built(
         spec_of(
@@ -233,9 +227,3 @@ def test_a_standing_pose_touches_the_floor() -> None:
         assert StartRules(model).floor_gap(data) == pytest.approx(0.0, abs=1e-9)
         np.testing.assert_array_equal(standing[3:], pose[3:])
         assert pose[2] == height
-
-
-def test_without_a_lift_or_a_floor_a_standing_pose_is_the_pose() -> None:
-    """A pendulum stands nowhere, and a ball above nothing stays where it is."""
-    for model in (built(pendulum()), _ball("")):
-        np.testing.assert_array_equal(standing_pose(model, model.qpos0), model.qpos0)

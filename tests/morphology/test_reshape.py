@@ -9,7 +9,7 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
-from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
+from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError
 from shapechanger.morphology import (
     AddLimb,
     Cut,
@@ -62,13 +62,6 @@ def test_the_given_spec_is_unchanged_after_an_error(
     assert differing(built(load()), built(spec)) == []
 
 
-def test_edits_are_applied_in_order() -> None:
-    spec = reshape(leg(), [Split("thigh", "half"), Stretch("half", 2.0)])
-    assert spec.geom("thigh_of_half") is not None
-    with pytest.raises(UnknownName, match="No body matches 'half'"):
-        reshape(leg(), [Stretch("half", 2.0), Split("thigh", "half")])
-
-
 def test_edits_with_amount_0_are_skipped() -> None:
     """Even their names are not looked up."""
     edits = [Stretch("no such body", 2.0, amount=0.0), Remove("trunk", amount=0.0)]
@@ -96,11 +89,3 @@ def test_a_body_that_does_not_compile_is_refused(edit: Edit, reason: str) -> Non
     assert found[2].startswith(reason)
     assert isinstance(caught.value, MorphologyError)
     assert isinstance(caught.value.__cause__, ValueError | mujoco.FatalError)
-
-
-def test_invalid_edits_are_no_compile_errors() -> None:
-    """They raise MorphologyError instead of BrokenModel."""
-    with pytest.raises(MorphologyError) as caught:
-        built(leg(), Remove("trunk"))
-    assert type(caught.value) is MorphologyError
-    assert caught.value.__cause__ is None

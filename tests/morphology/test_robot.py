@@ -18,7 +18,6 @@ from shapechanger.morphology.pose import (
     trunk_lift,
 )
 from shapechanger.morphology.tree import tree_of
-from tests.morphology.scenes import asset
 
 # Objects come first, so that nothing is right by the order of the file.
 _SCENE = """
@@ -189,11 +188,6 @@ def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
     text = text.replace('conaffinity="0"', "") if "pos" in floor else text
     model = mujoco.MjModel.from_xml_string(text)
     assert floor_height(model, start_pose(model)) == pytest.approx(height)
-
-
-def test_a_single_tree_is_the_robot() -> None:
-    model = asset("ant")
-    assert StartRules(model).robot_places.all()
 
 
 def test_large_models_have_dense_jacobians_on_mujoco_4_0_0() -> None:

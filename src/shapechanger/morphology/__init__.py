@@ -47,7 +47,7 @@ from shapechanger.morphology.edits.values import (
     Stiffness,
     Stretch,
 )
-from shapechanger.morphology.spec.elements import name_elements
+from shapechanger.morphology.spec import name_elements
 
 __all__ = [
     "EDITS",

@@ -18,8 +18,8 @@ import numpy as np
 
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
 from shapechanger.morphology.edits import EDITS, Edit, part_of_the_way
+from shapechanger.morphology.spec import make_explicit
 from shapechanger.morphology.spec.carried import carried
-from shapechanger.morphology.spec.elements import make_explicit
 
 Body = tuple[Edit, ...]
 """The edits, in order, that make a body from the model of its family."""

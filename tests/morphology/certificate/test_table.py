@@ -18,7 +18,7 @@ from shapechanger.morphology.certificate import compare, fingerprint
 from shapechanger.morphology.certificate.changes import differences
 from shapechanger.morphology.certificate.fields import MOVED, Field, Numbers, made_arrays
 from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
-from shapechanger.morphology.spec.elements import name_elements
+from shapechanger.morphology.spec import name_elements
 from tests.morphology.scenes import EVERYTHING, asset, asset_spec, everything
 
 _CLOTH = """

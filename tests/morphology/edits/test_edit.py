@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from shapechanger.morphology import (
-    Edit,
     Gravity,
     Mass,
     Stretch,
     compile_body,
     to_json,
 )
-from shapechanger.morphology.edits import part_of_the_way
 from tests.morphology.models import leg
 
 
@@ -25,17 +23,6 @@ def test_edits_are_values() -> None:
     assert repr(edit) == "Stretch(body='thigh', factor=2.0)"
     with pytest.raises(AttributeError):
         edit.factor = 3.0  # type: ignore[misc]
-
-
-def test_the_base_class_is_abstract() -> None:
-    with pytest.raises(NotImplementedError):
-        Edit().apply(leg())
-
-
-def test_interpolation_ends_exactly() -> None:
-    assert part_of_the_way(0.1, 0.7, 1.0) == 0.7
-    assert part_of_the_way(0.1, 0.7, 0.0) == 0.1
-    assert part_of_the_way(2.0, 4.0, 0.25) == 2.5
 
 
 def test_numpy_numbers_are_values() -> None:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     AddLimb,
     AddSegment,
@@ -21,7 +21,6 @@ from shapechanger.morphology import (
     Stretch,
 )
 from tests.morphology.models import (
-    ant,
     arm,
     built,
     capsule_mass,
@@ -30,7 +29,6 @@ from tests.morphology.models import (
     mass,
     posed,
     spec_of,
-    tip,
 )
 from tests.morphology.scenes import asset_spec
 
@@ -62,23 +60,6 @@ def test_children_beyond_a_cut_are_removed() -> None:
     assert _bodies(built(leg(), Cut("thigh", 1.0))) == ["trunk", "thigh", "shin"]
     for body in ("thigh", "leg"):
         assert built(asset_spec("hopper"), Cut(body, 1.0)).nbody == 5
-
-
-def test_a_glob_skips_bodies_that_a_cut_removed() -> None:
-    """Of a limb and its child that match, the limb is cut and the child is gone."""
-    model = built(ant(), Cut("*_4", 0.5))
-    assert "shank_4" not in _bodies(model)
-    assert model.geom("rightback_leg_geom").size[1] == pytest.approx(0.05 * math.sqrt(2.0))
-
-
-def test_a_partial_cut_shrinks_the_rest() -> None:
-    before = built(leg())
-    half = built(leg(), Cut("thigh", 0.5).partly(0.5))
-    assert half.geom("thigh").size[1] == pytest.approx(0.15 * 0.75)
-    assert mass(half, "shin") == pytest.approx(0.125 * mass(before, "shin"))
-    assert half.actuator("knee").gear[0] == 5.0
-    last = built(leg(), Cut("thigh", 0.5).partly(1.0 - 1e-12))
-    assert mass(last, "shin") == pytest.approx(1e-6 * mass(before, "shin"))
 
 
 def test_a_cut_leaves_something() -> None:
@@ -152,13 +133,6 @@ def test_elements_without_length_go_to_one_part() -> None:
     parts = built(high, Split("link", "far", at=0.5))
     np.testing.assert_allclose(parts.geom("low").pos, [0.1, 0.0, 0.2])
     np.testing.assert_allclose(posed(parts).geom("bone_of_far").xpos, [0.1, 0.0, 0.75])
-
-
-def test_rounded_ends_grow_with_the_amount() -> None:
-    """A small amount keeps the mass, see `test_assets`; at 1 both parts are complete capsules."""
-    assert mass(built(leg(), Split("thigh", "shank")), "shank") == pytest.approx(
-        capsule_mass(0.03, 0.15, 500.0)
-    )
 
 
 def test_a_split_divides_an_explicit_mass() -> None:
@@ -281,22 +255,6 @@ def test_a_copy_has_all_elements_of_the_limb() -> None:
         assert model.actuator(f"{name}_2").trnid[0] == new.id
 
 
-def test_copies_of_copies() -> None:
-    model = built(ant(), *(AddLimb("aux_1", f"_{n}", n * 0.4) for n in range(2, 8)))
-    assert (model.nu, model.nq) == (8 + 12, 15 + 12)
-    twice = built(leg(), AddLimb("thigh", "_2", 1.0), AddLimb("thigh_2", "_3", 1.0))
-    x, y, z = tip(twice, "toe")
-    np.testing.assert_allclose(
-        tip(twice, "toe_2_3"),
-        [x * math.cos(2) - y * math.sin(2), x * math.sin(2) + y * math.cos(2), z],
-        atol=1e-12,
-    )
-    claws = spec_of(_MESH_LIMB)
-    model = built(claws, AddLimb("claw", "_2", 1.0), AddLimb("claw", "_3", 2.0))
-    assert (model.ngeom, model.nmesh) == (4, 1)
-    assert mass(model, "claw_3") == mass(model, "claw")
-
-
 def test_a_mesh_cannot_be_scaled() -> None:
     for edit in (AddLimb("claw", "_2", 1.0, size=2.0), Remove("claw").partly(0.5)):
         with pytest.raises(MorphologyError, match=r"'claw(_2)?' holds 'claw(_2)?', a mesh"):
@@ -360,17 +318,6 @@ def test_a_partial_limb_is_small_and_weak(
 
 
 # --- Combinations ------------------------------------------------------------------------------
-
-
-def test_order_matters_where_it_should() -> None:
-    """A stretch after a split affects one part; after a cut there is no child to stretch."""
-    split_first = built(leg(), Split("thigh", "half"), Stretch("thigh", 2.0))
-    stretched_first = built(leg(), Stretch("thigh", 2.0), Split("thigh", "half"))
-    assert tip(split_first, "toe")[2] == pytest.approx(1.0 - 0.45 - 0.24)
-    assert tip(stretched_first, "toe")[2] == pytest.approx(1.0 - 0.6 - 0.24)
-    built(leg(), Stretch("shin", 2.0), Cut("thigh", 0.5))
-    with pytest.raises(UnknownName, match="No body matches 'shin'"):
-        built(leg(), Cut("thigh", 0.5), Stretch("shin", 2.0))
 
 
 def test_new_segments_can_be_edited() -> None:

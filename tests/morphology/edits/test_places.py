@@ -26,7 +26,6 @@ from tests.morphology.models import (
     capsule_mass,
     leg,
     limb,
-    posed,
     spec_of,
     tip,
 )
@@ -88,18 +87,6 @@ def test_a_geom_is_moved_by_its_middle() -> None:
         )
 
 
-def test_a_floor_can_be_moved() -> None:
-    """A geom of the world has no mass that would have to follow."""
-    model = built(leg(), PlaceGeom("floor", middle=(0.0, 0.0, -1.0)))
-    assert posed(model).geom("floor").xpos[2] == -1.0
-
-
-def test_a_written_mass_keeps_its_density() -> None:
-    model = limb('<geom name="rod" type="cylinder" size=".1" fromto="0 0 0 0 0 .4" mass="2"/>')
-    after = built(model, PlaceGeom("rod", (0.0, 0.0, 0.0), (0.0, 0.0, 0.8), radius=0.2))
-    assert after.body("link").mass == pytest.approx(16.0)
-
-
 def test_the_total_mass_is_set() -> None:
     """After other edits, with the inertia in proportion; halfway at half the amount."""
     before = built(ant(), Mass("torso", scale=3.0))
@@ -109,13 +96,6 @@ def test_the_total_mass_is_set() -> None:
     np.testing.assert_allclose(after.body_inertia, factor * before.body_inertia, rtol=1e-9)
     half = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0, amount=0.5))
     assert half.body_mass.sum() == pytest.approx(0.5 * (14.0 + before.body_mass.sum()))
-
-
-def test_the_trunk_starts_higher() -> None:
-    model = built(leg(), StartHeight("trunk", 1.7))
-    np.testing.assert_array_equal(model.body("trunk").pos, [0.0, 0.0, 1.7])
-    assert model.qpos0[2] == 1.7
-    assert built(leg(), StartHeight("trunk", 2.0).partly(0.5)).qpos0[2] == 1.5
 
 
 def test_a_robot_lands_on_its_floor() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import mujoco
@@ -15,13 +14,12 @@ from shapechanger.morphology import (
     Damping,
     Friction,
     Gear,
-    Gravity,
     Mass,
     Remove,
     Stiffness,
     Stretch,
 )
-from tests.morphology.models import ant, arm, built, leg, limb, mass, pendulum, spec_of, tip
+from tests.morphology.models import ant, arm, built, leg, limb, mass, pendulum, spec_of
 
 _MOTORS = """
 <mujoco>
@@ -69,13 +67,6 @@ def test_a_gear_keeps_its_direction() -> None:
         built(spec_of(_MOTORS), Gear("*", scale=2.0))
 
 
-def test_damping_and_stiffness_of_joints() -> None:
-    damped = built(leg(), Damping("hip", scale=2.0), Damping("knee", to=7.0))
-    assert [damped.dof_damping[damped.joint(j).dofadr[0]] for j in ("hip", "knee")] == [4.0, 7.0]
-    stiff = built(leg(), Stiffness("hip", scale=2.0), Stiffness("knee", to=7.0))
-    assert [stiff.joint(j).stiffness[0] for j in ("hip", "knee")] == [6.0, 7.0]
-
-
 def test_polynomial_coefficients() -> None:
     """`scale` scales the whole polynomial, `to` sets the linear part."""
     spec = limb('<geom size=".1"/>')
@@ -99,47 +90,10 @@ def test_friction_has_three_coefficients(component: Any, place: int) -> None:
     np.testing.assert_array_equal(after.geom("floor").friction, before.geom("floor").friction)
 
 
-@pytest.mark.parametrize(
-    ("kind", "field"),
-    [(Damping, "dof_damping"), (Stiffness, "jnt_stiffness"), (Friction, "geom_friction")],
-)
-def test_some_values_can_be_zero(kind: Any, field: str) -> None:
-    values = getattr(built(leg(), kind("*", to=0.0)), field)
-    np.testing.assert_array_equal(values if values.ndim == 1 else values[:, 0], 0.0)
-
-
-def test_partial_values_are_interpolated() -> None:
-    assert built(leg(), Gear("hip", to=40.0).partly(0.25)).actuator("hip").gear[0] == 25.0
-    assert mass(built(leg(), Mass("shin", to=3.0).partly(0.5)), "shin") == pytest.approx(
-        0.5 * (3.0 + mass(built(leg()), "shin"))
-    )
-
-
-def test_a_glob_stretches_every_match() -> None:
-    """Parents are stretched first, so that children move along."""
-    model = built(ant(), Stretch("shank_*", 0.5))
-    np.testing.assert_allclose(
-        [model.geom(f"{leg}_ankle_geom").size[1] for leg in ("left", "right", "third", "fourth")],
-        0.1 * math.sqrt(2.0),
-    )
-    whole = built(leg(), Stretch("*", 2.0))
-    np.testing.assert_allclose(tip(whole, "toe"), [0.0, 0.4, 1.0 - 2.0 * (0.3 + 0.24)])
-
-
 def test_a_pole_keeps_its_lean_along_an_axis() -> None:
     """Stretched along z only, the end of the pole stays 1 mm off."""
     model = built(pendulum(), Stretch("pole", 2.0, axis="z"))
     np.testing.assert_allclose(2.0 * model.geom("cpole").pos, [0.001, 0.0, 1.2])
-
-
-def test_gravity_is_set() -> None:
-    """All components are set, or interpolated for partial edits."""
-    moon = Gravity((0.0, 0.0, -1.62))
-    np.testing.assert_array_equal(built(leg(), moon).opt.gravity, [0.0, 0.0, -1.62])
-    np.testing.assert_allclose(
-        built(leg(), Gravity((2.0, 0.0, -9.81)).partly(0.5)).opt.gravity, [1.0, 0.0, -9.81]
-    )
-    np.testing.assert_array_equal(built(leg(), Gravity((0.0, 0.0, 0.0))).opt.gravity, np.zeros(3))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ import pytest
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     AddLimb,
-    Split,
 )
 from shapechanger.morphology.spec.grafting import copy_element, copy_limb
 from tests.morphology.models import (
@@ -22,7 +21,6 @@ from tests.morphology.models import (
     spatial,
     spec_of,
 )
-from tests.morphology.scenes import EVERYTHING
 
 _WITH_ASSETS = """
 <mujoco>
@@ -67,23 +65,6 @@ def test_a_copied_limb_shares_the_assets() -> None:
     assert after.joint("knee_3").damping[0] == 3.0
     assert after.camera("eye_2").bodyid == after.body("shin_2").id
     assert after.light("lamp_2").bodyid == after.body("shin_2").id
-
-
-def test_limbs_of_a_complex_model_can_be_copied() -> None:
-    """Height fields, skyboxes, mocap bodies, ball joints and muscles are supported."""
-    before, spec = built(spec_of(EVERYTHING)), spec_of(EVERYTHING)
-    with pytest.raises(MorphologyError, match="'knee' follows 'wrist', and cannot follow a copy"):
-        built(spec, AddLimb("arm", "_2", 2.0))
-    spec.delete(spec.equality("mirror"))
-    with pytest.raises(MorphologyError, match="'hand' cannot be split: the actuator 'suction'"):
-        built(spec, Split("hand", "finger"))
-    spec.delete(spec.actuator("suction"))
-    model = built(spec, AddLimb("arm", "_2", 2.0), Split("hand", "finger"))
-    assert (model.nbody, model.nmesh, model.nhfield) == (
-        before.nbody + 3,
-        before.nmesh,
-        before.nhfield,
-    )
 
 
 def test_a_copied_geom_equals_the_original() -> None:

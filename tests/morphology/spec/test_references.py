@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import mujoco
-import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
@@ -26,7 +25,6 @@ from tests.morphology.models import (
     arm,
     built,
     check_at_rest,
-    gantry,
     spatial,
     spec_of,
 )
@@ -220,19 +218,6 @@ _TIED = """
 """
 
 
-def test_references_to_a_locked_joint() -> None:
-    """Its motor and the sensors of both go; its follower is held; a keyframe loses its number."""
-    model = built(gantry(), Lock("yaw"))
-    assert (model.nu, model.nkey) == (0, 1)
-    assert [model.sensor(i).name for i in range(model.nsensor)] == ["swing_angle", "hook"]
-    assert [int(i) for i in model.eq_obj1id] == [model.joint(j).id for j in ("pitch", "y")]
-    assert [int(i) for i in model.eq_obj2id] == [-1, model.joint("swing").id]
-    # `yaw` is 0.45 rad from its reference, and `pitch` follows it by the same angle.
-    pitch = model.joint("pitch").qposadr[0]
-    assert model.qpos0[pitch] == pytest.approx(-0.45)
-    np.testing.assert_allclose(model.key_qpos[0], [0.4, 0.0, 0.0, 0.1])
-
-
 def test_a_tendon_without_effect_is_removed() -> None:
     """The humanoid's tendons have neither force nor sensor."""
     assert built(asset_spec("humanoid")).ntendon == 2
@@ -261,12 +246,6 @@ def test_a_tendon_with_effect_prevents_the_lock(tendon: str, rest: str) -> None:
         built(spec, Lock("b", 0.1))
 
 
-def test_tendons_over_sites_do_not_tie_joints() -> None:
-    rest = '<actuator><motor tendon="rope"/></actuator><sensor><tendonpos tendon="rope"/></sensor>'
-    model = built(spec_of(_TIED.format(tendon="", rest=rest)), Lock("b", 0.1))
-    assert (model.ntendon, model.nu, model.nsensor) == (1, 1, 1)
-
-
 # --- Flexes and tuples -------------------------------------------------------------------------
 
 _CLOTH = """<deformable><flex name="cloth" dim="1" body="lower other" vertex="0 0 0 0 0 0"
@@ -281,12 +260,6 @@ def test_a_flex_is_not_torn(edit: Edit) -> None:
     """Its vertices belong to several bodies."""
     with pytest.raises(MorphologyError, match=r"carries a part of the flex 'cloth', which would"):
         built(arm(_CLOTH), edit)
-
-
-def test_equalities_of_a_flex_are_kept() -> None:
-    """They name no body."""
-    tied = _CLOTH + '<equality><flex flex="cloth"/></equality>'
-    assert built(arm(tied), Stretch("upper", 1.1)).neq == 1
 
 
 def test_a_tuple_loses_what_is_removed() -> None:

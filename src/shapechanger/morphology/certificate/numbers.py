@@ -34,7 +34,7 @@ from shapechanger.morphology.certificate.fields import (
     kinds_of,
     made_arrays,
 )
-from shapechanger.morphology.spec.elements import unique_namer
+from shapechanger.morphology.spec import unique_namer
 
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]

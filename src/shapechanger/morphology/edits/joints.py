@@ -12,14 +12,8 @@ import mujoco
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits import Edit, part_of_the_way, require_gear
-from shapechanger.morphology.spec.elements import require_free_name, select
-from shapechanger.morphology.spec.joints import (
-    add_motor,
-    displace,
-    limits,
-    reference_of,
-    set_limits,
-)
+from shapechanger.morphology.spec import require_free_name, select
+from shapechanger.morphology.spec.geometry import displace, limits, reference_of, set_limits
 from shapechanger.morphology.spec.references import OF_JOINTS, remove_joint
 
 # MuJoCo needs a range above zero; that of a partly locked joint is at least this.
@@ -158,6 +152,20 @@ class AddMotor(Edit, frozen=True):
                     f"The model states no largest torque or force of {joint.name!r}: give a gear."
                 )
             add_motor(spec, joint.name, gear * max(self.amount, _WEAKEST_PART))
+
+
+def add_motor(spec: mujoco.MjSpec, name: str, gear: float) -> None:
+    """Add a motor to the joint of its name; its gear is the N·m or N for a control of 1."""
+    require_free_name(spec, "actuator", name)
+    motor = spec.add_actuator(
+        name=name,
+        target=name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        ctrlrange=[-1.0, 1.0],
+        gear=[gear, 0.0, 0.0, 0.0, 0.0, 0.0],
+    )
+    motor.set_to_motor()
 
 
 class AddFreeJoint(Edit, frozen=True):

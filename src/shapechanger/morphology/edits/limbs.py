@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import mujoco
 import numpy as np
@@ -18,7 +18,9 @@ from shapechanger.morphology.edits import (
     part_of_the_way,
     require_gear,
 )
-from shapechanger.morphology.spec.elements import (
+from shapechanger.morphology.edits.joints import add_motor
+from shapechanger.morphology.edits.values import scale_strength
+from shapechanger.morphology.spec import (
     LEAST_MASS,
     require_free_name,
     select,
@@ -29,6 +31,7 @@ from shapechanger.morphology.spec.geometry import (
     NearPart,
     Plane,
     anchor,
+    carry_outwards,
     far_end,
     held_at,
     move_by,
@@ -37,6 +40,7 @@ from shapechanger.morphology.spec.geometry import (
     resize_geom,
     scale_geom_mass,
     set_ends,
+    set_limits,
     shorten,
     stretched,
     volume,
@@ -45,22 +49,26 @@ from shapechanger.morphology.spec.grafting import (
     copy_element,
     copy_limb,
     move,
-    resize_limb,
     share_contacts,
 )
-from shapechanger.morphology.spec.joints import add_motor, set_limits
 from shapechanger.morphology.spec.references import (
+    elements_of,
     key_of,
+    moves_only,
+    path_elements,
+    references,
     release_drawings,
     remove_limb,
     require_divisible,
     require_removable,
     require_unnamed,
+    subtree,
 )
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.carried import Keyframes
 
+_O: Final = mujoco.mjtObj
 # MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
 # share of its full size, which is a millionth of its mass.
 _SMALLEST_PART: Final = 0.01
@@ -290,7 +298,7 @@ class AddLimb(Edit, frozen=True):
         limb = next(select_limbs(spec, self.like, "copied"))
         copy = copy_limb(spec, limb, self.suffix, self.angle)
         if self.size != 1.0:
-            resize_limb(spec, copy, self.size)
+            _resize_limb(spec, copy, self.size)
         if self.amount != 1.0:
             _shrink(spec, copy, self.amount)
 
@@ -322,10 +330,49 @@ def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None
 
 def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
     """Scale a limb that exists only in part, in size and strength."""
-    resize_limb(spec, limb, max(part, _SMALLEST_PART))
+    _resize_limb(spec, limb, max(part, _SMALLEST_PART))
     # Of a limb that is scaled by two edits, masses can fall below what MuJoCo accepts.
     spec.compiler.boundmass = max(spec.compiler.boundmass, LEAST_MASS)
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, LEAST_MASS)
+
+
+def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
+    """Scale a limb in size and strength, in place, with everything attached to it.
+
+    Raises:
+        MorphologyError: If a body of it cannot be reshaped, or an actuator cannot be scaled.
+    """
+    for body in subtree(limb):
+        require_geometry(spec, body)
+        held = anchor(body)
+        for geom in body.geoms:
+            resize_geom(geom, held, factor)
+        carry_outwards(body, held, factor)
+        for joint in body.joints:
+            _scale_resistance(joint, factor)
+    elements = elements_of(limb)
+    release_drawings(spec, elements)
+    for tendon in spec.tendons:
+        path = {*path_elements(tendon)}
+        if path.isdisjoint(elements) or not moves_only(spec, tendon, elements):
+            continue
+        elements.add(key_of(tendon))
+        _scale_resistance(tendon, factor)
+        if path <= elements and _O.mjOBJ_JOINT not in {kind for kind, _ in path}:
+            tendon.range = tendon.range * factor
+            # A negative length stands for the length in the reference pose.
+            lengths = np.array(tendon.springlength)
+            tendon.springlength = np.where(lengths > 0.0, lengths * factor, lengths)
+    for mention in references(spec, "actuator"):
+        strong = mention.element[0] in (_O.mjOBJ_JOINT, _O.mjOBJ_TENDON)
+        if strong and mention.element in elements:
+            scale_strength(mention.holder, factor)
+
+
+def _scale_resistance(element: Any, factor: float) -> None:
+    """Scale the armature, damping, stiffness and friction of a joint or tendon."""
+    for field in ("armature", "damping", "stiffness", "frictionloss"):
+        setattr(element, field, getattr(element, field) * factor)
 
 
 def _add_segment(

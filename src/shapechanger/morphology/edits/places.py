@@ -16,7 +16,7 @@ from msgspec import Meta
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits import Edit, Positive, Vector, part_of_the_way
 from shapechanger.morphology.pose import robot_bodies
-from shapechanger.morphology.spec.elements import (
+from shapechanger.morphology.spec import (
     compiled,
     require_free_name,
     select,
@@ -28,13 +28,13 @@ from shapechanger.morphology.spec.geometry import (
     move_by,
     orientation,
     place_of,
+    reference_of,
     require_geometry,
     rotation,
     same_density,
     scale_mass,
     set_ends,
 )
-from shapechanger.morphology.spec.joints import reference_of
 from shapechanger.morphology.spec.references import key_of, release_drawings
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ words for these are the operations `scale` and `abs` of domain randomization.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Final, Literal
 
 import mujoco
@@ -15,7 +16,7 @@ from msgspec import Meta
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits import Edit, Ratio, Vector, part_of_the_way, require_gear
-from shapechanger.morphology.spec.elements import compiled, select
+from shapechanger.morphology.spec import compiled, select
 from shapechanger.morphology.spec.geometry import (
     inertia_is_written_out,
     require_geometry,
@@ -23,10 +24,12 @@ from shapechanger.morphology.spec.geometry import (
     stretch_segment,
     thicken_geom,
 )
-from shapechanger.morphology.spec.joints import is_motor, scale_clamps, scale_strength
-from shapechanger.morphology.spec.references import key_of, release_drawings
+from shapechanger.morphology.spec.references import key_of, references, release_drawings
 
 _D: Final = mujoco.mjtDisableBit
+_GAIN: Final = mujoco.mjtGain
+_BIAS: Final = mujoco.mjtBias
+_LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE), (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
 # A larger value, in any unit here, is a typing mistake, and MuJoCo's numbers overflow.
 _LARGEST: Final = 1e6
 # Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
@@ -118,7 +121,7 @@ class Gear(ValueEdit, frozen=True):
         """Change every actuator that fits."""
         factors: dict[str, float] = {}
         for actuator in select("actuator", self.element, spec.actuators):
-            if not is_motor(actuator):
+            if not _is_motor(actuator):
                 if self.scale is None:
                     raise MorphologyError(
                         f"{actuator.name!r} is no motor, so its gear is not its strength: give a "
@@ -134,7 +137,55 @@ class Gear(ValueEdit, frozen=True):
             new = self.changed(strongest)
             factors[actuator.name] = new / strongest
             actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
-        scale_clamps(spec, factors)
+        _scale_clamps(spec, factors)
+
+
+def _is_motor(actuator: mujoco.MjsActuator) -> bool:
+    """Return whether the force does not depend on where the actuator is: gain times control."""
+    return actuator.gaintype == _GAIN.mjGAIN_FIXED and actuator.biastype == _BIAS.mjBIAS_NONE
+
+
+def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
+    """Scale the force of an actuator; a servo keeps its targets, and a muscle its lengths.
+
+    The gear of a motor scales. The gear of any other actuator also scales what it measures, so of a
+    servo the gains, the bias and the force range scale instead.
+
+    Raises:
+        MorphologyError: If the actuator's gains have no common scale.
+    """
+    if _is_motor(actuator):
+        actuator.gear = actuator.gear * factor
+        return
+    gain, bias = np.array(actuator.gainprm), np.array(actuator.biasprm)
+    if actuator.gaintype == _GAIN.mjGAIN_MUSCLE and actuator.biastype == _BIAS.mjBIAS_MUSCLE:
+        # The peak force, and what it is derived from where it is negative.
+        for force in (gain[2:4], bias[2:4]):
+            force[force > 0.0] *= factor
+    elif actuator.gaintype in _LINEAR[0] and actuator.biastype in _LINEAR[1]:
+        # Constant, length and velocity terms.
+        gain[:3] *= factor
+        bias[:3] *= factor
+    else:
+        raise MorphologyError(
+            f"{actuator.name!r} is an actuator whose gains have no common scale, so its strength "
+            "cannot be scaled: write new gains into the model instead."
+        )
+    actuator.gainprm, actuator.biasprm = gain, bias
+    actuator.forcerange = actuator.forcerange * factor
+
+
+def _scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
+    """Scale the largest force of the joints and tendons whose actuators have all become as strong.
+
+    Without it, a stronger motor of a joint with `actuatorfrcrange` would change nothing. The
+    factors are new forces over old ones, by the names of actuators.
+    """
+    driven = [(each.element, each.holder.name) for each in references(spec, "actuator")]
+    for element in (*spec.joints, *spec.tendons):
+        scales = {factors.get(name, 1.0) for target, name in driven if target == key_of(element)}
+        if len(scales) == 1 and np.any(element.actfrcrange):
+            element.actfrcrange = element.actfrcrange * abs(scales.pop())
 
 
 class Damping(ValueEdit, frozen=True):

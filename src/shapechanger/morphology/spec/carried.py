@@ -17,9 +17,17 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.elements import compiled, unique_namer
-from shapechanger.morphology.spec.geometry import UPRIGHT, Array, inverse, orientation, product
-from shapechanger.morphology.spec.joints import displace, reference_of, set_reference
+from shapechanger.morphology.spec import compiled, unique_namer
+from shapechanger.morphology.spec.geometry import (
+    UPRIGHT,
+    Array,
+    displace,
+    inverse,
+    orientation,
+    product,
+    reference_of,
+    set_reference,
+)
 from shapechanger.morphology.spec.references import COUPLINGS, MARK, OF_JOINTS, PINS, Element
 
 _E: Final = mujoco.mjtEq

@@ -200,11 +200,7 @@ def held_at(body: mujoco.MjsBody) -> Array:
 
 
 def far_end(body: mujoco.MjsBody) -> Array:
-    """Return the point of a segment's axis farthest from its anchor.
-
-    Raises:
-        MorphologyError: If the body has no capsule or cylinder.
-    """
+    """Return the point of a segment's axis farthest from its anchor; refuse one without an axis."""
     held = anchor(body)
     ends = [end for geom in body.geoms for end in axis_ends(geom) or ()]
     if not ends:
@@ -257,10 +253,7 @@ def stretch_segment(
     """Make a segment `factor` times as long, at the same thickness, held at its anchor.
 
     It is stretched along "x", "y" or "z" of its body, or along all three; what is attached to it
-    moves outwards with it.
-
-    Raises:
-        MorphologyError: If a geom lies oblique to the axis.
+    moves outwards with it. A geom that lies oblique to the axis is refused.
     """
     if factor == 1.0:
         return  # Avoid rounding if nothing moves.
@@ -309,6 +302,80 @@ def carry_outwards(
     for child in body.bodies:
         held_there = held_at(child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
+
+
+# --- Joints ------------------------------------------------------------------------------------
+
+
+def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
+    """Return the range of a hinge or slide, rad or m, and refuse other joints.
+
+    It is a full turn for a hinge without limits, None for a slide without.
+    """
+    if joint.type not in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE):
+        raise MorphologyError(f"{joint.name!r} is neither a hinge nor a slide, so it has no range.")
+    lower, upper = (float(x) for x in joint.range)
+    automatic = joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
+    if joint.limited != mujoco.mjtLimited.mjLIMITED_TRUE and not automatic:
+        return None if joint.type == _J.mjJNT_SLIDE else _FULL_TURN
+    if _in_degrees(joint):
+        return math.radians(lower), math.radians(upper)
+    return lower, upper
+
+
+def set_limits(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
+    """Limit the range of a hinge or slide, rad or m."""
+    joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+    joint.range = [_as_written(joint, lower), _as_written(joint, upper)]
+
+
+def reference_of(joint: mujoco.MjsJoint) -> float:
+    """Return the position of a hinge or slide in the model's own pose, rad or m."""
+    return math.radians(joint.ref) if _in_degrees(joint) else float(joint.ref)
+
+
+def set_reference(joint: mujoco.MjsJoint, position: float) -> None:
+    """Set the position of a hinge or slide in the model's own pose, rad or m; the pose stays."""
+    joint.ref = _as_written(joint, position)
+
+
+def _in_degrees(joint: mujoco.MjsJoint) -> bool:
+    return bool(joint.compiler.degree) and joint.type == _J.mjJNT_HINGE
+
+
+def _as_written(joint: mujoco.MjsJoint, position: float) -> float:
+    """Return a position, rad or m, in the unit of the model.
+
+    MuJoCo converts degrees to exactly this angle if possible, as for every angle that was written
+    in degrees: 30° is not 29.999999999999996°.
+    """
+    if not _in_degrees(joint):
+        return position
+    near = math.degrees(position)
+    candidates = (round(near, 9), near, math.nextafter(near, 0.0), math.nextafter(near, 2.0 * near))
+    return next((degrees for degrees in candidates if math.radians(degrees) == position), near)
+
+
+def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
+    """Change the pose of a joint's body as if the joint had moved by an angle or distance, rad or m.
+
+    Of a ball it is the turn as a quaternion (w, x, y, z).
+    """
+    body, quaternion = joint.parent, UPRIGHT.copy()
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    if joint.type == _J.mjJNT_BALL:
+        quaternion = np.array(by)
+    elif joint.type == _J.mjJNT_HINGE:
+        mujoco.mju_axisAngle2Quat(quaternion, axis, float(by))
+    turn = rotation(quaternion)
+    shift = axis * by if joint.type == _J.mjJNT_SLIDE else joint.pos - turn @ joint.pos
+    # The body's joints act in order; those before this one are now seen from the turned frame.
+    for earlier in body.joints[: [j.name for j in body.joints].index(joint.name)]:
+        earlier.axis = turn.T @ earlier.axis
+        earlier.pos = turn.T @ (earlier.pos - shift)
+    parent = orientation(body)
+    body.pos = body.pos + rotation(parent) @ shift
+    set_orientation(body, product(parent, quaternion))
 
 
 # --- Cuts --------------------------------------------------------------------------------------
@@ -363,11 +430,7 @@ class Plane:
         return [point for point in points if self._is_beyond(place_of(point))]
 
     def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
-        """Return the part of a geom on the near side; one without a length goes by its middle.
-
-        Raises:
-            MorphologyError: If the plane cuts a box that lies oblique to it.
-        """
+        """Return the part of a geom on the near side; one without a length goes by its middle."""
         ends, axis = self._ends(geom)
         if ends is None:
             return NearPart(place_of(geom), float(not self._is_beyond(place_of(geom))), axis)

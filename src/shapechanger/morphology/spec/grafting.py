@@ -1,4 +1,4 @@
-"""Copy, move and resize limbs, geoms and sites within a model, and copy what names them."""
+"""Copy and move limbs, geoms and sites within a model, and copy what names them."""
 
 from __future__ import annotations
 
@@ -11,26 +11,19 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.elements import require_free_name, resolve_frames
+from shapechanger.morphology.spec import require_free_name, resolve_frames
 from shapechanger.morphology.spec.geometry import (
-    anchor,
-    carry_outwards,
     has_ends,
     orientation,
     product,
-    require_geometry,
-    resize_geom,
     rotation,
 )
-from shapechanger.morphology.spec.joints import scale_resistance, scale_strength
 from shapechanger.morphology.spec.references import (
     COUPLINGS,
     elements_of,
     elements_on,
     key_of,
     kind_of,
-    moves_only,
-    path_elements,
     path_of,
     references,
     release_drawings,
@@ -119,39 +112,6 @@ def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
         moved = copy_element(spec, element, parent, name)
     spec.delete(element)
     return moved
-
-
-def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
-    """Scale a limb in size and strength, in place, with everything attached to it.
-
-    Raises:
-        MorphologyError: If a body of it cannot be reshaped, or an actuator cannot be scaled.
-    """
-    for body in subtree(limb):
-        require_geometry(spec, body)
-        held = anchor(body)
-        for geom in body.geoms:
-            resize_geom(geom, held, factor)
-        carry_outwards(body, held, factor)
-        for joint in body.joints:
-            scale_resistance(joint, factor)
-    elements = elements_of(limb)
-    release_drawings(spec, elements)
-    for tendon in spec.tendons:
-        path = {*path_elements(tendon)}
-        if path.isdisjoint(elements) or not moves_only(spec, tendon, elements):
-            continue
-        elements.add(key_of(tendon))
-        scale_resistance(tendon, factor)
-        if path <= elements and _O.mjOBJ_JOINT not in {kind for kind, _ in path}:
-            tendon.range = tendon.range * factor
-            # A negative length stands for the length in the reference pose.
-            lengths = np.array(tendon.springlength)
-            tendon.springlength = np.where(lengths > 0.0, lengths * factor, lengths)
-    for mention in references(spec, "actuator"):
-        strong = mention.element[0] in (_O.mjOBJ_JOINT, _O.mjOBJ_TENDON)
-        if strong and mention.element in elements:
-            scale_strength(mention.holder, factor)
 
 
 def share_contacts(

@@ -90,7 +90,7 @@ class Mention(NamedTuple):
 def references(spec: mujoco.MjSpec, *kinds: str) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
-    `kinds` are those of the holders, such as "actuator", by default all.
+    `kinds` such as "actuator" are the holders', by default all.
     """
     found = [
         Mention(tendon, "tendon", "path", element)
