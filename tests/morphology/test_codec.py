@@ -1,10 +1,11 @@
-"""Bodies as JSON."""
+"""Edits as values, and bodies as JSON."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
+import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError, UnknownName
@@ -18,9 +19,11 @@ from shapechanger.morphology import (
     Remove,
     Stretch,
     as_body,
+    compile_body,
     from_json,
     to_json,
 )
+from tests.morphology.models import leg
 
 BODY = (
     Stretch("shank_*", 2.0),
@@ -122,3 +125,24 @@ def test_other_objects_are_refused(value: Any) -> None:
         MorphologyError, match=r"made of edits such as Stretch\('shank_\*', 1\.5\), "
     ):
         as_body(value)
+
+
+def test_edits_are_values() -> None:
+    """Edits compare by value, are hashable and frozen, and print without defaults."""
+    edit = Stretch("thigh", 2.0)
+    assert edit == Stretch("thigh", 2.0) != Stretch("shin", 2.0)
+    assert len({edit, Stretch("thigh", 2.0)}) == 1
+    assert repr(edit) == "Stretch(body='thigh', factor=2.0)"
+    with pytest.raises(AttributeError):
+        edit.factor = 3.0  # type: ignore[misc]
+
+
+def test_numpy_numbers_are_values() -> None:
+    stretch = Stretch("thigh", np.linspace(0.5, 2.0, 2)[0])
+    assert stretch == Stretch("thigh", 0.5)
+    assert to_json([stretch]) == to_json([Stretch("thigh", 0.5)])
+    fall = Gravity(np.array([0.0, 0.0, -3.7]))  # type: ignore[arg-type]
+    assert fall == Gravity((0.0, 0.0, -3.7))
+    assert type(Mass("*", scale=np.float32(2.0)).scale) is float
+    assert Stretch("thigh", np.int64(2)) == Stretch("thigh", 2.0)
+    assert compile_body(leg(), [Stretch("thigh", np.float64(2.0))]).nbody == leg().compile().nbody

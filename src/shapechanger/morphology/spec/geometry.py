@@ -357,7 +357,7 @@ def _as_written(joint: mujoco.MjsJoint, position: float) -> float:
 
 
 def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
-    """Change the pose of a joint's body as if the joint had moved by an angle or distance, rad or m.
+    """Change the pose of a joint's body as if the joint had moved by an angle, rad, or a distance.
 
     Of a ball it is the turn as a quaternion (w, x, y, z).
     """
