@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from shapechanger.morphology.certificate.fields import kinds_of
 
 _Array = NDArray[np.float64]
-_J = mujoco.mjtJoint
+_J: Final = mujoco.mjtJoint
+_E: Final = mujoco.mjtEq
 GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 """Types of geoms that a body can stand on."""
 
@@ -28,9 +29,7 @@ _FAR_M: Final = 1000.0
 _LOCKED: Final = 1e5
 # Tolerance of the vertical part of an axis that counts as vertical.
 _VERTICAL: Final = 1e-6
-
 # Loops are closed by Gauss-Newton steps on MuJoCo's own Jacobian of these equalities.
-_E: Final = mujoco.mjtEq
 _SOLVED: Final = [
     int(kind) for kind in (_E.mjEQ_CONNECT, _E.mjEQ_WELD, _E.mjEQ_JOINT, _E.mjEQ_TENDON)
 ]
@@ -315,10 +314,11 @@ class StartRules:
         The floor is every plane and height field that is fixed to the world and can touch the
         robot's geoms; 1000 without one. The model's `data` have gone through `mj_kinematics`.
         """
-        gap = _FAR_M
-        for floor, geom in self.floor_pairs:
-            gap = min(gap, mujoco.mj_geomDistance(self._model, data, floor, geom, _FAR_M, None))
-        return gap
+        gaps = (
+            mujoco.mj_geomDistance(self._model, data, floor, geom, _FAR_M, None)
+            for floor, geom in self.floor_pairs
+        )
+        return min(gaps, default=_FAR_M)
 
     def feasible(self, drawn: _Array, data: mujoco.MjData, start: _Array | None = None) -> _Array:
         """Return the feasible pose next to a drawn one, (nq,); the pose in `data` is overwritten.
@@ -350,13 +350,11 @@ class StartRules:
 
     def _lift(self, pose: _Array, data: mujoco.MjData) -> None:
         """Lift the trunk of a pose until its feet are not in the floor, in place."""
-        if self.lift is None:
-            return
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(self._model, data)
-        gap = self.floor_gap(data)
-        if gap < 0.0:
-            self.lift.raise_by(pose, -gap)
+        if self.lift is not None:
+            data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, data)
+            if (gap := self.floor_gap(data)) < 0.0:
+                self.lift.raise_by(pose, -gap)
 
     def _closed(self, drawn: _Array, start: _Array, goal: float, data: mujoco.MjData) -> _Array:
         """Return the pose next to a drawn one, inside the limits, with no larger violation.

@@ -337,11 +337,7 @@ def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
 
 
 def _resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
-    """Scale a limb in size and strength, in place, with everything attached to it.
-
-    Raises:
-        MorphologyError: If a body of it cannot be reshaped, or an actuator cannot be scaled.
-    """
+    """Scale a limb in size and strength, in place, with everything attached to it."""
     for body in subtree(limb):
         require_geometry(spec, body)
         held = anchor(body)

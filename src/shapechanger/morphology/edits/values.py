@@ -150,9 +150,6 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
 
     The gear of a motor scales. The gear of any other actuator also scales what it measures, so of a
     servo the gains, the bias and the force range scale instead.
-
-    Raises:
-        MorphologyError: If the actuator's gains have no common scale.
     """
     if _is_motor(actuator):
         actuator.gear = actuator.gear * factor

@@ -132,9 +132,6 @@ def make_explicit(spec: mujoco.MjSpec) -> None:
 
     These are frames, a total mass, least masses and inertias, and primitives that are fitted to
     meshes. The physics does not change.
-
-    Raises:
-        MorphologyError: If a frame scales its elements, or a least mass cannot be written out.
     """
     name_elements(spec)
     resolve_frames(spec)
@@ -180,11 +177,7 @@ def _write_out_bounds(spec: mujoco.MjSpec) -> None:
 
 
 def resolve_frames(spec: mujoco.MjSpec) -> None:
-    """Express every pose relative to its body, and reset the frames.
-
-    Raises:
-        MorphologyError: If a frame scales its elements.
-    """
+    """Express every pose relative to its body, and reset the frames; refuse those that scale."""
     for frame in spec.frames:
         if np.any(frame.scale != 1.0) or frame.massscale:
             raise MorphologyError(

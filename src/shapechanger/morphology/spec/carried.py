@@ -56,11 +56,7 @@ _SINGULAR: Final = 1e-6
 
 @contextmanager
 def carried(spec: mujoco.MjSpec) -> Generator[Keyframes]:
-    """Take keyframes and pins out of the way of edits, yield the keyframes, and write all back.
-
-    Raises:
-        MorphologyError: If a loop cannot be closed, or a tendon does not fit its new path.
-    """
+    """Take keyframes and pins out of the way of edits, yield the keyframes, and write all back."""
     keyframes = Keyframes()
     loops = any(equality.type in (*PINS, *COUPLINGS) for equality in spec.equalities)
     if not (spec.keys or spec.tendons or loops):
@@ -107,10 +103,7 @@ class Keyframes:
             spec.delete(key)
 
     def copy(self, originals: Mapping[str, str]) -> None:
-        """Give copied joints, actuators and bodies the values of the elements that were copied.
-
-        `originals` has the names of the elements that were copied by those of the copies.
-        """
+        """Give copied joints, actuators and bodies the values of their originals, by name."""
         for known in (known for _, values in self._values for known in values.values()):
             known |= {new: known[old] for new, old in originals.items() if old in known}
 
@@ -159,17 +152,11 @@ def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, dict[str, 
 
 
 class _Tendon(NamedTuple):
-    """A tendon in the model's own pose.
+    """A tendon in the model's own pose."""
 
-    Attributes:
-        length: Its length, m, or of a fixed one the sum of its joints.
-        fits: Whether the length is within its limits, if it has any.
-        inside: For each geom that it passes with a side site, whether the site is inside.
-    """
-
-    length: float
-    fits: bool
-    inside: tuple[bool, ...]
+    length: float  # m, or of a fixed one the sum of its joints.
+    fits: bool  # Whether the length is within its limits, if it has any.
+    inside: list[bool]  # For each geom that it passes with a side site, whether that is inside.
 
 
 def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
@@ -193,7 +180,7 @@ def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
         length = float(data.ten_length[i])
         low, high = model.tendon_range[i]
         fits = not model.tendon_limited[i] or low - _WITHIN <= length <= high + _WITHIN
-        found[model.tendon(i).name] = _Tendon(length, bool(fits), tuple(inside))
+        found[model.tendon(i).name] = _Tendon(length, bool(fits), inside)
     return found
 
 
@@ -254,9 +241,6 @@ def _close_loops(
 
     Positions of hinges and slides keep their meaning, since their references move, and so do those
     of balls in the keyframes. Return the data of the model in its new pose.
-
-    Raises:
-        MorphologyError: If no pose of its joints closes a loop.
     """
     data = _posed(model)
     for i, key in enumerate(_keys(spec)):

@@ -382,17 +382,11 @@ def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
 
 
 class NearPart(NamedTuple):
-    """The part of a geom that lies on the near side of a plane.
+    """The part of a geom that lies on the near side of a plane."""
 
-    Attributes:
-        near: End of its axis on that side, in the body's frame, shape (3,), m.
-        share: Share of its length on that side: 1 for all of the geom, 0 for nothing of it.
-        axis: Index of the half-size that is its length.
-    """
-
-    near: Array
-    share: float
-    axis: int
+    near: Array  # End of its axis on that side, in the body's frame, m.
+    share: float  # Of its length: 1 for all of the geom, 0 for nothing of it.
+    axis: int  # Index of the half-size that is its length.
 
 
 class Plane:

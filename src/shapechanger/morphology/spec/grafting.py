@@ -41,16 +41,10 @@ _APART: Final = frozenset(
 
 
 def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> Any:
-    """Add a copy of one element, which names the same others.
+    """Add a copy of one element, with a free name or none, which names the same others.
 
-    Args:
-        spec: Specification that contains it.
-        element: The element; a body is copied without what hangs on it, a tendon without its path.
-        place: The body or frame that the copy is added to, or `spec` for an element on no body.
-        name: Name of the copy; empty for none.
-
-    Raises:
-        MorphologyError: If the name is taken, or a plugin drives the element.
+    A body is copied without what hangs on it, a tendon without its path. The copy is added to
+    `place`, a body or frame, or for an element on no body to `spec`.
     """
     kind = kind_of(element)
     if name:
@@ -94,12 +88,9 @@ def _copy_body(
 
 
 def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
-    """Attach a limb or a point to another body, at the same pose in its frame.
+    """Attach a limb or a point to another body, at the same pose in its frame; names stay.
 
-    What names it still does.
-
-    Returns:
-        The new element; the old handle is invalid.
+    The new element is returned; the old handle is invalid.
     """
     # References are by name: under another name the old elements go without them.
     if isinstance(element, mujoco.MjsBody):
@@ -135,19 +126,8 @@ def copy_limb(
     """Add a turned copy of a limb, with a copy of all that names its elements.
 
     Points of the body that carries the limb, where tendons and pins begin, are copied and turned
-    with it; any other element that is named together with one of the limb is shared.
-
-    Args:
-        spec: Specification that contains it.
-        limb: First body of the limb.
-        suffix: Appended to the names of all copied elements.
-        angle: Turn about the z axis of the limb's parent, rad.
-
-    Returns:
-        The first body of the copy.
-
-    Raises:
-        MorphologyError: If a new name is taken, or an element cannot be copied.
+    with it; any other element that is named together with one of the limb is shared. All names get
+    the suffix. The turn is about the z axis of the limb's parent, rad. The first body is returned.
     """
     turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
     inside, parent = elements_of(limb), limb.parent
@@ -188,7 +168,12 @@ def copy_limb(
         if not any(mention.element in inside for mention in moves):
             continue
         if isinstance(holder, mujoco.MjsEquality):
-            _require_own_follower(holder, inside)
+            leader, follower = holder.name2, holder.name1
+            if (coupled := COUPLINGS.get(holder.type)) and (coupled, follower) not in inside:
+                raise MorphologyError(
+                    f"{follower!r} follows {leader!r}, and cannot follow a copy of it too: copy a "
+                    "limb that holds both."
+                )
         copy = copy_element(spec, holder, spec, holder.name and holder.name + suffix)
         if isinstance(holder, mujoco.MjsTendon):
             _copy_path(holder, copy, name_of)
@@ -207,16 +192,6 @@ def copy_limb(
             copy = getattr(spec, mention.kind)(mention.holder.name + suffix)
             copy.targetbody = mention.element[1] + suffix
     return first
-
-
-def _require_own_follower(equality: mujoco.MjsEquality, inside: set[Any]) -> None:
-    """Refuse to copy a coupling that would lead an element outside of the limb twice."""
-    kind = COUPLINGS.get(equality.type)
-    if kind and (kind, equality.name1) not in inside and (kind, equality.name2) in inside:
-        raise MorphologyError(
-            f"{equality.name1!r} follows {equality.name2!r}, and cannot follow a copy of it "
-            "too: copy a limb that holds both."
-        )
 
 
 def _copy_path(

@@ -66,19 +66,12 @@ _HOLDERS: Final = {
 
 
 class Mention(NamedTuple):
-    """One element of a model that names another.
-
-    Attributes:
-        holder: The element that names.
-        kind: Its kind, for messages.
-        field: Its field that holds the name; `path` of a tendon.
-        element: The named element.
-    """
+    """One element of a model, the holder, that names another."""
 
     holder: Any
-    kind: str
-    field: str
-    element: Element
+    kind: str  # Of the holder, for messages.
+    field: str  # Of the holder, which has the name; `path` of a tendon.
+    element: Element  # The named one.
 
     def __str__(self) -> str:
         if self.holder.name:
@@ -210,11 +203,7 @@ def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
 
 
 def release_drawings(spec: mujoco.MjSpec, touched: set[Element], *, skins: bool = True) -> None:
-    """Remove the skins over bodies that change, which have no effect, and refuse parts of a flex.
-
-    Raises:
-        MorphologyError: If one of the bodies carries a part of a flex.
-    """
+    """Remove the skins over bodies that change, without effect, and refuse parts of a flex."""
     mentions = [each for each in references(spec, "flex", "skin") if each.element in touched]
     for mention in mentions:
         if mention.kind == "flex":
