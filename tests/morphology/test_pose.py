@@ -14,10 +14,9 @@ from shapechanger.morphology.pose import (
     standing_height,
     standing_pose,
     start_pose,
-    travelling_body,
     trunk_lift,
 )
-from tests.morphology.models import ant, built, gantry, leg, pendulum, posed, spec_of
+from tests.morphology.models import ant, built, gantry, leg, posed, spec_of
 
 _BALL = """
 <mujoco>
@@ -78,18 +77,6 @@ def test_geoms_without_contact_are_no_floor(floor: str, ball: str) -> None:
     assert StartRules(model).floor_gap(posed(model)) == 1000.0
     assert standing_height(model) is None
     np.testing.assert_array_equal(start_pose(model), model.qpos0)
-
-
-def test_the_trunk_has_the_first_free_joint() -> None:
-    model = built(
-        spec_of(
-            """<mujoco><worldbody><body><joint name="door"/><geom size=".1"/></body>
-            <body><freejoint name="root"/><geom size=".1"/></body>
-            <body><freejoint name="ball"/><geom size=".1"/></body></worldbody></mujoco>"""
-        )
-    )
-    assert travelling_body(model) == 2
-    assert travelling_body(built(pendulum())) is None
 
 
 def test_a_body_starts_inside_its_limits() -> None:

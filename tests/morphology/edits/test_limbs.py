@@ -106,35 +106,6 @@ def test_a_split_gives_two_segments() -> None:
     np.testing.assert_array_equal(after.actuator("shank").ctrlrange, [-1.0, 1.0])
 
 
-def test_elements_without_length_go_to_one_part() -> None:
-    """Sites and spheres keep their place and their references."""
-    spec = leg()
-    spec.add_sensor(
-        name="touch",
-        type=mujoco.mjtSensor.mjSENS_TOUCH,
-        objname="toe",
-        objtype=mujoco.mjtObj.mjOBJ_SITE,
-    )
-    model = built(spec, Split("shin", "foot", at=0.5))
-    assert model.site("toe").bodyid == model.geom("sole").bodyid == model.body("foot").id
-    np.testing.assert_allclose(
-        posed(model).geom("sole").xpos, posed(built(leg())).geom("sole").xpos
-    )
-    assert model.sensor("touch").objid[0] == model.site("toe").id
-    near = built(leg(), Split("thigh", "shank", at=0.9))
-    assert near.site("scar").bodyid == near.body("thigh").id
-    np.testing.assert_array_equal(near.site("scar").pos, [0.0, 0.0, -0.06])
-    high = spec_of(
-        """<mujoco><worldbody><body name="trunk"><geom size=".1"/><body name="link">
-        <joint name="link" axis="0 1 0" pos=".1 0 0"/><geom name="low" size=".05" pos=".1 0 .2"/>
-        <geom name="bone" type="capsule" fromto=".1 0 0 .1 0 1" size=".01"/>
-        </body></body></worldbody></mujoco>"""
-    )
-    parts = built(high, Split("link", "far", at=0.5))
-    np.testing.assert_allclose(parts.geom("low").pos, [0.1, 0.0, 0.2])
-    np.testing.assert_allclose(posed(parts).geom("bone_of_far").xpos, [0.1, 0.0, 0.75])
-
-
 def test_a_split_divides_an_explicit_mass() -> None:
     for content in ('mass="3"', 'density="3"'):
         geom = f'<geom name="g" type="capsule" size=".1" fromto="0 0 0 0 0 1" {content}/>'

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import Mass, Stretch, name_elements, reshape
+from shapechanger.morphology import Mass, name_elements
 from shapechanger.morphology.spec import (
     make_explicit,
     resolve_frames,
@@ -165,13 +165,6 @@ def test_a_total_mass_scales_explicit_inertias() -> None:
     assert mass(model, "a") == pytest.approx(2.5)
     assert mass(model, "b") == pytest.approx(7.5)
     np.testing.assert_allclose(sorted(model.body("b").inertia), [0.25, 0.5, 0.5])
-
-
-def test_a_model_without_edits_is_unchanged() -> None:
-    """Without edits, or with an amount of 0, frames are not resolved."""
-    spec = spec_of(_FRAMES)
-    assert any(np.any(frame.pos) for frame in reshape(spec, ()).frames)
-    assert any(np.any(f.pos) for f in reshape(spec, [Stretch("limb", 2.0, amount=0.0)]).frames)
 
 
 def test_least_masses_do_not_swallow_an_edit() -> None:

@@ -18,11 +18,13 @@ from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits import Edit, Ratio, Vector, part_of_the_way, require_gear
 from shapechanger.morphology.spec import compiled, select
 from shapechanger.morphology.spec.geometry import (
+    LONG,
+    has_ends,
     inertia_is_written_out,
     require_geometry,
+    same_density,
     scale_mass,
     stretch_segment,
-    thicken_geom,
 )
 from shapechanger.morphology.spec.references import key_of, references, release_drawings
 
@@ -295,7 +297,12 @@ class Radius(Edit, frozen=True):
             require_geometry(spec, body)
             release_drawings(spec, {key_of(body)})
             for geom in body.geoms:
-                thicken_geom(geom, factor)
+                with same_density(geom):
+                    size = np.array(geom.size)
+                    is_round = geom.type in (*LONG, mujoco.mjtGeom.mjGEOM_SPHERE) or has_ends(geom)
+                    thick = np.arange(3) == 0 if is_round else np.arange(3) != np.argmax(size)
+                    size[thick] *= factor
+                    geom.size = size
 
 
 class Gravity(Edit, frozen=True):

@@ -174,17 +174,6 @@ def resize_geom(geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
         _move_outwards(geom, held, factor)
 
 
-def thicken_geom(geom: mujoco.MjsGeom, factor: float) -> None:
-    """Scale the thickness of a geom: its radius, or its two smaller half-sizes."""
-    with same_density(geom):
-        size = np.array(geom.size)
-        if geom.type in (*LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
-            size[0] *= factor
-        else:
-            size[np.arange(3) != np.argmax(size)] *= factor
-        geom.size = size
-
-
 # --- Segments ----------------------------------------------------------------------------------
 
 
