@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any, Final
 from shapechanger.envs.catalogue import register_all
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.registry import LEARNERS, METHODS, MODELS, POLICIES, ROBOTS
+from shapechanger.registry import LEARNERS, MAKERS, METHODS, MODELS, POLICIES, ROBOTS
 
 if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
@@ -180,6 +180,7 @@ LEARNERS.ship(
         "cloning": "vehicles.cloning:CloningSettings",
     }
 )
+MAKERS.ship({"make_vec": "envs.make_vec:make_vec"})
 MODELS.ship({"mujoco": "morphology.certificate.changes:ModelNumbers"})
 POLICIES.ship(
     {

@@ -12,6 +12,7 @@ import re
 import sys
 import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
+from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, cast
@@ -21,10 +22,10 @@ HASH_DIGITS: Final = 16
 
 _NAMED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
 _INSTALLED: Final = frozenset(("site-packages", "dist-packages"))
-_LIBRARY: Final = tuple(
-    Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")
+_NOT_OWN: Final = (
+    *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")),
+    Path(__file__).resolve().parent,
 )
-_HERE: Final = Path(__file__).resolve().parent
 # A worker process knows the script of its parent by the second name.
 _SCRIPTS: Final = ("__main__", "__mp_main__")
 
@@ -42,25 +43,28 @@ def own_modules(names: Iterable[str]) -> dict[str, str]:
         folder that it is imported from, such as `tasks/jump.py`.
     """
     found: dict[str, str] = {}
-    waiting, seen = list(names), set[str]()
-    folders = _import_folders()
+    waiting, seen = list(names), {""}
     while waiting:
         name = waiting.pop()
         if name in seen or name.partition(".")[0] == "shapechanger":
             continue
         seen.add(name)
-        if (package := name.rpartition(".")[0]) not in seen:
-            waiting.append(package)
-        file = _file_of(name, folders)
+        waiting.append(name.rpartition(".")[0])
+        file = _file_of(name)
         if file is None or not _is_own(file):
             continue
-        folders |= {_folder_of(name, file): None}
+        # A script that was run with `python -m` has the name of its module.
+        spec = getattr(sys.modules.get(name), "__spec__", None)
+        dotted = str(getattr(spec, "name", "")) if name in _SCRIPTS else name
+        package = dotted if file.stem == "__init__" else dotted.rpartition(".")[0]
         source = file.read_bytes()
         if file.suffix == ".py":
-            source, imported = _read(source, _package_of(name, file))
+            source, imported = _read(source, package)
             waiting += imported
         waiting += _used_by(sys.modules.get(name))
-        found[_key(name, file)] = hashlib.sha256(source).hexdigest()[:HASH_DIGITS]
+        depth = len(package.split(".")) if package else 0
+        key = Path(*file.parts[-1 - depth :]).as_posix()
+        found[key] = hashlib.sha256(source).hexdigest()[:HASH_DIGITS]
     return dict(sorted(found.items()))
 
 
@@ -72,8 +76,7 @@ def modules_of(*objects: Any) -> set[str]:
             found.add(each.__name__)
             continue
         kind: Any = each if isinstance(each, type) else type(each)
-        named = (each, *kind.__mro__)
-        modules = [getattr(one, "__module__", None) for one in named]
+        modules = [getattr(one, "__module__", None) for one in (each, *kind.__mro__)]
         found.update(module for module in modules if isinstance(module, str))
     return found
 
@@ -87,103 +90,61 @@ def modules_of_env(env: Any, env_id: str = "") -> set[str]:
     """
     spec: Any = getattr(env, "spec", None)
     arguments: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
-    found = modules_of(*_layers(env), *_parts(env), *_objects(arguments))
-    found.update(named_modules([env_id, *texts_in(arguments)]))
     entry: Any = None if spec is None else spec.entry_point
-    found.update(named_modules([entry]) if isinstance(entry, str) else modules_of(entry))
-    return found
-
-
-def _import_folders() -> dict[Path, None]:
-    """Return the folders that modules are imported from, without those of installed packages."""
-    places = (Path(place or ".").resolve() for place in sys.path)
-    return dict.fromkeys(place for place in places if place.is_dir() and _is_own(place))
+    parts: list[Any] = [env, entry]
+    while env is not (inner := getattr(env, "unwrapped", env)):
+        env = env.env
+        parts.append(env)
+    rig = getattr(getattr(inner, "family", None), "rig", ())
+    parts += [getattr(inner, "task", None), *getattr(inner, "measures", ())]
+    parts += [*getattr(inner, "body", ()), *rig, *arguments.values()]
+    return modules_of(*parts) | {*named_modules([env_id, *texts_in([entry, arguments])])}
 
 
 def _is_own(path: Path) -> bool:
     """Return whether a file or folder is neither installed nor part of Python or Shapechanger."""
-    return (
-        not _INSTALLED & set(path.parts)
-        and not any(path.is_relative_to(library) for library in _LIBRARY)
-        and not path.is_relative_to(_HERE)
-    )
+    return not _INSTALLED & {*path.parts} and not any(map(path.is_relative_to, _NOT_OWN))
 
 
-def _file_of(name: str, folders: Iterable[Path]) -> Path | None:
+def _file_of(name: str) -> Path | None:
     """Return the file of a module, which need not have been imported; None without a file."""
-    loaded = sys.modules.get(name)
-    if loaded is not None:
-        file = getattr(loaded, "__file__", None)
-        return None if file is None else Path(file).resolve()
-    parts = name.split(".")
-    for folder in folders:
-        for file in (folder.joinpath(*parts, "__init__.py"), folder.joinpath(*parts[:-1])):
-            if file.suffix and file.is_file():
-                return file
-            if (module := file / f"{parts[-1]}.py").is_file():
-                return module
-    return None
-
-
-def _spec_name(name: str) -> str:
-    """Return the name of a module; that of a script run with `python -m` is its module's."""
-    spec = getattr(sys.modules.get(name), "__spec__", None)
-    return str(getattr(spec, "name", "")) if name in _SCRIPTS else name
-
-
-def _package_of(name: str, file: Path) -> str:
-    """Return the package that relative imports of a module begin at."""
-    known = _spec_name(name)
-    return known if file.stem == "__init__" else known.rpartition(".")[0]
-
-
-def _folder_of(name: str, file: Path) -> Path:
-    """Return the folder that a module was imported from."""
-    package = _package_of(name, file)
-    return file.parents[len(package.split(".")) if package else 0]
-
-
-def _key(name: str, file: Path) -> str:
-    """Return the place of a module's file below the folder that it is imported from."""
-    try:
-        return file.relative_to(_folder_of(name, file)).as_posix()
-    except (ValueError, IndexError):
-        return file.name
+    file = getattr(sys.modules.get(name), "__file__", None)
+    if name not in sys.modules:
+        # Unlike `importlib.util.find_spec`, this imports no package on the way.
+        folders, parts = [place for place in sys.path if _is_own(Path(place).resolve())], name
+        for end in [*(m.start() for m in re.finditer(r"\.", name)), len(name)]:
+            spec = PathFinder.find_spec(parts[:end], folders)
+            if spec is None:
+                return None
+            folders, file = list(spec.submodule_search_locations or ()), spec.origin
+    return None if file is None else Path(file).resolve()
 
 
 def _read(source: bytes, package: str) -> tuple[bytes, list[str]]:
-    """Return the part of a source that an import runs, and the names that it imports."""
+    """Return the part of a source that an import runs, and the names that it may import."""
     lines = source.removeprefix(b"\xef\xbb\xbf").splitlines()
     try:
         tree = ast.parse(b"\n".join(lines))
     except (SyntaxError, ValueError):
         return b"\n".join(lines), []
-    run = [True] * len(lines)
-    for node in tree.body:
+    imported: list[str] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imported += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            parents = package.split(".") if node.level and package else []
+            parents = parents[: len(parents) + 1 - node.level]
+            base = ".".join([*parents, *([node.module] if node.module else [])])
+            imported += [base, *(f"{base}.{alias.name}".lstrip(".") for alias in node.names)]
+    for node in reversed(tree.body):
         if isinstance(node, ast.If) and not node.orelse and _is_guard(node.test):
-            run[node.lineno - 1 : node.end_lineno] = [False] * (
-                (node.end_lineno or node.lineno) - node.lineno + 1
-            )
-    kept = [line for line, runs in zip(lines, run, strict=True) if runs]
-    return b"\n".join(kept), list(_imported(tree, package))
+            del lines[node.lineno - 1 : node.end_lineno]
+    return b"\n".join(lines), imported
 
 
 def _is_guard(test: ast.expr) -> bool:
     """Return whether a condition is `__name__ == "__main__"`."""
     return ast.unparse(test).replace('"', "'") == "__name__ == '__main__'"
-
-
-def _imported(tree: ast.Module, package: str) -> Iterator[str]:
-    """Yield the names that a module may import, anywhere in its source."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            parents = package.split(".") if node.level and package else []
-            parents = parents[: len(parents) + 1 - node.level] if node.level else []
-            base = ".".join([*parents, *([node.module] if node.module else [])])
-            yield base
-            yield from (f"{base}.{alias.name}" if base else alias.name for alias in node.names)
 
 
 def _used_by(module: ModuleType | None) -> set[str]:
@@ -193,38 +154,14 @@ def _used_by(module: ModuleType | None) -> set[str]:
     return modules_of(*named) - {*_SCRIPTS}
 
 
-def _layers(env: Any) -> Iterator[Any]:
-    """Yield an env and what it wraps, from the outermost."""
-    yield env
-    while env is not getattr(env, "unwrapped", env):
-        env = env.env
-        yield env
-
-
-def _parts(env: Any) -> list[Any]:
-    """Return what an env is told to do and to be: its task, and the edits of its body."""
-    inner: Any = getattr(env, "unwrapped", env)
-    family = getattr(inner, "family", None)
-    edits = [*getattr(inner, "body", ()), *getattr(family, "rig", ())]
-    return [getattr(inner, "task", None), *getattr(inner, "measures", ()), *edits]
-
-
 def texts_in(value: Any) -> Iterator[str]:
     """Yield all texts in arguments, at any depth."""
     if isinstance(value, str):
         yield value
-    elif isinstance(value, Mapping):
-        for each in cast("Mapping[str, Any]", value).values():
+    elif isinstance(value, Mapping | list | tuple):
+        inner = cast("Any", value)
+        for each in inner.values() if isinstance(value, Mapping) else inner:
             yield from texts_in(each)
-    elif isinstance(value, list | tuple):
-        for each in cast("list[Any]", value):
-            yield from texts_in(each)
-
-
-def _objects(arguments: Mapping[str, Any]) -> list[Any]:
-    """Return the arguments that no JSON can hold, such as a task that is an object."""
-    plain = (str, int, float, bool, list, tuple, dict, type(None))
-    return [value for value in arguments.values() if not isinstance(value, plain)]
 
 
 def named_modules(texts: Iterable[str]) -> Iterator[str]:

@@ -31,19 +31,11 @@ class Registry(Generic[_Part]):
         self._registered: dict[str, _Part] = {}
 
     def ship(self, places: dict[str, str]) -> None:
-        """State where the parts are that come with Shapechanger.
-
-        Args:
-            places: `module:attribute` below `shapechanger` by name.
-        """
+        """State where shipped parts are, `module:attribute` below `shapechanger`, by name."""
         self._places |= places
 
     def register(self, name: str, part: _Part) -> None:
-        """Register a part.
-
-        Args:
-            name: Its name.
-            part: The part, a class.
+        """Register a part, a class.
 
         Raises:
             StudyError: If the name is empty, has other characters than letters, digits, - and _, or
@@ -55,7 +47,7 @@ class Registry(Generic[_Part]):
                 f"A {self._kind}'s name is made of letters, digits, - and _, and {title}'s is "
                 f"{name!r}."
             )
-        other: Any = self._registered.get(name)
+        other = self._registered.get(name)
         # A worker process may import the same class again under another module's name.
         is_same = getattr(other, "__qualname__", None) == getattr(part, "__qualname__", "")
         if name in self._places or not (other is None or is_same):
@@ -74,10 +66,7 @@ class Registry(Generic[_Part]):
         return frozenset(self.names()) - self._places.keys()
 
     def load(self, name: str) -> _Part:
-        """Return a part.
-
-        Args:
-            name: Its name, or `module:name` to import a module first that registers it.
+        """Return a part by its name, or by `module:name` to import a module that registers it.
 
         Raises:
             UnknownName: If there is no such part or module.
@@ -111,3 +100,6 @@ ROBOTS: Final[Registry[Any]] = Registry("reader of robots", "shapechanger.robots
 
 MODELS: Final[Registry[Any]] = Registry("kind of model", "shapechanger.models")
 """Readers of the numbers of a compiled model, keyed by the library that compiled it."""
+
+MAKERS: Final[Registry[Any]] = Registry("maker of vector envs", "shapechanger.makers")
+"""Functions like `shapechanger.make_vec`, so that learners import no env."""

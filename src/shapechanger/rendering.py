@@ -7,6 +7,7 @@ import ctypes.util
 import os
 import sys
 import warnings
+from functools import cache
 from importlib import import_module
 from typing import Any, Final
 
@@ -22,8 +23,7 @@ _OTHER_VALUES: Final = (
 # From the Khronos registry: EGL_EXT_platform_device.
 _EGL_PLATFORM_DEVICE_EXT: Final = 0x313F
 _MOST_DEVICES: Final = 16
-# Width and height of a context that is only a test, pixels.
-_PROBE: Final = 16
+_PROBE: Final = 16  # Width and height of a window that is only a test, pixels.
 
 
 def has_screen() -> bool:
@@ -80,25 +80,11 @@ def require_known_gl() -> None:
         raise _no_library(chosen)
 
 
-def require_context() -> None:
-    """Require that a context for drawing without a window opens.
-
-    MuJoCo's own errors are late and of many kinds, and GLFW reports none.
-
-    Raises:
-        RenderError: If none opens.
-    """
-    if _library() == "glfw":
-        _require_glfw()
-        return
-    open_context(_PROBE, _PROBE).free()
-
-
 def open_context(width: int, height: int) -> Any:
     """Open a context for drawing without a window, and make it current.
 
     `mujoco.GLContext` follows `MUJOCO_GL` when MuJoCo was imported; this follows its present
-    value.
+    value. MuJoCo's own errors are late and of many kinds, and GLFW reports none.
 
     Args:
         width: Width, pixels.
@@ -107,7 +93,9 @@ def open_context(width: int, height: int) -> Any:
     Raises:
         RenderError: If none opens.
     """
-    library = _library()
+    library = os.environ.get("MUJOCO_GL") or "glfw"
+    if library == "glfw":
+        _require_glfw()
     try:
         context: Any = import_module(f"mujoco.{library}").GLContext(width, height)
         context.make_current()
@@ -119,10 +107,6 @@ def open_context(width: int, height: int) -> Any:
     return context
 
 
-def _library() -> str:
-    return os.environ.get("MUJOCO_GL") or "glfw"
-
-
 def _no_library(chosen: str) -> RenderError:
     return RenderError(
         f"With MUJOCO_GL={chosen} nothing can be drawn: set it to one of {', '.join(_LIBRARIES)}, "
@@ -130,32 +114,28 @@ def _no_library(chosen: str) -> RenderError:
     )
 
 
+@cache
 def _require_glfw() -> None:
-    """Require that GLFW opens a window.
-
-    Raises:
-        RenderError: If it opens none.
-    """
+    """Require, once, that GLFW opens a window."""
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    where, window = f" on the display {display}" if display else "", None
     try:
         glfw: Any = import_module("glfw")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # The error below has the reason.
-            window = None
             if glfw.init() and glfw.get_primary_monitor():
                 glfw.window_hint(glfw.VISIBLE, False)
                 window = glfw.create_window(_PROBE, _PROBE, "", None, None)
                 glfw.default_window_hints()
-            if window:
-                glfw.destroy_window(window)
-                return
+        if window:
+            glfw.destroy_window(window)
     except ImportError as error:  # Its library is missing.
-        raise RenderError(f"GLFW opens no window here: {_first_line(error)}.") from error
-    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
-    where = f" on the display {display}" if display else ""
-    raise RenderError(
-        f"GLFW opens no window{where}: set DISPLAY to an existing display, or unset it and "
-        "MUJOCO_GL to draw without a screen."
-    )
+        where = f" ({_first_line(error)})"
+    if not window:
+        raise RenderError(
+            f"GLFW opens no window{where}: set DISPLAY to an existing display, or unset it and "
+            "MUJOCO_GL to draw without a screen."
+        )
 
 
 def _first_line(error: Exception) -> str:
@@ -166,28 +146,25 @@ def _first_line(error: Exception) -> str:
 def _egl_works() -> bool:
     """Return whether some EGL device opens; a library without a driver does not."""
     name = ctypes.util.find_library("EGL")
-    if name is None:
-        return False
     try:
-        egl = ctypes.CDLL(name)
+        egl = ctypes.CDLL(name) if name else None
     except OSError:  # Built for another machine.
+        egl = None
+    if egl is None:
         return False
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
     get_display = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
     if not query or not get_display:
         return False
-    pointer = ctypes.c_void_p
-    query_devices = ctypes.CFUNCTYPE(
-        ctypes.c_uint, ctypes.c_int, ctypes.POINTER(pointer), ctypes.POINTER(ctypes.c_int)
-    )(query)
-    platform_display = ctypes.CFUNCTYPE(pointer, ctypes.c_uint, pointer, pointer)(get_display)
-    egl.eglInitialize.argtypes = [pointer, pointer, pointer]
+    pointer, integer, count = ctypes.c_void_p, ctypes.c_uint, ctypes.c_int(0)
     devices = (pointer * _MOST_DEVICES)()
-    count = ctypes.c_int(0)
-    if not query_devices(_MOST_DEVICES, devices, ctypes.byref(count)):
-        return False
-    return any(
+    # Prototypes of the Khronos registry; without them pointers would be cut to 32 bits.
+    query_devices = ctypes.CFUNCTYPE(integer, ctypes.c_int, pointer, pointer)(query)
+    platform_display = ctypes.CFUNCTYPE(pointer, integer, pointer, pointer)(get_display)
+    egl.eglInitialize.argtypes = [pointer, pointer, pointer]
+    found = query_devices(_MOST_DEVICES, devices, ctypes.addressof(count))
+    return bool(found) and any(
         egl.eglInitialize(platform_display(_EGL_PLATFORM_DEVICE_EXT, device, None), None, None)
         for device in devices[: count.value]
     )

@@ -17,7 +17,7 @@ from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
 from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
 from shapechanger.cli.play import Watching, acting_in, load_any_policy
-from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
+from shapechanger.contract.env_ref import EnvRef, hold_out, layouts_of, measures_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.envs.naming import allow_own_modules, driven, env_ref
 from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyError
@@ -166,8 +166,7 @@ class PoliciesEvaluate(_InEnv):
             acting, act = acting_in(
                 env, self.file, self.learner, None if self.env or self.body else ref
             )
-            if isinstance(env.unwrapped, HasHeldOutStarts):
-                env.unwrapped.hold_out()
+            hold_out(env)
             found = evaluate(act, [acting], EVALUATION_SEED, episodes=self.episodes)
             for measure in measures_of(env):
                 unit = "" if measure.unit == "1" else f" {measure.unit}"

@@ -1,9 +1,7 @@
 """The promises of envs to learners, studies and recorders, and of worlds to simulated hardware.
 
-`env_ref` names an env as a value and reads its traits: layouts, measures, and the optional
-abilities that transfer uses (an expert, a family of bodies, a certificate of a shift). `vector`
-makes many envs at once. `measure` defines how well a task is done. `world` is the interface of
-every world that a robot's twin senses and moves in. `plan`, `limits` and `duty` are the numbers
-and pure functions of a robot's limits, for its guard and for simulations. `testing` is the exam of
-every env; begin there to write a new one.
+`env_ref` names an env as a value and reads its traits. `measure` defines how well a task is done.
+`world` is the interface of every world that a robot's twin senses and moves in. `plan` and `limits`
+are the numbers and pure functions of a robot's limits, for its guard and for simulations. `testing`
+is the exam of every env; begin there to write a new one.
 """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 from shapechanger.errors import UnknownName
 
@@ -32,28 +33,19 @@ class DriveReward:
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> DriveReward:
-        """Create the reward from weights keyed by name, as in a robot's profile.
-
-        Args:
-            weights: Weights that replace the defaults.
+        """Create the reward from weights that replace the defaults, keyed by name.
 
         Raises:
             UnknownName: If there is no such weight.
         """
-        names = [field.name for field in fields(cls)]
+        kinds: dict[str, Any] = {field.name: type(field.default) for field in fields(cls)}
         for name in weights:
-            if name not in names:
-                raise UnknownName("weight of the reward", name, names)
-        given = {name: float(value) for name, value in weights.items()}
-        ends = bool(given.pop("collision_ends_episode", cls().collision_ends_episode))
-        return cls(**given, collision_ends_episode=ends)
+            if name not in kinds:
+                raise UnknownName("weight of the reward", name, kinds)
+        return cls(**{name: kinds[name](value) for name, value in weights.items()})
 
     def terms(
-        self,
-        speed_mps: float | None,
-        collided: bool | None,
-        stalled: bool | None,
-        dt_s: float,
+        self, speed_mps: float | None, collided: bool | None, stalled: bool | None, dt_s: float
     ) -> dict[str, float]:
         """Return the terms of one step; the reward is their sum.
 

@@ -1,10 +1,28 @@
-"""Envs as values, and the facts that transfer reads from an env."""
+"""Envs as values, and the facts that transfer reads from an env.
+
+An env is recognised by its attributes to have more than Gymnasium's interface:
+
+- `observation_layout`, `action_layout` and `measures`: see `EnvTraits`.
+- `demonstrator(seed)`: an expert for its task, a `TaskDemonstrator`, whose mistakes `seed` decides.
+- `taught_by(act, seed)`: the same, of a policy of another env with the id `teacher_env`. `act` maps
+  that env's observations, (n, k), to actions, (n, m).
+- `hold_out()`: draws its surroundings from now on from a set that training never uses.
+- `family_name`: the continuous family of its body. `arguments_towards(target, alpha)` returns
+  arguments that make a body at `alpha`, 0 to 1, of the way to a target env's;
+  `arguments_between(target)`, those that draw a body on this way at each reset; and
+  `drawn_bodies(count, seed, split)`, bodies of a part of the family as JSON.
+- `tree`: the trunk and the limbs of its body, a `shapechanger.morphology.tree.Tree`.
+- `randomised_source()` and `identified_source(seed)`: arguments of a source env that randomise its
+  body over those that this env may have, or identify it from motions of this env.
+- `certify_shift(source, target)`: the certificate of the change between two envs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, Protocol
 
 import gymnasium as gym
 import msgspec
@@ -95,16 +113,14 @@ def each_body(env: EnvRef) -> list[EnvRef]:
             draw = msgspec.convert(given, BodyDraw)
         except msgspec.ValidationError as error:
             raise StudyError(f"The bodies of {env.id} are wrong: {error}.") from None
-        made = one.make()
-        try:
-            if not isinstance(made.unwrapped, HasBodyFamily):
+        with closing(one.make()) as made:
+            body: Any = made.unwrapped
+            if not hasattr(body, "drawn_bodies"):
                 raise StudyError(f"The body of {env.id} belongs to no family to draw from.")
-            given = made.unwrapped.drawn_bodies(draw.count, draw.seed, draw.split)
-        finally:
-            made.close()
+            given = body.drawn_bodies(draw.count, draw.seed, draw.split)
     if not given:
         raise StudyError(f"{env.id} needs at least one body.")
-    return [one.having({"body": body}) for body in given]
+    return [one.having({"body": edits}) for edits in given]
 
 
 class TaskDemonstrator(Protocol):
@@ -117,166 +133,6 @@ class TaskDemonstrator(Protocol):
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return the intended action, which is learned, and the executed one."""
         ...
-
-
-@runtime_checkable
-class HasDemonstrator(Protocol):
-    """An env with an expert for its task."""
-
-    def demonstrator(self, seed: int) -> TaskDemonstrator:
-        """Return the expert; `seed` determines its mistakes."""
-        ...
-
-
-@runtime_checkable
-class CanBeTaught(Protocol):
-    """An env whose demonstrations can come from a policy of another env with richer observations.
-
-    Attributes:
-        teacher_env: Id of that env.
-    """
-
-    teacher_env: str
-
-    def taught_by(self, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int) -> TaskDemonstrator:
-        """Return a demonstrator of this env that acts as a teacher does.
-
-        Args:
-            act: The teacher: maps observations of the teacher's env, (n, k), to actions, (n, m).
-            seed: Seed of the mistakes that it makes on purpose.
-        """
-        ...
-
-
-@runtime_checkable
-class HasHeldOutStarts(Protocol):
-    """An env whose surroundings can be drawn from a set that training never uses."""
-
-    def hold_out(self) -> None:
-        """Draw from the held-out set from now on."""
-        ...
-
-
-@runtime_checkable
-class HasBodyFamily(Protocol):
-    """An env whose body is one of a continuous family."""
-
-    @property
-    def family_name(self) -> str:
-        """Name of the family, such as "ant"."""
-        ...
-
-    def arguments_towards(self, target: Any, alpha: float) -> dict[str, Any]:
-        """Return arguments that make a body on the way to the body of another env.
-
-        Args:
-            target: An env of the same family.
-            alpha: The part of the way, 0 to 1.
-        """
-        ...
-
-    def arguments_between(self, target: Any) -> dict[str, Any]:
-        """Return arguments that draw a body between this one and another env's at each reset.
-
-        Args:
-            target: An env of the same family and spaces.
-        """
-        ...
-
-    def drawn_bodies(self, count: int, seed: int, split: Any) -> list[str]:
-        """Return bodies of the family as JSON.
-
-        Args:
-            count: How many.
-            seed: Seed of the draws.
-            split: Part of the family to draw from.
-        """
-        ...
-
-
-class LimbNumbers(Protocol):
-    """One joint of a body, and what it moves up to the next."""
-
-    @property
-    def joint(self) -> str:
-        """Name of its hinge or slide."""
-        ...
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Names of its body and of those fixed to it."""
-        ...
-
-    @property
-    def actuator(self) -> str:
-        """Name of the actuator that moves the joint; empty if no actuator does."""
-        ...
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Numbers that describe it."""
-        ...
-
-
-class KinematicTree(Protocol):
-    """The trunk and the limbs of a body."""
-
-    @property
-    def trunk(self) -> tuple[str, ...]:
-        """Names of the trunk's body and of those fixed to it."""
-        ...
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Numbers that describe the trunk."""
-        ...
-
-    @property
-    def limbs(self) -> Sequence[LimbNumbers]:
-        """Its limbs."""
-        ...
-
-    @property
-    def trunk_numbers(self) -> tuple[str, ...]:
-        """Names of the numbers of the trunk."""
-        ...
-
-    @property
-    def limb_numbers(self) -> tuple[str, ...]:
-        """Names of the numbers of each limb."""
-        ...
-
-
-@runtime_checkable
-class HasTree(Protocol):
-    """An env that describes the kinematic tree of its body."""
-
-    @property
-    def tree(self) -> KinematicTree:
-        """The trunk and the limbs of the present body."""
-        ...
-
-
-@runtime_checkable
-class SourceAdaptation(Protocol):
-    """A target env that can adapt its source env to itself."""
-
-    def randomised_source(self) -> dict[str, Any]:
-        """Return source arguments that randomise its body over the plausible ones."""
-        ...
-
-    def identified_source(self, seed: int) -> dict[str, Any]:
-        """Return source arguments identified from motions of this env.
-
-        Args:
-            seed: Seed of the motions.
-        """
-        ...
-
-
-@runtime_checkable
-class _CertifiesShift(Protocol):
-    def certify_shift(self, source: Any, target: Any) -> object: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,10 +167,8 @@ class EnvTraits:
 
     def same_layouts(self, other: EnvTraits) -> bool:
         """Return whether observations and actions mean the same in another env."""
-        return (self.observation_layout, self.action_layout) == (
-            other.observation_layout,
-            other.action_layout,
-        )
+        mine, theirs = self.observation_layout, other.observation_layout
+        return mine == theirs and self.action_layout == other.action_layout
 
 
 def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
@@ -336,12 +190,17 @@ def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
         env.action_space,
         exclusive=getattr(inner, "exclusive", False),
         individual=getattr(inner, "individual", ""),
-        has_demonstrator=isinstance(inner, HasDemonstrator),
-        adapts_source=isinstance(inner, SourceAdaptation),
-        family=inner.family_name if isinstance(inner, HasBodyFamily) else "",
+        has_demonstrator=hasattr(inner, "demonstrator"),
+        adapts_source=hasattr(inner, "identified_source"),
+        family=getattr(inner, "family_name", ""),
         measures=measures_of(env),
         identified=identify_env(env, env_id),
     )
+
+
+def hold_out(env: gym.Env[Any, Any]) -> None:
+    """Let an env that has a held-out set draw its surroundings from it from now on."""
+    getattr(env.unwrapped, "hold_out", lambda: None)()
 
 
 def is_single_instance(env: gym.Env[Any, Any]) -> bool:
@@ -356,11 +215,7 @@ def measures_of(env: gym.Env[Any, Any]) -> tuple[Measure, ...]:
 
 
 def is_reward_term(name: str) -> bool:
-    """Return whether a number of a step's `info` is a term of the reward.
-
-    Args:
-        name: Its name: `reward_...`, or `..._penalty` as of negative costs in Gymnasium.
-    """
+    """Return whether a key of `info` is a reward term: `reward_...` or `..._penalty`."""
     return name.startswith("reward_") or name.endswith("_penalty")
 
 
@@ -370,36 +225,30 @@ def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
     Raises:
         LayoutError: If it publishes none.
     """
-    found = [
-        env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else None
-        for name in ("observation_layout", "action_layout")
-    ]
-    if not all(isinstance(layout, Layout) for layout in found):
+    names = ("observation_layout", "action_layout")
+    found = [env.get_wrapper_attr(n) for n in names if env.has_wrapper_attr(n)]
+    layouts = [layout for layout in found if isinstance(layout, Layout)]
+    if len(layouts) < len(names):
         name = env.spec.id if env.spec else type(env.unwrapped).__name__
         raise LayoutError(
             f"{name} publishes no observation_layout and action_layout, so the meaning of its "
             "numbers is unknown: add them to the env, as `shapechanger.Layout`s."
         )
-    observation, action = cast("list[Layout]", found)
-    return observation, action
+    return layouts[0], layouts[1]
 
 
 def certify_shift(source: gym.Env[Any, Any], target: gym.Env[Any, Any]) -> str:
     """Return the certificate of the change between two envs; empty if the source issues none.
 
-    Args:
-        source: The env before the change.
-        target: The env after it.
-
     Raises:
         EmptyShift: If nothing changes.
         StudyError: If an env fails in the rollout that the certificate compares.
     """
-    inner = source.unwrapped
-    if not isinstance(inner, _CertifiesShift):
+    certify = getattr(source.unwrapped, "certify_shift", None)
+    if certify is None:
         return ""
     try:
-        return str(inner.certify_shift(source, target))
+        return str(certify(source, target))
     except ShapechangerError:
         raise
     except (TypeError, ValueError, ArithmeticError) as error:

@@ -1,4 +1,4 @@
-"""Caps, slew and the reflexes of motion as functions of a plan's limits, without a clock.
+"""Caps, slew, duty cycles and the reflexes of motion, as functions of a plan without a clock.
 
 The guard calls them on a robot, and a simulation of the robot calls them too, so that both move
 the same way. They need the standard library alone.
@@ -8,24 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan
 
-# Name of the turning action. It may propel, as a tank's does, but never forward.
-_STEERING = "steering"
 _SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
-_NS_PER_MS = 1_000_000
+# gpiozero over lgpio has steps of 1 % (`LGPIOPin._set_state`: `int(value * 100)`). Rounding to them
+# here makes all pin factories equal, and the returned value is the applied one.
+_STEPS = 100
+# Speed below which a robot stands still, m/s: one count per second of a coarse encoder.
 _STANDS_M_PER_S = 0.01
-"""Speed below which a robot stands still, m/s: one count per second of a coarse encoder."""
 
 
 def aimed(action: ActionPlan, value: float) -> float:
-    """Return the target of a command's value: clipped to the caps and rounded to a level.
-
-    Args:
-        action: The action.
-        value: Value in the command, dimensionless.
-    """
+    """Return the target of a command's value: clipped to the caps and rounded to a level."""
     if action.levels == "three":
         if value >= action.threshold:
             return action.high
@@ -34,12 +30,7 @@ def aimed(action: ActionPlan, value: float) -> float:
 
 
 def clipped(action: ActionPlan, value: float) -> bool:
-    """Return whether a command's value lies outside the caps.
-
-    Args:
-        action: The action; with three levels no value is clipped.
-        value: Value in the command, dimensionless.
-    """
+    """Return whether a command's value lies outside the caps; with three levels none does."""
     is_inside = action.low - _SAME <= value <= action.high + _SAME
     return action.levels == "any" and not is_inside
 
@@ -67,32 +58,34 @@ def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> floa
     return aim if abs(aim - now) <= step else now + math.copysign(step, aim - now)
 
 
-def forward_actions(actions: Sequence[ActionPlan]) -> tuple[int, ...]:
-    """Return the indices of the actions that push the robot forward or backward."""
-    return tuple(i for i, a in enumerate(actions) if a.propels and a.name != _STEERING)
+@dataclass(frozen=True, slots=True)
+class Duty:
+    """Duty cycles of a motor: conversion of an output value to the share of time that it is on.
 
-
-def bump_ends_ns(touches: bool, now_ns: int, ends_ns: int | None, hold_ms: int) -> int | None:
-    """Return when the block of the newest bump ends, ns; None if there was none.
-
-    Args:
-        touches: Whether a bumper touches something now.
-        now_ns: Time, ns.
-        ends_ns: The end so far.
-        hold_ms: Time for which a bump blocks forward motion (`LimitPlan.bump_hold_ms`), ms.
+    Attributes:
+        start: Smallest duty that moves the motor, 0 to 1; the smallest values are mapped there.
+        full: Duty at a value of 1, above `start` and at most 1.
     """
-    return now_ns + hold_ms * _NS_PER_MS if touches else ends_ns
 
+    start: float = 0.0
+    full: float = 1.0
 
-def bump_blocks(touches: bool, now_ns: int, ends_ns: int | None) -> bool:
-    """Return whether a bump blocks forward motion.
+    def of(self, value: float) -> float:
+        """Return the duty cycle for the magnitude of a value, in whole steps."""
+        size = min(abs(value), 1.0)
+        if size == 0.0:
+            return 0.0
+        steps = round((self.start + (self.full - self.start) * size) * _STEPS)
+        duty = steps / _STEPS
+        # gpiozero truncates, and 0.29 * 100 is 28.999999999999996.
+        return duty if int(duty * _STEPS) == steps else math.nextafter(duty, 1.0)
 
-    Args:
-        touches: Whether a bumper touches something now.
-        now_ns: Time, ns.
-        ends_ns: End of the block, as `bump_ends_ns` returns it.
-    """
-    return touches or (ends_ns is not None and now_ns < ends_ns)
+    def size_at(self, duty: float) -> float:
+        """Return the magnitude of the value of a duty cycle; above 0 for every duty above 0."""
+        if duty <= 0.0:
+            return 0.0
+        # A duty that was rounded to just below `start` still turns the motor.
+        return min(max((duty - self.start) / (self.full - self.start), 0.5 / _STEPS), 1.0)
 
 
 class Persistence:
@@ -103,12 +96,7 @@ class Persistence:
         self._since_ns: int | None = None
 
     def holds(self, condition: bool, now_ns: int) -> bool:
-        """Update with the current condition and return whether it has held for long enough.
-
-        Args:
-            condition: Whether it holds now.
-            now_ns: Robot's time, ns.
-        """
+        """Update with the condition at a time, ns; return whether it has held for long enough."""
         if not condition:
             self._since_ns = None
             return False
@@ -126,26 +114,22 @@ class Bump:
     """
 
     def __init__(self, hold_ms: int) -> None:
-        self._hold_ms = hold_ms
+        self._hold_ns = hold_ms * 1_000_000
         self._touches = False
         self.count = 0
         self.until_ns: int | None = None
 
     def sense(self, quantities: Mapping[str, float], now_ns: int) -> None:
-        """Update with a new sensing.
-
-        Args:
-            quantities: Readings keyed by name.
-            now_ns: Robot's time, ns.
-        """
+        """Update with readings keyed by name, at a time, ns."""
         touches = quantities.get("bump", 0.0) > 0.0
         self.count += touches and not self._touches
-        self.until_ns = bump_ends_ns(touches, now_ns, self.until_ns, self._hold_ms)
+        if touches:
+            self.until_ns = now_ns + self._hold_ns
         self._touches = touches
 
     def blocks(self, now_ns: int) -> bool:
         """Return whether forward motion is blocked."""
-        return bump_blocks(self._touches, now_ns, self.until_ns)
+        return self._touches or (self.until_ns is not None and now_ns < self.until_ns)
 
 
 class Stall:
@@ -165,25 +149,17 @@ class Stall:
     def __init__(self, after_s: float, threshold: float) -> None:
         self._after_s = after_s
         self._threshold = threshold
-        self._forward = Persistence(after_s)
-        self._backward = Persistence(after_s)
+        self._pushed = {1: Persistence(after_s), -1: Persistence(after_s)}
         self.way = 0
         self.watches = False
 
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
-        """Update with a new sensing.
-
-        Args:
-            quantities: Readings keyed by name.
-            push: Applied push, -1 to 1.
-            now_ns: Robot's time, ns.
-        """
+        """Update with readings keyed by name and the applied push, -1 to 1, at a time, ns."""
         self.watches = self._after_s > 0.0 and "speed" in quantities
         stands = self.watches and abs(quantities["speed"]) < _STANDS_M_PER_S
-        if self._forward.holds(stands and push > self._threshold, now_ns):
-            self.way = 1
-        if self._backward.holds(stands and push < -self._threshold, now_ns):
-            self.way = -1
+        for way, pushed in self._pushed.items():
+            if pushed.holds(stands and way * push > self._threshold, now_ns):
+                self.way = way
 
     def ask(self, push: float) -> None:
         """Update with the push that the command asks for."""
@@ -200,7 +176,8 @@ class Propulsion:
 
     def __init__(self, actions: Sequence[ActionPlan]) -> None:
         self._actions = actions
-        self.forward = forward_actions(actions)
+        # A turning action may propel, as a tank's does, but never forward.
+        self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != "steering")
         # Actions whose profile gives a speed.
         self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
 
@@ -220,9 +197,6 @@ class Propulsion:
 
 class MotionReflexes:
     """Reflexes that hold a robot back from what it touches, nears or pushes against.
-
-    Args:
-        plan: The robot.
 
     Attributes:
         bump: Contacts of the bumpers.
@@ -259,29 +233,21 @@ class MotionReflexes:
         self.stall.sense(quantities, self.propulsion.push(done), now_ns)
 
     def hold_back(self, aims: Sequence[float], now_ns: int) -> tuple[tuple[float, ...], str]:
-        """Return the targets without forbidden motion, and why.
-
-        Args:
-            aims: Target of each action.
-            now_ns: Robot's time, ns.
-        """
+        """Return the target of each action without forbidden motion, and why it was changed."""
         self.stall.ask(self.propulsion.push(aims))
-        forward: list[str] = []
-        if self.bump.blocks(now_ns):
-            forward.append("Not forward: the bumper touched something.")
-        if self._is_near:
-            forward.append("Not forward: something is near.")
-        if not self._is_far:
-            forward.append("Not forward: the distance ahead is not known.")
-        if self.stall.way > 0:
-            forward.append("Not forward: it pushes and does not move.")
-        backward = ["Not backward: it pushes and does not move."] if self.stall.way < 0 else []
-        kept = list(aims)
-        reasons: list[str] = []
-        for i in self.propulsion.forward:
+        reasons = (
+            (1, self.bump.blocks(now_ns), "Not forward: the bumper touched something."),
+            (1, self._is_near, "Not forward: something is near."),
+            (1, not self._is_far, "Not forward: the distance ahead is not known."),
+            (1, self.stall.way > 0, "Not forward: it pushes and does not move."),
+            (-1, self.stall.way < 0, "Not backward: it pushes and does not move."),
+        )
+        forbidden = [(way, reason) for way, holds, reason in reasons if holds]
+        kept, given = list(aims), dict[str, None]()
+        for i in self.propulsion.forward if forbidden else ():
             rest = self._actions[i].rest
-            for words, drops in ((forward, kept[i] > rest), (backward, kept[i] < rest)):
-                if words and drops:
-                    kept[i] = rest
-                    reasons += words
-        return tuple(kept), " ".join(dict.fromkeys(reasons))
+            asked = [reason for way, reason in forbidden if way * (aims[i] - rest) > 0.0]
+            if asked:
+                kept[i] = rest
+                given |= dict.fromkeys(asked)
+        return tuple(kept), " ".join(given)

@@ -1,9 +1,8 @@
 """Plan of a robot: its actions, outputs, sensors and limits, as a profile states them.
 
 The guard of the robot and simulations of it move within the same plan. These are tables of a
-profile (`shapechanger.robot.profile`) as plain dataclasses, with the bounds that it checks: the
-guard loads nothing but msgspec and its drivers. They cross from the command line to the guard as
-JSON.
+profile (`shapechanger.robot.profile`) with the bounds that it checks: the guard loads nothing but
+msgspec and its drivers. They cross from the command line to the guard as JSON.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -207,7 +206,7 @@ class GuardPlan:
 
     def to_json(self) -> str:
         """Return the plan as JSON."""
-        return json.dumps(asdict(self))
+        return json.dumps(asdict(self))  # Slews may be infinite.
 
     @classmethod
     def from_json(cls, text: str) -> GuardPlan:
@@ -231,24 +230,15 @@ def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...
             f"{plan.name} has {len(plan.actions)} actions ({names}), got {len(actions)} numbers."
         )
     named = {action.name: value for action, value in zip(plan.actions, actions, strict=True)}
-    values: list[float] = []
-    for output in plan.outputs:
-        mixed = output.offset + sum([weight * named[a] for a, weight in output.mix.items()])
-        values.append(max(-1.0, min(1.0, mixed)))
-    return tuple(values)
-
-
-_DRIVEN: Final = ("forward", "backward", "enable", "phase", "pin")
+    mixed = [
+        o.offset + sum([weight * named[a] for a, weight in o.mix.items()]) for o in plan.outputs
+    ]
+    return tuple([max(-1.0, min(1.0, value)) for value in mixed])
 
 
 def driven_pins(plan: GuardPlan) -> dict[int, str]:
     """Return the use of each pin that drives an output or the enable line, by BCM number."""
-    found = {
-        pin: f"{output.name} {key}"
-        for output in plan.outputs
-        for key in _DRIVEN
-        if (pin := output.settings.get(key, -1)) >= 0
-    }
-    if plan.enable_pin is not None:
-        found[plan.enable_pin] = "enable line"
-    return found
+    keys = ("forward", "backward", "enable", "phase", "pin")
+    used = {o.settings.get(key, -1): f"{o.name} {key}" for o in plan.outputs for key in keys}
+    enable = {} if plan.enable_pin is None else {plan.enable_pin: "enable line"}
+    return {pin: use for pin, use in (used | enable).items() if pin >= 0}

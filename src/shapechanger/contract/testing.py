@@ -10,6 +10,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from itertools import pairwise, product
 from typing import Any, Final, cast
 
@@ -45,8 +46,7 @@ def _require(kept: bool, sentence: str) -> None:
 
 def passes_gymnasiums_checker(make: MakeEnv) -> None:
     """Passes Gymnasium's `check_env`."""
-    env = make()
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), make() as env:
         # Advice on spaces with another range than -1 to 1 is no failure.
         warnings.filterwarnings("ignore", message=".*symmetric and normalized space.*")
         warnings.filterwarnings("ignore", message=".*(minimum|maximum) value is -?infinity.*")
@@ -54,7 +54,6 @@ def passes_gymnasiums_checker(make: MakeEnv) -> None:
             check_env(env.unwrapped, skip_render_check=True)
         except (AssertionError, gym.error.Error) as error:
             raise BrokenPromise(f"Gymnasium's checker says: {error}") from error
-    env.close()
 
 
 def is_deterministic(make: MakeEnv) -> None:
@@ -73,24 +72,22 @@ def shares_no_memory(make: MakeEnv) -> None:
 
 def names_every_number(make: MakeEnv) -> None:
     """Layouts have the sizes and bounds of the spaces."""
-    env = make()
-    observation, action = _layouts(env)
-    for side, layout, space in (
-        ("observation", observation, env.observation_space),
-        ("action", action, env.action_space),
-    ):
-        # An image is one block of a layout, and so is each part of a Dict.
-        kinds = (gym.spaces.Box, gym.spaces.Dict)[: 2 if side == "observation" else 1]
+    with make() as env:
+        observation, action = _layouts(env)
+        for side, layout, space, kinds in (
+            # An image is one block of a layout, and so is each part of a Dict.
+            ("observation", observation, env.observation_space, (gym.spaces.Box, gym.spaces.Dict)),
+            ("action", action, env.action_space, (gym.spaces.Box,)),
+        ):
+            _require(
+                isinstance(space, kinds) and gym.spaces.flatdim(space) == layout.size,
+                f"The {side} layout has {layout.size} numbers, its space {space}.",
+            )
+        box = cast("Any", env.action_space)
         _require(
-            isinstance(space, kinds) and gym.spaces.flatdim(space) == layout.size,
-            f"The {side} layout has {layout.size} numbers, its space {space}.",
+            np.allclose(box.low, action.low) and np.allclose(box.high, action.high),
+            "The bounds of the action layout differ from the action space's.",
         )
-    box = cast("Any", env.action_space)
-    _require(
-        np.allclose(box.low, action.low) and np.allclose(box.high, action.high),
-        "The bounds of the action layout differ from the action space's.",
-    )
-    env.close()
 
 
 def pickles(make: MakeEnv) -> None:
@@ -112,51 +109,38 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
 
     Their names are `reward_...`, or `..._penalty` as of negative costs in Gymnasium.
     """
-    env = make()
-    env.reset(seed=_SEED)
-    env.action_space.seed(_SEED)
-    for step in range(_STEPS):
-        _, reward, terminated, truncated, info = env.step(env.action_space.sample())
+    infos: list[dict[str, Any]] = []
+    for step, (_, reward) in enumerate(_rollout(make(), infos)[1:]):
+        info = infos[step]
         _require(
             not info.get("diverged"),
             f"The simulation diverges at step {step + 1} of random actions: give the actuators a "
             "narrower range, motors of a rig a smaller gear, or the model a shorter time step.",
         )
-        terms = [
-            float(value)
-            for name, value in info.items()
-            if is_reward_term(name)
-            and not isinstance(value, Mapping)  # Such as all terms together, or their sources.
-        ]
+        # A mapping has all terms together, or their sources.
+        named = (value for name, value in info.items() if is_reward_term(name))
+        terms = [float(value) for value in named if not isinstance(value, Mapping)]
         _require(bool(terms), "info reports no reward terms.")
         _require(
-            bool(np.isclose(float(reward), sum(terms), rtol=1e-9, atol=1e-12)),
+            bool(np.isclose(reward, sum(terms), rtol=1e-9, atol=1e-12)),
             f"The reward is {reward}, its terms add up to {sum(terms)}.",
         )
-        if terminated or truncated:
-            break
-    env.close()
 
 
 def starts_where_it_may(make: MakeEnv) -> None:
     """Starts differ between seeds and are within the ranges of the layout."""
-    env = make()
-    observation, _ = _layouts(env)
-    space = env.observation_space
-    starts = [np.asarray(gym.spaces.flatten(space, env.reset(seed=i)[0])) for i in range(20)]
+    with closing(make()) as env:
+        layout, space = _layouts(env)[0], env.observation_space
+        seen = [np.asarray(gym.spaces.flatten(space, env.reset(seed=i)[0])) for i in range(20)]
+    starts = np.stack(seen)
     _require(
-        not all(np.array_equal(starts[0], start) for start in starts[1:]),
-        "Every start is the same.",
+        not np.array_equal(starts, starts[:1].repeat(len(seen), 0)), "Every start is the same."
     )
-    low, high = (
-        bound + sign * _ROUNDING * np.maximum(1.0, np.abs(bound))
-        for sign, bound in ((-1.0, observation.low), (1.0, observation.high))
-    )
-    for start in starts:
-        within = (start >= low) & (start <= high)
-        names = [name for name, places in observation.slices.items() if not within[places].all()]
-        _require(not names, f"Starts out of range: {', '.join(names)}.")
-    env.close()
+    low = layout.low - _ROUNDING * np.maximum(1.0, np.abs(layout.low))
+    high = layout.high + _ROUNDING * np.maximum(1.0, np.abs(layout.high))
+    outside = (starts < low) | (starts > high)
+    names = [name for name, places in layout.slices.items() if outside[:, places].any()]
+    _require(not names, f"Starts out of range: {', '.join(names)}.")
 
 
 PROMISES: Final[tuple[Callable[[MakeEnv], None], ...]] = (
@@ -211,15 +195,19 @@ def _arrays(observation: Any) -> list[Any]:
     return [observation]
 
 
-def _rollout(env: gym.Env[Any, Any]) -> _Rollout:
-    """Return observations and rewards under seeded random actions, and close the env."""
-    observation, _ = env.reset(seed=_SEED)
-    env.action_space.seed(_SEED)
-    result: _Rollout = [(observation, 0.0)]
-    for _ in range(_STEPS):
-        observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
-        result.append((observation, float(reward)))
-        if terminated or truncated:
-            break
-    env.close()
+def _rollout(env: gym.Env[Any, Any], infos: list[dict[str, Any]] | None = None) -> _Rollout:
+    """Return observations and rewards under seeded random actions, and close the env.
+
+    The info of each step is appended to `infos`.
+    """
+    with closing(env):
+        result: _Rollout = [(env.reset(seed=_SEED)[0], 0.0)]
+        env.action_space.seed(_SEED)
+        for _ in range(_STEPS):
+            observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+            result.append((observation, float(reward)))
+            if infos is not None:
+                infos.append(info)
+            if terminated or truncated:
+                break
     return result

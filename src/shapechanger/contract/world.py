@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 RESTING_V: Final = 8.0
 """Voltage without load of two nearly full lithium cells."""
 
-
 STANDING_MPS: Final = 0.1
 """Speed, m/s, below which a vehicle stands, unless it turns."""
 

@@ -17,7 +17,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import HasDemonstrator, TaskDemonstrator, layouts_of
+from shapechanger.contract.env_ref import TaskDemonstrator, layouts_of
 from shapechanger.demos.cloning.clone import Clone
 from shapechanger.demos.episodes import Driver
 from shapechanger.demos.recording import QUALITY, ObservationEncoder, RecordEpisodes, name_of
@@ -190,8 +190,8 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
     act = None if driver == EXPERT else _policy(Path(driver), env)
     if act is not None and not corrected_by:
         return Pilot(env, act, None)
-    inner = env.unwrapped
-    if not isinstance(inner, HasDemonstrator):
+    inner: Any = env.unwrapped
+    if not hasattr(inner, "demonstrator"):
         raise DemosError(
             f"{name_of(env)} has no expert: let a policy drive with `--driver FILE`, or drive a "
             "robot yourself with `shapechanger robot drive`."

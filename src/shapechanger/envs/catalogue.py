@@ -8,7 +8,6 @@ from typing import Any, Final
 import gymnasium as gym
 import msgspec
 
-from shapechanger.contract.vector import register_make_vec
 from shapechanger.envs.odrl import odrl_bodies
 from shapechanger.errors import UnknownName
 
@@ -190,8 +189,7 @@ _TUNED: Final = ("Ant", "InvertedPendulum")
 
 
 def register_all() -> None:
-    """Register every env of the catalogue with Gymnasium, once, and how to make many."""
-    register_make_vec("shapechanger.envs.make_vec:make_vec")
+    """Register every env of the catalogue with Gymnasium, once."""
     for entry in (*CATALOGUE.values(), *ODRL_ENVS.values()):
         _register(
             entry.id,

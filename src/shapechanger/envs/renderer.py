@@ -14,18 +14,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import MissingExtra, RenderError
-from shapechanger.rendering import choose_gl, require_context
+from shapechanger.rendering import choose_gl, open_context
 
 try:
-    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer, WindowViewer
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
 except ModuleNotFoundError as error:
     raise MissingExtra(error.name or "mujoco", "sim") from error
 
+_Floats = NDArray[np.float64]
+
 # Frames of at most this many pixels are camera observations rather than films.
 _MOST_CAMERA_PIXELS: Final = 256 * 256
-_require_context_once: Final = functools.cache(require_context)
 # Effects that render the scene again for each light and each mirror.
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
+# Width of the squares that floors consist of in frames with shadows, m. In large squares,
+# coordinates in the shadow map are inexact enough that floors shadow themselves in places.
+_SQUARE_M: Final = 0.5
+
+
+@functools.cache
+def _require_context() -> None:
+    """Require, once, that MuJoCo can draw; Gymnasium's renderer fails in many ways."""
+    open_context(16, 16).free()
 
 
 class Renderer(MujocoRenderer):
@@ -47,7 +57,7 @@ class Renderer(MujocoRenderer):
         **more: As Gymnasium's renderer.
     """
 
-    _viewers: dict[str, OffScreenViewer | WindowViewer]
+    _viewers: dict[str, Any]
 
     def __init__(
         self,
@@ -76,9 +86,9 @@ class Renderer(MujocoRenderer):
             RenderError: If nothing can be drawn here.
         """
         if render_mode != "human":
-            _require_context_once()
+            _require_context()
         try:
-            viewer = cast("Any", self._get_viewer(render_mode))
+            viewer = self._get_viewer(render_mode)
         except mujoco.FatalError as error:
             raise RenderError(f"MuJoCo cannot draw here: {error}.") from error
         viewer.make_context_current()
@@ -87,35 +97,26 @@ class Renderer(MujocoRenderer):
         for marker in markers:
             viewer.add_marker(**marker)
         with _restored(self.data.geom_xpos):
-            if self._follow is not None:
-                self._move_floors(self.data.xpos[self._follow, :2])
-            return cast("Any", super().render(render_mode))
+            # Contacts take floors as infinite, and images do not, so those below a body that the
+            # camera follows move along, by whole tiles so that they seem to stay.
+            for floor, period in self._floors.items() if self._follow is not None else ():
+                place = self.data.geom_xpos[floor, :2]
+                place += np.round((self.data.xpos[self._follow, :2] - place) / period) * period
+            return cast("Any", super()).render(render_mode)
 
-    def _move_floors(self, middle: NDArray[np.float64]) -> None:
-        """Move floors below the body that the camera follows, which may walk off them.
-
-        Contacts take floors as infinite, and images do not. They move by whole tiles, so that
-        they seem to stay.
-        """
-        for floor, period in self._floors.items():
-            place = self.data.geom_xpos[floor, :2]
-            place += np.round((middle - place) / period) * period
-
-    def _get_viewer(self, render_mode: str | None) -> OffScreenViewer | WindowViewer:
-        viewers: Any = super()
+    def _get_viewer(self, render_mode: str | None) -> Any:
+        new: Any = super()._get_viewer
         if render_mode in self._viewers:
-            return viewers._get_viewer(render_mode)
+            return new(render_mode)
         if not self._plain or render_mode == "human":
-            # In large squares, coordinates in the shadow map are inexact enough that floors shadow
-            # themselves in places. Contacts do not read the size of a square.
-            with _restored(self.model.geom_size):
+            with _restored(self.model.geom_size):  # Contacts do not read the size of a square.
                 self.model.geom_size[[*self._floors], 2] = _SQUARE_M
-                return viewers._get_viewer(render_mode)
+                return new(render_mode)
         quality = self.model.vis.quality
         before = quality.offsamples, quality.shadowsize
         quality.offsamples = quality.shadowsize = 0  # Neither multisampling nor shadow maps.
         try:
-            viewer = viewers._get_viewer(render_mode)
+            viewer = new(render_mode)
         finally:
             quality.offsamples, quality.shadowsize = before
         for flag in _COSTLY:
@@ -128,9 +129,9 @@ class Renderer(MujocoRenderer):
         _free(self._viewers)
 
 
-def _floors(model: mujoco.MjModel) -> dict[int, NDArray[np.float64]]:
+def _floors(model: mujoco.MjModel) -> dict[int, _Floats]:
     """Return the level floors with tiles, and the width and depth after which these repeat, m."""
-    found: dict[int, NDArray[np.float64]] = {}
+    found: dict[int, _Floats] = {}
     for floor in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist():
         material, size = model.geom_matid[floor], model.geom_size[floor, :2]
         level = model.geom_bodyid[floor] == 0 and model.geom_quat[floor, 0] == 1.0
@@ -140,7 +141,7 @@ def _floors(model: mujoco.MjModel) -> dict[int, NDArray[np.float64]]:
 
 
 @contextmanager
-def _restored(array: NDArray[np.float64]) -> Generator[None]:
+def _restored(array: _Floats) -> Generator[None]:
     """Restore the numbers of an array at the end of this block."""
     before = array.copy()
     try:
@@ -149,7 +150,7 @@ def _restored(array: NDArray[np.float64]) -> Generator[None]:
         array[:] = before
 
 
-def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
+def _free(viewers: dict[str, Any]) -> None:
     """Free the OpenGL resources and then the context of each viewer."""
     while viewers:
         _, viewer = viewers.popitem()
@@ -158,45 +159,22 @@ def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
         viewer.free()
 
 
-_AZIMUTH_DEG: Final = 105.0
-_ELEVATION_DEG: Final = -25.0
-# At MuJoCo's default field of view, 45 degrees, a sphere of radius 1 fills the height at 2.6; the
-# rest is margin.
+# View of still images. At MuJoCo's default field of view, 45 degrees, a sphere of radius 1 fills
+# the height at a distance of 2.6; the rest is margin.
+_VIEW: Final = {"azimuth": 105.0, "elevation": -25.0}
 _DISTANCE_PER_REACH: Final = 3.0
-# Brightness of the headlight for models without lights; its default is dim.
-_HEADLIGHT: Final = 0.5
-# Geoms of the groups 3 to 5 are not drawn unless a viewer asks for them.
-_HIDDEN_GROUP: Final = 3
-_BACKGROUND: Final = 235
 # Largest width and height, pixels; GPUs do not draw much larger images.
 _LARGEST: Final = 8192
-# Tiles of floors, red, green and blue.
-_DARK_TILE: Final = [0.42, 0.45, 0.48]
-_LIGHT_TILE: Final = [0.54, 0.57, 0.6]
-# Light from all sides, and from lamps, in models with lamps; in a shadow only the first is left.
-_AMBIENT: Final = 0.3
-_DIFFUSE: Final = 0.7
-# Width of the squares that floors consist of in frames with shadows, m.
-_SQUARE_M: Final = 0.5
-# Higher than any body of the catalogue reaches, m.
-_LIGHT_HEIGHT_M: Final = 4.0
-# Half the width of shadow maps, in extents of the model.
-_SHADOW_CLIP: Final = 0.3
 
 
-def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
-    """Return the distance from the middle of a body to its farthest point, m.
-
-    Args:
-        model: The model.
-        pose: Its pose, shape (nq,).
-    """
+def body_reach(model: mujoco.MjModel, pose: _Floats) -> float:
+    """Return the distance from the middle of a body in a pose (nq,) to its farthest point, m."""
     middle, places, sizes = _geoms(model, _posed(model, pose))
     return float((np.linalg.norm(places - middle, axis=1) + sizes).max())
 
 
 def draw(
-    model: mujoco.MjModel, pose: NDArray[np.float64], width: int, height: int, reach: float
+    model: mujoco.MjModel, pose: _Floats, width: int, height: int, reach: float
 ) -> NDArray[np.uint8]:
     """Return an image of a body, shape (height, width, 3).
 
@@ -221,12 +199,7 @@ def draw(
     buffer = model.vis.global_
     buffer.offwidth, buffer.offheight = max(buffer.offwidth, width), max(buffer.offheight, height)
     data = _posed(model, pose)
-    camera = {
-        "lookat": _geoms(model, data)[0],
-        "distance": _DISTANCE_PER_REACH * reach,
-        "azimuth": _AZIMUTH_DEG,
-        "elevation": _ELEVATION_DEG,
-    }
+    camera = {**_VIEW, "lookat": _geoms(model, data)[0], "distance": _DISTANCE_PER_REACH * reach}
     renderer = Renderer(model, data, camera, width, height, camera_id=-1, shadows=True)
     try:
         return np.array(renderer.render("rgb_array"), dtype=np.uint8)
@@ -234,16 +207,14 @@ def draw(
         renderer.close()
 
 
-def _posed(model: mujoco.MjModel, pose: NDArray[np.float64]) -> mujoco.MjData:
+def _posed(model: mujoco.MjModel, pose: _Floats) -> mujoco.MjData:
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_forward(model, data)
     return data
 
 
-def _geoms(
-    model: mujoco.MjModel, data: mujoco.MjData
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _geoms(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[_Floats, _Floats, _Floats]:
     """Return the middle of the body's geoms, their places (n, 3), and their radii (n,), m."""
     of_body = model.geom_bodyid > 0
     places, radii = data.geom_xpos[of_body], model.geom_rbound[of_body]
@@ -251,6 +222,22 @@ def _geoms(
         # A URDF may have no shape that touches anything, and then its links are points.
         places, radii = data.xpos[1:], np.zeros(model.nbody - 1)
     return 0.5 * (places.min(axis=0) + places.max(axis=0)), places, radii
+
+
+# Brightness of the headlight for models without lights; its default is dim.
+_HEADLIGHT: Final = [0.5] * 3
+_BACKGROUND: Final = [235 / 255.0] * 3
+# Geoms of the groups 3 to 5 are not drawn unless a viewer asks for them.
+_HIDDEN_GROUP: Final = 3
+_DARK_TILE: Final = [0.42, 0.45, 0.48]
+_LIGHT_TILE: Final = [0.54, 0.57, 0.6]
+# Light from all sides, and from lamps, in models with lamps; in a shadow only the first is left.
+_AMBIENT: Final = [0.3] * 3
+_DIFFUSE: Final = [0.7] * 3
+# Higher than any body of the catalogue reaches, m.
+_LIGHT_HEIGHT_M: Final = 4.0
+# Half the width of shadow maps, in extents of the model.
+_SHADOW_CLIP: Final = 0.3
 
 
 def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
@@ -280,28 +267,22 @@ def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
                 geom.group = _HIDDEN_GROUP
     for material in spec.materials:
         material.reflectance = 0.0
+    headlight = spec.visual.headlight
     if spec.lights:
-        spec.visual.headlight.ambient = [_AMBIENT] * 3
+        headlight.ambient = _AMBIENT
+    else:
+        headlight.ambient = headlight.diffuse = _HEADLIGHT
     for light in spec.lights:
-        light.diffuse = [_DIFFUSE] * 3
+        light.diffuse = _DIFFUSE
         if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
             light.pos = [light.pos[0], light.pos[1], max(light.pos[2], _LIGHT_HEIGHT_M)]
             light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
     spec.visual.map.shadowclip = _SHADOW_CLIP
-    if not spec.lights:
-        spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3
-    if any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
-        return
-    grey = [_BACKGROUND / 255.0] * 3
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=grey,
-        rgb2=grey,
-        width=8,
-        height=8,
-    )
+    skybox = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    if not any(texture.type == skybox for texture in spec.textures):
+        sky = spec.add_texture(name="sky", type=skybox, builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT)
+        sky.width = sky.height = 8
+        sky.rgb1 = sky.rgb2 = _BACKGROUND
 
 
 def halve_textures(spec: mujoco.MjSpec) -> None:

@@ -10,7 +10,7 @@ import imageio.v3 as iio
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, measures_of
+from shapechanger.contract.env_ref import EnvRef, hold_out, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.reports.films import write_film
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
@@ -157,8 +157,7 @@ def _play(
     try:
         if scene.drives and not hasattr(env.unwrapped, "world"):
             return [], 0.0, ""  # A robot.
-        if isinstance(env.unwrapped, HasHeldOutStarts):
-            env.unwrapped.hold_out()
+        hold_out(env)
         fps = float(env.metadata["render_fps"])
         measure = measures_of(env)[0]
         acting = env if scene.body_map is None else MappedEnv(env, scene.body_map)

@@ -24,10 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import (
-    CanBeTaught,
     EnvRef,
     EnvTraits,
-    HasDemonstrator,
     TaskDemonstrator,
     layouts_of,
 )
@@ -187,9 +185,10 @@ def record_demonstrations(
 ) -> Dataset:
     """Record the demonstrator of an env, as `drive` does."""
     with closing(env.make(max_episode_steps=episode_steps)) as made:
-        if not isinstance(made.unwrapped, HasDemonstrator):
+        inner: Any = made.unwrapped
+        if not hasattr(inner, "demonstrator"):
             raise StudyError(f"{env} has no demonstrator to learn from.")
-        driver = made.unwrapped.demonstrator(seed)
+        driver = inner.demonstrator(seed)
         return drive(made, driver, steps, framing, seed, lambda _, disturbed: disturbed)
 
 
@@ -379,8 +378,8 @@ def train_student(
             f"The teacher drives at least one step and the student {_ROUNDS}, got {steps} in total."
         )
     with closing(env.make(max_episode_steps=_EPISODE_STEPS)) as made:
-        inner = made.unwrapped
-        if not isinstance(inner, CanBeTaught):
+        inner: Any = made.unwrapped
+        if not hasattr(inner, "taught_by"):
             raise StudyError(
                 f"{env} has no teachers: choose an env of a vehicle's camera, such as Car."
             )

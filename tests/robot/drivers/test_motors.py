@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.contract.duty import Duty
+from shapechanger.contract.limits import Duty
 from shapechanger.errors import RobotError
 from tests.robot.drivers.fakes import FakeHardware
 

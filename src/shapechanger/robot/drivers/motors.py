@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 
 from msgspec import Meta
 
-from shapechanger.contract.duty import Duty
+from shapechanger.contract.limits import Duty
 from shapechanger.contract.plan import OutputPlan
 from shapechanger.robot.drivers.chip import KeyMistake, Keys, OutputChip, device_errors
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import (
     EnvRef,
-    HasHeldOutStarts,
+    hold_out,
     is_reward_term,
     is_single_instance,
     measures_of,
@@ -88,8 +88,7 @@ def evaluation_envs(
     if not is_single_instance(envs[0]):
         envs += [env.make(**more) for _ in range(episodes - 1)]
     for one in envs:
-        if isinstance(one.unwrapped, HasHeldOutStarts):
-            one.unwrapped.hold_out()
+        hold_out(one)
     return envs
 
 

@@ -17,8 +17,8 @@ from typing import Any, Final, cast
 import numpy as np
 
 from shapechanger.contract.env_ref import EnvRef, layouts_of
-from shapechanger.contract.vector import make_vec
 from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.registry import MAKERS
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.identities import identities_in
@@ -157,7 +157,7 @@ class RslLearner(Sb3Learner):
         settings = self.settings
         settings.require_budget(steps)
         made, rows = self._worlds(env)
-        worlds = make_vec(
+        worlds = MAKERS.load("make_vec")(
             made.id,
             settings.n_envs,
             backend="warp",

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.contract.vector import make_vec
 from shapechanger.errors import MissingExtra
 from shapechanger.layout import Layout
+from shapechanger.registry import MAKERS
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 
 try:
@@ -37,7 +37,7 @@ class ThreadVecEnv(DummyVecEnv):
     def __init__(
         self, env_id: str, num_envs: int, *, threads: int | None = None, **arguments: Any
     ) -> None:
-        self._envs = make_vec(
+        self._envs = MAKERS.load("make_vec")(
             env_id,
             num_envs,
             backend="threads",

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.env_ref import HasTree, layouts_of
+from shapechanger.contract.env_ref import layouts_of
 from shapechanger.errors import LayoutError, StudyError, TransplantError
 from shapechanger.layout import Element, Feature, Layout
 
@@ -140,12 +140,12 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     """Return the rows of an env's body."""
     inner = env.unwrapped
     name = env.spec.id if env.spec else type(inner).__name__
-    if not isinstance(inner, HasTree):
+    tree: Any = getattr(inner, "tree", None)
+    if tree is None:
         raise StudyError(
             f"{name} has no kinematic tree, which a policy for many bodies reads: it needs a "
             "property `tree`, as the MuJoCo bodies have."
         )
-    tree = inner.tree
     observation, action = layouts_of(env)
     if room and len(tree.limbs) > room:
         raise StudyError(

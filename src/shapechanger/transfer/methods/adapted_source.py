@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from contextlib import closing
-from typing import Any, Final, cast
+from typing import Any, Final
 
-from shapechanger.contract.env_ref import EnvTraits, HasBodyFamily, SourceAdaptation
+from shapechanger.contract.env_ref import EnvTraits
 from shapechanger.files import write_json
 from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import Method, MethodRun
@@ -66,9 +66,9 @@ class Randomised(AdaptedSource):
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
         """Return the range of bodies."""
         del seed
-        if isinstance(target, SourceAdaptation):
+        if hasattr(target, "randomised_source"):
             return target.randomised_source()
-        return cast("HasBodyFamily", source).arguments_between(target)
+        return source.arguments_between(target)
 
 
 class Identified(AdaptedSource):
@@ -86,4 +86,4 @@ class Identified(AdaptedSource):
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
         """Move the target, and return the identified parameters."""
         del source
-        return cast("SourceAdaptation", target).identified_source(seed)
+        return target.identified_source(seed)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import msgspec
 
-from shapechanger.contract.env_ref import EnvRef, HasBodyFamily, layouts_of
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners.evaluation import Evaluation
@@ -56,12 +56,10 @@ class Evolution(Method):
 def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
     """Return envs whose bodies lie at equal distances between two others."""
     with closing(source.make()) as first, closing(target.make()) as last:
-        start, end = first.unwrapped, last.unwrapped
-        if not (
-            isinstance(start, HasBodyFamily)
-            and isinstance(end, HasBodyFamily)
-            and start.family_name == end.family_name
-        ):
+        start: Any = first.unwrapped
+        end: Any = last.unwrapped
+        families = {getattr(body, "family_name", "") for body in (start, end)}
+        if len(families) > 1 or "" in families:
             raise StudyError(f"{source} and {target} are not of one family of bodies.")
         shares = (k / (count + 1) for k in range(1, count + 1))
         return [target.having(start.arguments_towards(end, share)) for share in shares]

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.contract.limits import Bump, aimed, forward_actions, slewed
+from shapechanger.contract.limits import Bump, Propulsion, aimed, slewed
 from shapechanger.contract.plan import GuardPlan, output_values
 from shapechanger.contract.world import STANDING_MPS
 from shapechanger.layout import Feature, Layout
@@ -55,7 +55,7 @@ class MeanOutputs:
         self._plan = plan
         self._tick_s = 1.0 / plan.tick_hz
         self._tick_ns = round(1e9 / plan.tick_hz)
-        self._forward = forward_actions(plan.actions)
+        self._forward = Propulsion(plan.actions).forward
         self._now_ns = 0
         self._bump = Bump(plan.limits.bump_hold_ms)
         self.applied = tuple(action.rest for action in plan.actions)

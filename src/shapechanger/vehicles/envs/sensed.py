@@ -12,8 +12,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from shapechanger.contract.duty import Duty
-from shapechanger.contract.limits import MotionReflexes, aimed, clipped, slewed
+from shapechanger.contract.limits import Duty, MotionReflexes, aimed, clipped, slewed
 from shapechanger.contract.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.vehicles.world import MujocoWorld
 
