@@ -24,7 +24,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.measure import FORWARD_SPEED, RETURN
-from shapechanger.envs.actions import check_action
+from shapechanger.envs.checks import check_action
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.odrl import published
 from shapechanger.envs.stepping.tuned import (
@@ -54,8 +54,7 @@ _EXTENDED_START_HEIGHT_M: Final = 1.25
 
 def _foot(leg: int, gear: float | None) -> tuple[AddSegment, JointRange]:
     """A third segment on a leg, with a motor of this gear, N·m, or without."""
-    x, y = LEGS[leg]
-    end = (x * _FOOT_REACH_M, y * _FOOT_REACH_M, 0.0)
+    end = (LEGS[leg][0] * _FOOT_REACH_M, LEGS[leg][1] * _FOOT_REACH_M, 0.0)
     return (
         AddSegment(f"shank_{leg}", f"foot_{leg}", end, *_range(leg, _FOOT_RANGE_DEG), gear),
         JointRange(f"ankle_{leg}", *_range(leg, _ANKLE_RANGE_DEG)),
@@ -70,7 +69,7 @@ def _extended(gear: float | None) -> Body:
 
 def _range(leg: int, degrees: tuple[float, float]) -> tuple[float, float]:
     """Range of a leg's joint, rad, from the range of the legs that turn forwards, degrees."""
-    lower, upper = (math.radians(x) for x in degrees)
+    lower, upper = map(math.radians, degrees)
     return (-upper, -lower) if leg in _TURNS_BACK else (lower, upper)
 
 
@@ -247,11 +246,8 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
     def _follow_body(self) -> None:
         super()._follow_body()
         if self._given_z_range is None:
-            stands = self.standing_height
-            highest = math.inf
-            if stands is not None:
-                start = float(self.model.qpos0[2])
-                highest = max(_HIGHEST_STANDS * stands, _HIGHEST_STARTS * start)
+            stands = math.inf if self.standing_height is None else self.standing_height
+            highest = max(_HIGHEST_STANDS * stands, _HIGHEST_STARTS * float(self.model.qpos0[2]))
             self._healthy_z_range = (-math.inf, highest)
 
     @property
@@ -397,14 +393,9 @@ AntEnv.tuned = AntEnv
 
 
 def is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
-    """Return whether a torso is within its heights with its up axis above the horizon.
+    """Return whether a torso at a height z, m, with x and y of its quaternion, is healthy.
 
-    Args:
-        z: Height of the torso, m.
-        x: Its quaternion's x.
-        y: Its quaternion's y.
-        low: Lowest healthy height, m.
-        high: Highest one, m.
+    Its height is from low to high, m, and its up axis above the horizon.
     """
     return (low <= z) & (z <= high) & (1.0 - 2.0 * (x * x + y * y) > 0.0)
 
@@ -485,10 +476,7 @@ class ExtendedAntEnv(AntEnv):
     """
 
     def __init__(
-        self,
-        body: BodyLike | None = None,
-        actuated_extension: bool = True,
-        **arguments: Any,
+        self, body: BodyLike | None = None, actuated_extension: bool = True, **arguments: Any
     ) -> None:
         if body is None:
             body = "ExtendedAnt" if actuated_extension else "ExtendedAntPassive"

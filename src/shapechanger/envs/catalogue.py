@@ -13,20 +13,18 @@ from shapechanger.errors import UnknownName
 
 NAMESPACE: Final = "shapechanger"
 
+# Envs of robots on the network: two of a finger on a rig, with the layouts of `Finger-v1` and
+# `FingerTrack-v1`; of a robot whose body is unknown until it answers; and of a vehicle with the
+# camera and the action of all vehicles.
 REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
-"""Id of the env of a finger on a rig, with the layouts of `Finger-v1`."""
-
 REMOTE_FINGER_TRACK: Final = "shapechanger/RemoteFingerTrack-v1"
-"""Id of the env of a finger on a rig, with the layouts of `FingerTrack-v1`."""
-
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
-"""Id of the env of a robot on the network, whose body is unknown until the robot answers."""
-
 REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
-"""Id of the env of a vehicle on the network with the camera and the action of all vehicles."""
-
 OWN_ROBOT: Final = "shapechanger/OwnRobot-v1"
 """Id of the env of a robot and a task of the user's own, from a file."""
+
+MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
+"""Suffixes of files of users' robots."""
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = {
     "shapechanger/Car-v1": ("car", "front wheels that steer, in a corridor"),
@@ -69,21 +67,15 @@ class TaskEntry(msgspec.Struct, frozen=True):
     device: str = ""
 
 
+def _finger(entry_point: str, task: str, steps: int) -> TaskEntry:
+    summary = f"finger of seven tendons: {task}"
+    place = f"shapechanger.finger.{entry_point}"
+    return TaskEntry(place, summary, "ppo-finger", steps, "shapechanger.finger.gpu")
+
+
 FINGER_ENVS: Final[Mapping[str, TaskEntry]] = {
-    "shapechanger/Finger-v1": TaskEntry(
-        "shapechanger.finger.reach:FingerReachEnv",
-        "finger of seven tendons: reach a point",
-        "ppo-finger",
-        100,
-        "shapechanger.finger.gpu",
-    ),
-    "shapechanger/FingerTrack-v1": TaskEntry(
-        "shapechanger.finger.track:FingerTrackEnv",
-        "finger of seven tendons: follow a path",
-        "ppo-finger",
-        250,
-        "shapechanger.finger.gpu",
-    ),
+    "shapechanger/Finger-v1": _finger("reach:FingerReachEnv", "reach a point", 100),
+    "shapechanger/FingerTrack-v1": _finger("track:FingerTrackEnv", "follow a path", 250),
 }
 """Envs of the finger by id."""
 
@@ -151,13 +143,8 @@ def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
     body = name
     if name == "ExtendedAnt":  # Its class chooses between two bodies.
         entry_point, body = "ant:ExtendedAntEnv", ""
-    entry_point = f"shapechanger.envs.{entry_point}"
-    return CatalogueEntry(name, family, summary, entry_point, learner, body, threshold)
-
-
-CATALOGUE: Final[dict[str, CatalogueEntry]] = {
-    entry.id: entry for entry in (_entry(*row) for row in _BODIES)
-}
+    place = f"shapechanger.envs.{entry_point}"
+    return CatalogueEntry(name, family, summary, place, learner, body, threshold)
 
 
 def _odrl_entry(name: str) -> CatalogueEntry:
@@ -167,23 +154,17 @@ def _odrl_entry(name: str) -> CatalogueEntry:
     return _entry(name, family, f"body of ODRL: {task}")
 
 
-ODRL_ENVS: Final[Mapping[str, CatalogueEntry]] = {
-    entry.id: entry for entry in map(_odrl_entry, odrl_bodies())
-}
+CATALOGUE: Final = {entry.id: entry for entry in (_entry(*row) for row in _BODIES)}
+
+ODRL_ENVS: Final = {entry.id: entry for entry in map(_odrl_entry, odrl_bodies())}
 """Envs with the bodies of ODRL by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
 
 # Envs whose bodies form no family, except the vehicle on the network.
 _TASK_IDS: Final = (
-    *VEHICLE_ENVS,
-    *RANGES_ENVS,
-    *WAYPOINT_ENVS,
-    *FINGER_ENVS,
-    REMOTE_FINGER,
-    REMOTE_FINGER_TRACK,
-    OWN_ROBOT,
+    *(*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS),
+    *(REMOTE_FINGER, REMOTE_FINGER_TRACK, OWN_ROBOT),
 )
 _EPISODE_STEPS: Final = 1000
-_RANGES_STEPS: Final = 400  # A learner meets more courses.
 # Families with their own fast step, which Gymnasium's wrappers would slow down.
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
@@ -202,30 +183,26 @@ def register_all() -> None:
             disable_env_checker=entry.family in _TUNED,
             kwargs={"body": entry.body} if entry.body else {},
         )
-    _register(
-        OWN_ROBOT,
-        "shapechanger.envs.own:OwnRobotEnv",
-        _EPISODE_STEPS,
-        vector_entry_point="shapechanger.envs.make_vec:OwnRobot",
-    )
-    for envs, kind, limit in (
+    vectors = {"vector_entry_point": "shapechanger.envs.make_vec:OwnRobot"}
+    _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", _EPISODE_STEPS, **vectors)
+    for envs, kind, steps in (
         (VEHICLE_ENVS, "vehicle:VehicleEnv", _EPISODE_STEPS),
-        (RANGES_ENVS, "ranges:RangesEnv", _RANGES_STEPS),
+        (RANGES_ENVS, "ranges:RangesEnv", 400),  # A learner meets more courses.
         (WAYPOINT_ENVS, "vehicle:WaypointEnv", _EPISODE_STEPS),
     ):
         for env_id, (vehicle, _) in envs.items():
             entry_point = f"shapechanger.vehicles.envs.{kind}"
-            _register(env_id, entry_point, limit, kwargs={"vehicle": vehicle})
+            _register(env_id, entry_point, steps, kwargs={"vehicle": vehicle})
     for env_id, task in FINGER_ENVS.items():
         _register(env_id, task.entry_point, task.episode_steps)
     reach, track = FINGER_ENVS.values()
-    for env_id, entry_point, limit in (
+    for env_id, entry_point, steps in (
         (REMOTE_FINGER, "finger.remote:RemoteFingerEnv", reach.episode_steps),
         (REMOTE_FINGER_TRACK, "finger.remote:RemoteFingerTrackEnv", track.episode_steps),
         (REMOTE_VEHICLE, "robot.client.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
-        _register(env_id, f"shapechanger.{entry_point}", limit, nondeterministic=True)  # A robot.
+        _register(env_id, f"shapechanger.{entry_point}", steps, nondeterministic=True)  # A robot.
 
 
 def _register(env_id: str, entry_point: str, episode_steps: int | None, **more: Any) -> None:

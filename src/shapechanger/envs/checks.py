@@ -1,18 +1,140 @@
-"""Check the envs of a vector env, and the arguments of its reset."""
+"""Check the arguments of envs, their actions, and the envs, seeds and options of a vector env."""
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import LARGEST_RESET_SEED, SpaceMismatch, VectorEnvError, check_seed
+from shapechanger.errors import (
+    LARGEST_RESET_SEED,
+    BadAction,
+    EnvArgumentError,
+    SpaceMismatch,
+    UnknownName,
+    VectorEnvError,
+    check_seed,
+)
 
+# Kinds of NumPy dtypes: booleans, integers and floats; a batch refuses booleans, as Gymnasium.
+_NUMBERS: Final = "biuf"
+_BATCH_NUMBERS: Final = "iufc"
 _LONGEST_BODY: Final = 60
+
+
+def check_action(env: Any, action: Any) -> NDArray[Any]:
+    """Return an action as an array.
+
+    Args:
+        env: The env that takes it, with an `action_layout`.
+        action: The action, of any dtype.
+
+    Raises:
+        BadAction: If it has another shape than the env's actions, or a number that is not finite.
+    """
+    name = type(env).__name__ if env.spec is None else env.spec.id
+    try:
+        array = np.asarray(action)
+    except ValueError as error:  # Lists of different lengths in a list.
+        raise BadAction(f"{name} takes arrays of numbers as actions: {error}.") from error
+    expected = (env.action_layout.size,)
+    if array.dtype.kind not in _NUMBERS:
+        raise BadAction(f"{name} takes numbers as actions, got {array.dtype}.")
+    if array.shape != expected:
+        raise BadAction(f"{name} takes actions of shape {expected}, got {array.shape}.")
+    finite = np.isfinite(array)
+    if not finite.all():
+        place = int(np.argmin(finite))
+        raise BadAction(
+            f"{name} takes finite actions, got {array[place]} for "
+            f"{env.action_layout.names[place]}, number {place} of the action."
+        )
+    return array
+
+
+def check_actions(
+    actions: Any, num_envs: int, shape: tuple[int, ...], ignored: NDArray[np.bool_]
+) -> NDArray[Any]:
+    """Return the actions of many envs as one array of the action space's dtype.
+
+    Args:
+        actions: One action per env.
+        num_envs: How many envs there are.
+        shape: Shape of one action.
+        ignored: Whether the action of each env is ignored, because the env is about to be reset.
+
+    Raises:
+        BadAction: If one has another shape or a number that is not finite.
+    """
+    try:
+        given = np.asarray(actions)
+    except ValueError as error:
+        raise BadAction(f"Actions have the shape {shape} each, got several shapes.") from error
+    if given.shape != (num_envs, *shape):
+        raise BadAction(f"Actions have the shape {(num_envs, *shape)}, got {given.shape}.")
+    if given.dtype.kind not in _BATCH_NUMBERS:
+        raise BadAction(f"Actions must be numbers, got {given.dtype}.")
+    if not np.logical_and.reduce(np.isfinite(given), axis=None):
+        rows = np.isfinite(given).reshape(num_envs, -1).all(axis=1)
+        bad = np.flatnonzero(~rows & ~ignored)
+        if bad.size:
+            raise BadAction(
+                f"The action of env {bad[0]} has numbers that are not finite: {given[bad[0]]}."
+            )
+    return given
+
+
+# Arguments of Gymnasium's base class that its envs set themselves.
+_FIXED: Final = ("self", "arguments", "kwargs", "model_path", "observation_space")
+
+
+def check_arguments(
+    env: type[Any], family: str, own: Mapping[str, Any], arguments: Mapping[str, Any]
+) -> None:
+    """Refuse arguments of an env that do not exist or have the wrong type.
+
+    Args:
+        env: Class of the env; its Gymnasium base class defines the arguments.
+        family: Name of the family, for messages.
+        own: Arguments of every env that Gymnasium's constructors lack, with their defaults.
+        arguments: Arguments keyed by name.
+
+    Raises:
+        UnknownName: If there is no such argument.
+        EnvArgumentError: If one has the wrong type.
+    """
+    known: dict[str, Any] = dict(own)
+    for base in reversed(env.__mro__):
+        if base.__module__.startswith("gymnasium.envs.mujoco"):
+            parameters = inspect.signature(cast("Any", base).__init__).parameters.values()
+            known.update({one.name: one.default for one in parameters if one.name not in _FIXED})
+    for name, value in arguments.items():
+        if name not in known:
+            first = [n for n in inspect.signature(env.__init__).parameters if n not in _FIXED]
+            raise UnknownName(f"argument of {family}", name, dict.fromkeys([*first, *known]))
+        # `main_body` is a number or a name; MuJoCo refuses an unknown one.
+        if name != "main_body" and (expected := _mismatch(known[name], value)):
+            raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
+
+
+def _mismatch(default: Any, value: Any) -> str:
+    """Describe the type that a value must have, from the argument's default; empty if it fits."""
+    if isinstance(default, bool):
+        return "" if isinstance(value, (bool, np.bool_)) else "True or False"
+    if isinstance(default, (int, float)):
+        is_number = isinstance(value, Real) and value is not True and value is not False
+        return "" if is_number else "a number"
+    if isinstance(default, tuple):
+        pair: list[Any] = [*value] if isinstance(value, (tuple, list, np.ndarray)) else []
+        fits = len(pair) == 2 and all(isinstance(each, Real) for each in pair)
+        return "" if fits else "two numbers"
+    return ""
 
 
 def require_boxes(env: gym.Env[Any, Any]) -> None:
@@ -35,37 +157,28 @@ def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
     Raises:
         SpaceMismatch: If a space, or the names of its numbers, differ from the first env's.
     """
-    first = envs[0]
     for number, env in enumerate(envs[1:], 1):
         for side in ("observation", "action"):
-            ours, theirs = getattr(first, f"{side}_space"), getattr(env, f"{side}_space")
-            names, others = _names(first, side), _names(env, side)
+            (ours, names), (theirs, others) = (_space(one, side) for one in (envs[0], env))
             if ours == theirs and names == others:
                 continue
+            how = "other bounds than"
             if ours.shape != theirs.shape:
-                how = (
-                    f"{_size(theirs)} numbers, and the one of env 0 ({describe_body(first)}) has "
-                    f"{_size(ours)}"
-                )
+                how = f"{math.prod(theirs.shape)} numbers, not {math.prod(ours.shape)} like"
             elif names != others:
                 apart = next((a, b) for a, b in zip(names, others, strict=True) if a != b)
-                how = f"{apart[1]!r}, not {apart[0]!r} like env 0 ({describe_body(first)})"
-            else:
-                how = f"other bounds than env 0 ({describe_body(first)})"
+                how = f"{apart[1]!r}, not {apart[0]!r} like"
             raise SpaceMismatch(
-                f"The {side} space of env {number} ({describe_body(env)}) has {how}: the envs of a "
-                "vector env share their spaces, so make one vector env for each kind of body."
+                f"The {side} space of env {number} ({describe_body(env)}) has {how} env 0 "
+                f"({describe_body(envs[0])}): the envs of a vector env share their spaces, so make "
+                "one vector env for each kind of body."
             )
 
 
-def _names(env: gym.Env[Any, Any], side: str) -> tuple[str, ...]:
-    """Return the names of the numbers of a space; empty for an env without layouts."""
+def _space(env: gym.Env[Any, Any], side: str) -> tuple[Any, tuple[str, ...]]:
+    """Return a space and the names of its numbers; none for an env without layouts."""
     layout = getattr(env.unwrapped, f"{side}_layout", None)
-    return () if layout is None else tuple(layout.names)
-
-
-def _size(space: gym.spaces.Box) -> int:
-    return math.prod(space.shape)
+    return getattr(env, f"{side}_space"), () if layout is None else tuple(layout.names)
 
 
 def describe_body(env: gym.Env[Any, Any]) -> str:
@@ -75,12 +188,8 @@ def describe_body(env: gym.Env[Any, Any]) -> str:
     body = getattr(inner, "body", None)
     if body is None:
         return name
-    family = getattr(inner, "family", None)
-    known: dict[str, Any] = {} if family is None else family.bodies
-    for called, edits in known.items():
-        if edits == body:
-            return f"{name}, body {called}"
-    text = str(body)
+    known: dict[str, Any] = getattr(getattr(inner, "family", None), "bodies", {})
+    text = next((called for called, edits in known.items() if edits == body), str(body))
     shortened = f"{text[:_LONGEST_BODY]}..." if len(text) > _LONGEST_BODY else text
     return f"{name}, body {shortened}"
 
@@ -127,14 +236,12 @@ def masked_options(
     """
     if options is None or "reset_mask" not in options:
         return None, options
-    mask = options["reset_mask"]
-    if not isinstance(mask, np.ndarray):
-        raise TypeError(f"`reset_mask` must be an array of booleans, not a {type(mask).__name__}.")
-    given = cast("NDArray[Any]", mask)
-    if given.dtype != np.bool_:
-        raise TypeError(f"`reset_mask` must be an array of booleans, not of {given.dtype}.")
-    if given.shape != (num_envs,):
-        raise ValueError(f"`reset_mask` must have the shape ({num_envs},), not {given.shape}.")
-    if not given.any():
-        raise ValueError("`reset_mask` is true for no env, so nothing would be reset.")
+    given: Any = options["reset_mask"]
+    kind = getattr(given, "dtype", type(given).__name__)
+    if kind != np.bool_:
+        raise TypeError(f"`reset_mask` must be an array of booleans, not of {kind}.")
+    if given.shape != (num_envs,) or not given.any():
+        raise ValueError(
+            f"`reset_mask` must have the shape ({num_envs},) and be true for an env, got {given}."
+        )
     return given.copy(), {key: value for key, value in options.items() if key != "reset_mask"}

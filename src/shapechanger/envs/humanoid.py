@@ -17,12 +17,7 @@ with translate_errors(
     import mujoco
     from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv as GymnasiumHumanoidEnv
 
-from shapechanger.envs.layouts import (
-    contact_features,
-    drive_features,
-    inertia_features,
-    twist_features,
-)
+from shapechanger.envs import layouts
 from shapechanger.envs.runners import HealthyRunner
 from shapechanger.layout import Feature
 from shapechanger.morphology.families import BodyLike, Family
@@ -137,18 +132,15 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
         blocks = {
-            "cinert": inertia_features,
-            "cvel": twist_features,
-            "qfrc_actuator": drive_features,
-            "cfrc_ext": contact_features,
+            "cinert": layouts.inertia_features,
+            "cvel": layouts.twist_features,
+            "qfrc_actuator": layouts.drive_features,
+            "cfrc_ext": layouts.contact_features,
         }
-        self._blocks = [
-            features
-            for name, features in blocks.items()
-            if arguments.get(f"include_{name}_in_observation", True)
-        ]
+        seen = {name: arguments.get(f"include_{name}_in_observation", True) for name in blocks}
+        self._blocks = [features for name, features in blocks.items() if seen[name]]
         super()._begin(body, arguments)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
-        blocks = [super()._observation_features(model), *(block(model) for block in self._blocks)]
-        return [feature for block in blocks for feature in block]
+        features = super()._observation_features(model)
+        return features + [feature for block in self._blocks for feature in block(model)]

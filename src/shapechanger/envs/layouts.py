@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import mujoco
@@ -13,7 +13,6 @@ from shapechanger.layout import Element, Feature, Layout
 _J = mujoco.mjtJoint
 _POSITION_UNIT: Final = {_J.mjJNT_SLIDE: "m", _J.mjJNT_HINGE: "rad"}
 _FORCE_UNIT: Final = {_J.mjJNT_SLIDE: "N", _J.mjJNT_HINGE: "N·m"}
-_QUATERNION: Final = ("qw", "qx", "qy", "qz")
 
 
 def position_features(model: mujoco.MjModel) -> list[Feature]:
@@ -24,19 +23,15 @@ def position_features(model: mujoco.MjModel) -> list[Feature]:
     and motors can press a joint a little beyond them.
     """
     features: list[Feature] = []
-    for j in range(model.njnt):
-        name, kind = model.joint(j).name, _J(model.jnt_type[j])
-        low, high = model.jnt_range[j] if model.jnt_limited[j] else (-math.inf, math.inf)
-        if kind in _POSITION_UNIT:
-            quantity = "angle" if kind == _J.mjJNT_HINGE else "position"
-            element = Element("joint", name)
-            unit = _POSITION_UNIT[kind]
-            features.append(Feature(f"{name}/{quantity}", unit, float(low), float(high), element))
+    for kind, element, j in _joints(model):
+        if unit := _POSITION_UNIT.get(kind):
+            name = f"{element.name}/{'angle' if unit == 'rad' else 'position'}"
+            low, high = model.jnt_range[j] if model.jnt_limited[j] else (-math.inf, math.inf)
+            features.append(Feature(name, unit, float(low), float(high), element))
             continue
-        body, element = _body_of(model, j)
         if kind == _J.mjJNT_FREE:
-            features += [Feature(f"{body}/{axis}", "m", element=element) for axis in "xyz"]
-        features += [Feature(f"{body}/{q}", "1", -1.0, 1.0, element) for q in _QUATERNION]
+            features += [Feature(f"{element.name}/{axis}", "m", element=element) for axis in "xyz"]
+        features += [Feature(f"{element.name}/q{q}", "1", -1.0, 1.0, element) for q in "wxyz"]
     return features
 
 
@@ -51,20 +46,16 @@ def velocity_features(model: mujoco.MjModel, limit: float = math.inf) -> list[Fe
         limit: Absolute value at which the numbers are clipped.
     """
     features: list[Feature] = []
-    for j in range(model.njnt):
-        name, kind = model.joint(j).name, _J(model.jnt_type[j])
-        if kind in _POSITION_UNIT:
-            unit = f"{_POSITION_UNIT[kind]}/s"
-            features.append(
-                Feature(f"{name}/velocity", unit, -limit, limit, Element("joint", name))
-            )
-            continue
-        body, element = _body_of(model, j)
-        if kind == _J.mjJNT_FREE:
-            features += [
-                Feature(f"{body}/v{axis}", "m/s", -limit, limit, element) for axis in "xyz"
-            ]
-        features += [Feature(f"{body}/w{axis}", "rad/s", -limit, limit, element) for axis in "xyz"]
+    for kind, element, _ in _joints(model):
+        if unit := _POSITION_UNIT.get(kind):
+            quantities = {"velocity": f"{unit}/s"}
+        else:
+            quantities = {f"v{axis}": "m/s" for axis in "xyz" if kind == _J.mjJNT_FREE}
+            quantities |= {f"w{axis}": "rad/s" for axis in "xyz"}
+        features += [
+            Feature(f"{element.name}/{quantity}", unit, -limit, limit, element)
+            for quantity, unit in quantities.items()
+        ]
     return features
 
 
@@ -105,14 +96,11 @@ def twist_features(model: mujoco.MjModel) -> list[Feature]:
 
 def drive_features(model: mujoco.MjModel) -> list[Feature]:
     """Return a feature `joint/drive` per hinge and slide: the motors' torque or force, N·m or N."""
-    features: list[Feature] = []
-    for j in range(model.njnt):
-        kind = _J(model.jnt_type[j])
-        if kind in _FORCE_UNIT:
-            name = model.joint(j).name
-            element = Element("joint", name)
-            features.append(Feature(f"{name}/drive", _FORCE_UNIT[kind], element=element))
-    return features
+    return [
+        Feature(f"{element.name}/drive", _FORCE_UNIT[kind], element=element)
+        for kind, element, _ in _joints(model)
+        if kind in _FORCE_UNIT
+    ]
 
 
 def action_layout(model: mujoco.MjModel) -> Layout:
@@ -149,23 +137,24 @@ def _servo_unit(model: mujoco.MjModel, actuator: int, kind: mujoco.mjtJoint | No
     """Return the unit of the target of a servo on a hinge or slide; empty for other actuators."""
     # MuJoCo's shortcuts <position> and <velocity>, with a gear of 1.
     plain = (
-        kind in _POSITION_UNIT
-        and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+        model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
         and model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
         and model.actuator_gear[actuator, 0] == 1.0
     )
-    if not plain or kind is None:
-        return ""
     gain, bias = model.actuator_gainprm[actuator, 0], model.actuator_biasprm[actuator]
-    if gain and bias[1] == -gain:
+    if not plain or not gain or kind is None or kind not in _POSITION_UNIT:
+        return ""
+    if bias[1] == -gain:
         return _POSITION_UNIT[kind]
-    return f"{_POSITION_UNIT[kind]}/s" if gain and bias[1] == 0.0 and bias[2] == -gain else ""
+    return f"{_POSITION_UNIT[kind]}/s" if bias[1] == 0.0 and bias[2] == -gain else ""
 
 
-def _body_of(model: mujoco.MjModel, joint: int) -> tuple[str, Element]:
-    """Return the name of a joint's body, and the body as an element."""
-    name = model.body(model.jnt_bodyid[joint]).name
-    return name, Element("body", name)
+def _joints(model: mujoco.MjModel) -> Iterator[tuple[mujoco.mjtJoint, Element, int]]:
+    """Yield kind and number of each joint, and its name: of its body for a free or ball joint."""
+    for j in range(model.njnt):
+        kind, body = _J(model.jnt_type[j]), model.body(model.jnt_bodyid[j]).name
+        is_axis = kind in _POSITION_UNIT
+        yield kind, Element("joint", model.joint(j).name) if is_axis else Element("body", body), j
 
 
 def _of_each_body(
@@ -175,15 +164,7 @@ def _of_each_body(
     low: float = -math.inf,
     high: float = math.inf,
 ) -> list[Feature]:
-    """Return a feature `body/block/quantity` per quantity of each body except the world.
-
-    Args:
-        model: The model.
-        block: Name of the block.
-        quantities: Unit of each quantity, keyed by its name.
-        low: Smallest value of all quantities.
-        high: Largest value of all quantities.
-    """
+    """Return a feature `body/block/quantity` per body except the world and quantity with a unit."""
     names = [model.body(b).name for b in range(1, model.nbody)]
     return [
         Feature(f"{name}/{block}/{quantity}", unit, low, high, Element("body", name))

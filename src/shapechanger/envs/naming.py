@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
+    MODEL_FILES,
     ODRL_ENVS,
     OWN_ROBOT,
     RANGES_ENVS,
@@ -26,26 +28,22 @@ from shapechanger.envs.catalogue import (
 from shapechanger.errors import MorphologyError, StudyError, UnknownName
 from shapechanger.rendering import require_known_gl
 
-# Suffixes of files of users' robots.
-_MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
+_IN_MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^:]+")  # Such as `module:id`.
 
 
 def env_ref(env_id: str, body: str = "") -> EnvRef:
     """Return a reference to an env, optionally with another body."""
     require_known_gl()
     file, at, own_task = env_id.partition("@")
-    if file.endswith(_MODEL_FILES):
+    if file.endswith(MODEL_FILES):
         allow_own_modules(own_task)
         more = {"task": own_task} if at else {}
         return EnvRef(OWN_ROBOT, {"path": file, **more, **({"body": body} if body else {})})
-    task = find_task(env_id)
-    if task and not body:
-        return EnvRef(task)
     try:
-        full = task or find(env_id).id
+        full = find_task(env_id) or find(env_id).id
     except UnknownName:
         # Third-party envs count too, as `module:id` or once registered; `make` checks again.
-        if not _has_module(env_id) and env_id not in gym.registry:
+        if not _IN_MODULE.fullmatch(env_id) and env_id not in gym.registry:
             raise
         allow_own_modules(env_id)
         full = env_id
@@ -57,7 +55,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
 def short_name(env_id: str) -> str:
     """Return the name of an env as a part of a folder's name."""
     file, _, own_task = env_id.partition("@")
-    if file.endswith(_MODEL_FILES):
+    if file.endswith(MODEL_FILES):
         return "-".join(filter(None, (Path(file).stem, own_task.rpartition(":")[2])))
     return env_id.replace("odrl/", "odrl-").rpartition("/")[2].removesuffix("-v1")
 
@@ -76,16 +74,14 @@ def allow_own_modules(*names: str | None) -> None:
 
 def default_learner(env: EnvRef) -> str:
     """Return the learner tuned on the env's family; for other envs, the ant's."""
-    if env.id in VEHICLE_ENVS:
-        return "cloning"
-    if env.id in WAYPOINT_ENVS:
-        return "waypoint"
-    if env.id in RANGES_ENVS:
-        return "ppo-drive"
-    if env.id in (REMOTE_FINGER, REMOTE_FINGER_TRACK):
-        return "ppo-rig"
+    learners = {
+        **dict.fromkeys(VEHICLE_ENVS, "cloning"),
+        **dict.fromkeys(WAYPOINT_ENVS, "waypoint"),
+        **dict.fromkeys(RANGES_ENVS, "ppo-drive"),
+        **dict.fromkeys((REMOTE_FINGER, REMOTE_FINGER_TRACK), "ppo-rig"),
+    }
     entry = CATALOGUE.get(env.id) or ODRL_ENVS.get(env.id) or FINGER_ENVS.get(env.id)
-    return entry.learner if entry else "ppo-run"
+    return entry.learner if entry else learners.get(env.id, "ppo-run")
 
 
 def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
@@ -96,10 +92,3 @@ def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
         return env
     more: dict[str, Any] = {"lenses": list(lenses)} if lenses else {}
     return EnvRef(env.id, {**env.kwargs, "put_back": True, **more})
-
-
-def _has_module(env_id: str) -> bool:
-    """Return whether an id has the form `module:id`."""
-    module, _, name = env_id.partition(":")
-    named = all(part.isidentifier() for part in module.split("."))
-    return named and bool(name) and ":" not in name

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import fnmatch
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
 from os import fspath
 from pathlib import Path
 from typing import Any, Final, cast
@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.errors import BrokenModel, EnvArgumentError, MissingExtra, UnknownName
+from shapechanger.errors import EnvArgumentError, MissingExtra, UnknownName
 
 try:
     import mujoco
@@ -22,10 +22,10 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.contract.measure import RETURN, Measure
-from shapechanger.envs.actions import check_action
 from shapechanger.envs.catalogue import OWN_ROBOT
+from shapechanger.envs.checks import check_action
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
-from shapechanger.envs.own_models import own_family, require_robot
+from shapechanger.envs.own_models import compiling, own_family, require_robot
 from shapechanger.envs.own_tasks import (
     RobotState,
     as_task,
@@ -36,7 +36,7 @@ from shapechanger.envs.own_tasks import (
 )
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
-from shapechanger.morphology import as_body, reason_of, to_json
+from shapechanger.morphology import as_body, to_json
 from shapechanger.morphology.families import BodyLike
 from shapechanger.morphology.pose import (
     StartRules,
@@ -127,7 +127,11 @@ class OwnRobotEnv(Reshapable, EzPickle):
         self.family = self._file = own_family(path, as_body(rig))
         self._begin(body, arguments)
         spec = self.family.load(self._file.path)
-        self._home = _joints_at_home(spec, self._file.path)
+        with compiling(self._file.path):
+            plain = spec.copy().compile()
+        has_home = mujoco.mj_name2id(plain, mujoco.mjtObj.mjOBJ_KEY, _HOME) >= 0
+        # The joints that the keyframe poses; edits may add others.
+        self._home = {plain.joint(j).name for j in range(plain.njnt)} if has_home else set[str]()
         if frame_skip is None:
             frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
         if frame_skip < 1:
@@ -162,9 +166,8 @@ class OwnRobotEnv(Reshapable, EzPickle):
             # Edits carry the keyframe along, so `StartHeight` and the poses of copied limbs are in
             # it; joints that are new to it are left inside their limits.
             home = model.key(_HOME).qpos
-            for joint, place, size in _places_of_joints(model):
-                at = slice(place, place + size)
-                if joint in self._home or np.any(home[at] != model.qpos0[at]):
+            for j, at in enumerate(np.split(np.arange(model.nq), model.jnt_qposadr[1:])):
+                if model.joint(j).name in self._home or np.any(home[at] != model.qpos0[at]):
                     pose[at] = home[at]
             # Lifted to the floor if the robot has grown since.
             pose = StartRules(model).feasible(pose, mujoco.MjData(model), pose)
@@ -172,10 +175,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         height, trunk = standing_height(model, pose), travelling_body(model)
         if height is None and trunk is not None and trunk_lift(model) is None:
             # Such as a base on wheels that slides in a plane: it stays as high as it starts.
-            data = mujoco.MjData(model)
-            data.qpos[:] = pose
-            mujoco.mj_kinematics(model, data)
-            height = float(data.xpos[trunk, 2])
+            height = float(_posed(model, pose).xpos[trunk, 2])
         return pose, None if height is None else height - floor_height(model, pose)
 
     def _follow_body(self) -> None:
@@ -184,26 +184,27 @@ class OwnRobotEnv(Reshapable, EzPickle):
         self._can_travel = travelling is not None
         self._trunk = travelling or int(model.body_rootid[np.argmax(robot_bodies(model))])
         super()._follow_body()
-        data = mujoco.MjData(model)
-        data.qpos[:] = self.init_qpos
-        mujoco.mj_kinematics(model, data)
         self._floor = floor_height(model, self.init_qpos)
-        self._up_axis = data.xmat[self._trunk].reshape(3, 3)[2].copy()
+        at_start = _posed(model, self.init_qpos)
+        self._up_axis = at_start.xmat[self._trunk].reshape(3, 3)[2].copy()
         low, high = self.action_layout.low, self.action_layout.high
         self._middle, self._half_range = 0.5 * (low + high), 0.5 * (high - low)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
-        features = position_features(model) + velocity_features(model)
-        hidden = _place_on_floor(model)
-        names = [feature.name for feature in features]
+        features = position_features(model) + velocity_features(model) + contact_features(model)
+        names, moving = [feature.name for feature in features], model.nq + model.nv
         if self._observed is None:
-            places = [i for i in range(len(features)) if i not in hidden]
+            places = [i for i in range(moving) if i not in _place_on_floor(model)]
         else:
-            features += contact_features(model)
-            names = [feature.name for feature in features]
-            places = _matching(names, self._observed)
+            found = {
+                pattern: {name for name in names if pattern == name or fnmatchcase(name, pattern)}
+                for pattern in self._observed
+            }
+            if missing := [pattern for pattern in found if not found[pattern]]:
+                raise UnknownName("observed number", missing[0], names)
+            places = [i for i, name in enumerate(names) if name in set().union(*found.values())]
         self._places = np.array(places, np.intp)
-        self._contacts_observed = any(place >= model.nq + model.nv for place in places)
+        self._contacts_observed = any(place >= moving for place in places)
         self._place_of = {name: place for place, name in enumerate(names)}
         return [features[place] for place in places]
 
@@ -217,11 +218,10 @@ class OwnRobotEnv(Reshapable, EzPickle):
         # A state that is huge or not finite is no fault of the task, and is not its business.
         terms = {} if diverged else reward_terms(self.task, self.task_name, robot)
         terminated = diverged or has_ended(self.task, self.task_name, robot)
+        (x, y, _), (x_velocity, y_velocity, _) = robot.place.tolist(), robot.velocity.tolist()
         info = {
-            "x_position": float(robot.place[0]),
-            "y_position": float(robot.place[1]),
-            "x_velocity": float(robot.velocity[0]),
-            "y_velocity": float(robot.velocity[1]),
+            **{"x_position": x, "y_position": y},
+            **{"x_velocity": x_velocity, "y_velocity": y_velocity},
             **{f"reward_{name}": value for name, value in terms.items()},
             **({"diverged": True} if diverged else {}),
         }
@@ -243,14 +243,13 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return self._all_numbers(self._contacts_observed)[self._places]
 
     def _get_reset_info(self) -> dict[str, Any]:
-        place = self.trunk_place()
-        return {"x_position": float(place[0]), "y_position": float(place[1])}
+        x, y, _ = self.trunk_place().tolist()
+        return {"x_position": x, "y_position": y}
 
     def _all_numbers(self, contacts: bool) -> _Floats:
         """Return all numbers that can be observed, in the order of the names."""
-        blocks = [self.data.qpos, self.data.qvel]
-        if contacts:
-            blocks.append(self.data.cfrc_ext[1:].ravel())
+        data = self.data
+        blocks = [data.qpos, data.qvel, *([data.cfrc_ext[1:].ravel()] if contacts else [])]
         return np.concatenate(blocks)
 
     def _number(self, name: str) -> float:
@@ -272,18 +271,10 @@ class OwnRobotEnv(Reshapable, EzPickle):
         """
         place = self.trunk_place()
         return RobotState(
-            self.model,
-            self.data,
-            self.dt,
-            place,
-            (place - before) / self.dt,
+            *(self.model, self.data, self.dt, place, (place - before) / self.dt),
             float(self._up_axis @ self.data.xmat[self._trunk].reshape(3, 3)[2]),
-            action,
-            (action - self._middle) / self._half_range,
-            self.standing_height,
-            self._can_travel,
-            self._number,
-            self._floor,
+            *(action, (action - self._middle) / self._half_range),
+            *(self.standing_height, self._can_travel, self._number, self._floor),
         )
 
     @property
@@ -297,32 +288,11 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return self._file.key
 
 
-_SIZES: Final = {_J.mjJNT_FREE: 7, _J.mjJNT_BALL: 4, _J.mjJNT_SLIDE: 1, _J.mjJNT_HINGE: 1}
-
-
-def _places_of_joints(model: mujoco.MjModel) -> Iterator[tuple[str, int, int]]:
-    """Yield name, first index in qpos and count of numbers of each joint."""
-    for j in range(model.njnt):
-        yield model.joint(j).name, int(model.jnt_qposadr[j]), _SIZES[_J(model.jnt_type[j])]
-
-
-def _joints_at_home(spec: mujoco.MjSpec, path: Path) -> set[str]:
-    """Return the joints that the keyframe `home` poses, if there is one.
-
-    Args:
-        spec: The unedited robot.
-        path: Its file.
-
-    Raises:
-        BrokenModel: If it does not compile.
-    """
-    try:
-        model = spec.copy().compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise BrokenModel(f"MuJoCo does not compile {path.name}: {reason_of(error)}.") from error
-    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, _HOME) < 0:
-        return set()
-    return {joint for joint, _, _ in _places_of_joints(model)}
+def _posed(model: mujoco.MjModel, pose: _Floats) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_kinematics(model, data)
+    return data
 
 
 def _place_on_floor(model: mujoco.MjModel) -> set[int]:
@@ -336,18 +306,6 @@ def _place_on_floor(model: mujoco.MjModel) -> set[int]:
         elif kind == _J.mjJNT_SLIDE and not model.jnt_limited[joint]:
             hidden |= {place} - ({lift.place} if lift else set())
     return hidden
-
-
-def _matching(names: Sequence[str], patterns: Sequence[str]) -> list[int]:
-    """Return the places of the names that match one of the patterns, in their order."""
-    for pattern in patterns:
-        if not any(pattern == name or fnmatch.fnmatchcase(name, pattern) for name in names):
-            raise UnknownName("observed number", pattern, names)
-    return [
-        place
-        for place, name in enumerate(names)
-        if any(pattern == name or fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
-    ]
 
 
 def from_mjcf(

@@ -5,12 +5,15 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import mujoco
 
+from shapechanger.envs.catalogue import MODEL_FILES
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
 from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_json
 from shapechanger.morphology.families import Family
@@ -18,9 +21,20 @@ from shapechanger.morphology.families import Family
 # Names of the package are its modules' names.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
-_COLLADA: Final = ".dae"
 # Paths of ROS and Gazebo.
 _IN_PACKAGE: Final = re.compile(r"(package|model)://+(?P<name>[^/]+)/(?P<rest>.+)")
+
+
+@contextmanager
+def compiling(path: Path) -> Generator[None]:
+    """Report errors of MuJoCo as a `BrokenModel` with the name of a file."""
+    try:
+        yield
+    except (ValueError, mujoco.FatalError) as error:
+        if isinstance(error, ShapechangerError):
+            raise
+        reason = reason_of(error)
+        raise BrokenModel(f"MuJoCo does not compile {path.name}: {reason}.") from error
 
 
 @dataclass(frozen=True)
@@ -59,19 +73,14 @@ class OwnFamily(Family):
         # The base of a URDF would vanish in the world, and its names with it.
         spec.compiler.fusestatic = False
         name_elements(spec)
-        try:
+        with compiling(Path(path)):
             return reshape(spec, self.rig)
-        except (ValueError, mujoco.FatalError) as error:
-            if isinstance(error, ShapechangerError):
-                raise
-            reason = reason_of(error)
-            raise BrokenModel(f"MuJoCo does not compile {Path(path).name}: {reason}.") from error
 
 
 def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
     """Replace the `package://` paths of a URDF, which only ROS resolves, by paths of files."""
     for element in (*spec.meshes, *spec.textures):
-        if element.file.lower().endswith(_COLLADA):
+        if element.file.lower().endswith(".dae"):
             raise BrokenModel(
                 f"{path.name} names the mesh {element.file}, and MuJoCo does not read COLLADA: "
                 "convert it to OBJ or STL."
@@ -80,16 +89,15 @@ def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
         if package is None:
             continue
         name, rest = package["name"], package["rest"]
-        above = path.resolve().parents
-        folders = [each if each.name == name else each / name for each in above]
-        found = [folder / rest for folder in folders if (folder / rest).is_file()]
-        if not found:
+        folders = (each if each.name == name else each / name for each in path.resolve().parents)
+        found = next((folder / rest for folder in folders if (folder / rest).is_file()), None)
+        if found is None:
             raise BrokenModel(
                 f"{path.name} names the file {element.file}, and neither a folder {name!r} that it "
                 f"is in nor one next to these has {rest}: copy the package's folder next to "
                 f"{path.name}, or write a path relative to it."
             )
-        element.file = str(found[0])
+        element.file = str(found)
 
 
 def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
@@ -104,24 +112,17 @@ def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
         UnknownName: If there is no such file, or the package has no robot of this name.
         MorphologyError: If the path is a folder, or the package is missing or fails.
     """
-    file = _model_file(path)
-    name = file.stem
-    return OwnFamily(name, {name: ()}, path=file, rig=rig)
-
-
-def _model_file(path: str | Path) -> Path:
-    """Return the file of a robot, as an absolute path."""
     file = Path(path).expanduser()
-    if file.is_file():
-        return file.resolve()
-    if _DESCRIPTION.fullmatch(str(path)):
-        return _described(str(path))
-    if file.is_dir():
-        raise MorphologyError(f"{path} is a folder: name a file of MJCF or URDF in it.")
-    folder = file.parent
-    models = (each for each in folder.glob("*") if each.suffix in (".xml", ".urdf", ".mjcf"))
-    known = sorted(each.name for each in models)
-    raise UnknownName(f"model in {folder.resolve()}", file.name, known)
+    if not file.is_file():
+        if _DESCRIPTION.fullmatch(str(path)):
+            file = _described(str(path))
+        elif file.is_dir():
+            raise MorphologyError(f"{path} is a folder: name a file of MJCF or URDF in it.")
+        else:
+            models = (each for each in file.parent.glob("*") if each.suffix in MODEL_FILES)
+            known = sorted(each.name for each in models)
+            raise UnknownName(f"model in {file.parent.resolve()}", file.name, known)
+    return OwnFamily(file.stem, {file.stem: ()}, path=file.resolve(), rig=rig)
 
 
 def _described(name: str) -> Path:
@@ -138,18 +139,14 @@ def _described(name: str) -> Path:
         module = importlib.import_module(f"{_PACKAGE}.{name}")
     except Exception as error:  # Git, network and file errors of several packages.
         raise MorphologyError(f"{_PACKAGE} cannot fetch {name}: {reason_of(error)}.") from error
-    for attribute in ("MJCF_PATH", "URDF_PATH"):
-        if hasattr(module, attribute):
-            return Path(getattr(module, attribute)).resolve()
-    raise MorphologyError(f"{name} of {_PACKAGE} has neither MJCF nor URDF.")
+    file = getattr(module, "MJCF_PATH", None) or getattr(module, "URDF_PATH", None)
+    if file is None:
+        raise MorphologyError(f"{name} of {_PACKAGE} has neither MJCF nor URDF.")
+    return Path(file)
 
 
 def require_robot(model: mujoco.MjModel, path: Path) -> None:
-    """Require a model that a policy can act on.
-
-    Args:
-        model: The compiled model.
-        path: Its file.
+    """Require a compiled model of a file that a policy can act on.
 
     Raises:
         MorphologyError: If it has no joints, no actuators, or one whose range is unknown.
@@ -161,10 +158,8 @@ def require_robot(model: mujoco.MjModel, path: Path) -> None:
         raise MorphologyError(
             f"{path.name} has no actuators: add them to the file, or motors with {motors}."
         )
-    unlimited = [
-        model.actuator(i).name for i in range(model.nu) if not model.actuator_ctrllimited[i]
-    ]
-    if unlimited:
+    limited = model.actuator_ctrllimited
+    if unlimited := [model.actuator(i).name for i in range(model.nu) if not limited[i]]:
         raise MorphologyError(
             f"These actuators of {path.name} have no ctrlrange, so their range is unknown: "
             f"{', '.join(unlimited)}."

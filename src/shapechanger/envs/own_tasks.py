@@ -17,9 +17,8 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from types import SimpleNamespace
-from typing import Any, Final, Protocol, cast
+from typing import Any, ClassVar, Final, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,10 +95,11 @@ class OwnTask(Protocol):
         ...
 
 
+@dataclass
 class Walk:
     """Walk or run forwards along x, as Gymnasium's runners.
 
-    Args:
+    Attributes:
         forward: Reward per m/s.
         alive: Reward of each step in which the robot is healthy.
         control: Cost of the sum of squares of the actions, each scaled to -1 to 1.
@@ -109,23 +109,14 @@ class Walk:
         terminate: Whether an episode ends when the robot has fallen.
     """
 
-    measures: tuple[Measure, ...] = (FORWARD_SPEED, RETURN)
+    measures: ClassVar[tuple[Measure, ...]] = (FORWARD_SPEED, RETURN)
 
-    def __init__(
-        self,
-        forward: float = 1.0,
-        alive: float = 1.0,
-        control: float = 0.1,
-        least_height: float = 0.4,
-        least_up: float = 0.0,
-        terminate: bool = True,
-    ) -> None:
-        self._forward = forward
-        self._alive = alive
-        self._control = control
-        self._least_height = least_height
-        self._least_up = least_up
-        self._terminate = terminate
+    forward: float = 1.0
+    alive: float = 1.0
+    control: float = 0.1
+    least_height: float = 0.4
+    least_up: float = 0.0
+    terminate: bool = True
 
     def check(self, robot: RobotState) -> None:
         """Require a robot that can travel, on a floor."""
@@ -142,20 +133,20 @@ class Walk:
 
     def healthy(self, robot: RobotState) -> bool:
         """Return whether the robot has not fallen."""
-        lowest = self._least_height * (robot.standing_height or 0.0)
-        return robot.height >= lowest and robot.up >= self._least_up
+        lowest = self.least_height * (robot.standing_height or 0.0)
+        return robot.height >= lowest and robot.up >= self.least_up
 
     def reward(self, robot: RobotState) -> Mapping[str, float]:
         """Return the terms `forward`, `alive` and `control`."""
         return {
-            "forward": self._forward * float(robot.velocity[0]),
-            "alive": self._alive * self.healthy(robot),
-            "control": -self._control * float(np.square(robot.scaled_action).sum()),
+            "forward": self.forward * float(robot.velocity[0]),
+            "alive": self.alive * self.healthy(robot),
+            "control": -self.control * float(np.square(robot.scaled_action).sum()),
         }
 
     def terminated(self, robot: RobotState) -> bool:
         """Return whether the robot has fallen."""
-        return self._terminate and not self.healthy(robot)
+        return self.terminate and not self.healthy(robot)
 
 
 BUILT_IN: Final[Mapping[str, type[OwnTask]]] = {"walk": Walk}
@@ -177,27 +168,21 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
     """
     found = _found(task) if isinstance(task, str) else task
     name = task if isinstance(task, str) else getattr(task, "__qualname__", type(task).__qualname__)
+    rewards = callable(getattr(found, "reward", None))
+    is_function = callable(found) and not rewards and not isinstance(found, type)
+    # Checked first: a name from a file must not make just any object, such as a process.
+    if not is_function and not rewards:
+        raise TaskError(
+            f"The task {name!r} has no method `reward(robot)` that returns a dict of reward terms."
+        )
     if isinstance(found, type):
-        # Checked first: a name from a file must not make just any object, such as a process.
-        if not callable(getattr(found, "reward", None)):
-            raise _without_reward(name)
         try:
             found = found(**(options or {}))
         except TypeError as error:
             raise TaskError(f"The task {name!r} cannot be made: {error}.") from error
     elif options:
         raise TaskError(f"The task {name!r} is no class, so it takes no options.")
-    if callable(getattr(found, "reward", None)):
-        return cast("OwnTask", found), name
-    if callable(found):
-        return cast("OwnTask", SimpleNamespace(reward=found)), name
-    raise _without_reward(name)
-
-
-def _without_reward(name: str) -> TaskError:
-    return TaskError(
-        f"The task {name!r} has no method `reward(robot)` that returns a dict of reward terms."
-    )
+    return cast("OwnTask", SimpleNamespace(reward=found) if is_function else found), name
 
 
 def reference(task: Any) -> Any:
@@ -247,34 +232,24 @@ def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float
         )
     terms: dict[str, float] = {}
     for term, value in cast("Mapping[str, Any]", given).items():
-        number: Any = value
-        if isinstance(value, np.ndarray):
-            array = cast("NDArray[Any]", value)
-            number = array.item() if array.ndim == 0 else None
-        if not isinstance(number, Real | np.bool_) or not np.isfinite(cast("Any", number)):
+        number = np.asarray(value)
+        if number.ndim or number.dtype.kind not in "biuf" or not np.isfinite(number):
             raise TaskError(
                 f"The reward term {term!r} of the task {name!r} is {value!r}: it must be one "
                 "finite number."
             )
-        terms[term] = float(cast("Any", number))
+        terms[term] = float(number)
     return terms
 
 
 def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
-    """Return whether a task ends the episode.
-
-    Args:
-        task: The task.
-        name: Its name.
-        robot: What it sees.
+    """Return whether a task, with its name, ends the episode of a robot.
 
     Raises:
         TaskError: If its answer is neither true nor false.
     """
-    terminated = getattr(task, "terminated", None)
-    if terminated is None:
-        return False
-    answer: Any = terminated(robot)
+    terminated: Any = getattr(task, "terminated", None)
+    answer: Any = terminated is not None and terminated(robot)
     if not isinstance(answer, bool | np.bool_):
         raise TaskError(
             f"`terminated` of the task {name!r} returns {answer!r}: it must be True or False."

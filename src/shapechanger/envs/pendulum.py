@@ -21,26 +21,20 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.envs.actions import check_action
+from shapechanger.envs.checks import check_action
 from shapechanger.envs.layouts import position_features, velocity_features
 from shapechanger.envs.reshapable import Reshapable
-from shapechanger.envs.stepping.tuned import (
-    NO_WARNINGS,
-    Binding,
-    ModelWatch,
-    StepResult,
-    TunedStep,
-)
+from shapechanger.envs.stepping.tuned import NO_WARNINGS, Binding, StepResult, TunedStep
 from shapechanger.layout import Element, Feature
 from shapechanger.morphology import Stretch, compile_body
 from shapechanger.morphology.families import BodyLike, Family
 
+# The poles of the original release (2017) end at (0.001, 0, h) m with h = 0.3 and 1.2: stretching
+# along z keeps the lean of 1 mm.
 PENDULUM: Final = Family(
-    name="InvertedPendulum",
-    bodies={
+    "InvertedPendulum",
+    {
         "InvertedPendulum": (),
-        # The poles of the original release (2017) end at (0.001, 0, h) m with h = 0.3 and 1.2:
-        # stretching along z keeps the lean of 1 mm.
         "SmallInvertedPendulum": (Stretch("pole", 0.5, axis="z"),),
         "BigInvertedPendulum": (Stretch("pole", 2.0, axis="z"),),
     },
@@ -56,14 +50,6 @@ FALLEN_M: Final = 1.0
 """The tip's height at which Gymnasium ends an episode of the unedited double pendulum, m."""
 CLIPPED_AT: Final = 10.0
 """Where Gymnasium clips the double pendulum's velocities, m/s and rad/s, and its force, N."""
-
-
-class _Pendulum(Binding):
-    """Views of a pendulum's data."""
-
-    def __init__(self, watch: ModelWatch, env: TunedStep) -> None:
-        super().__init__(watch, env)
-        self.observed = [self.qpos, self.qvel]
 
 
 class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -114,7 +100,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
     """
 
     family = PENDULUM
-    binding = _Pendulum
+    binding = Binding
     replaced = ("do_simulation", "_step_mujoco_simulation", "_get_obs")
 
     def __init__(self, body: BodyLike = "InvertedPendulum", **arguments: Any) -> None:
@@ -122,7 +108,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         cast("Any", GymnasiumInvertedPendulumEnv).__init__(self, **arguments)
         self._finish(arguments)
 
-    def _advance(self, bound: _Pendulum, action: Any) -> StepResult:
+    def _advance(self, bound: Binding, action: Any) -> StepResult:
         # Gymnasium's `step`, with each number computed once.
         if type(action) is not np.ndarray or action.shape != bound.shape:
             action = check_action(self, action)
@@ -130,7 +116,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
             check_action(self, action)
         bound.ctrl[:] = action
         bound.move()
-        observation = np.concatenate(bound.observed)
+        observation = np.concatenate((bound.qpos, bound.qvel))
         numbers = observation.tolist()
         # A sum is finite only if every number is; one that is not may have overflowed.
         finite = math.isfinite(sum(numbers)) or bool(np.isfinite(observation).all())
@@ -222,26 +208,21 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         super()._follow_body()
         self._fallen = False
         self._foot_m, self._length_m = _foot_and_length(self.model)
-        plain = self.model
-        if self.body:
-            plain = compile_body(self.family.load(self.fullpath), ())
+        plain = compile_body(self.family.load(self.fullpath), ()) if self.body else self.model
         self._plain_foot_m, self._plain_length_m = _foot_and_length(plain)
 
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
         _foot_and_length(model)
-        positions = position_features(model)
-        hinges = [feature.element for feature in positions[1:]]
-        cart = cast("Element", positions[0].element)
-        return [
-            positions[0],
-            *(
-                Feature(f"{cast('Element', hinge).name}/{function}", "1", -1.0, 1.0, hinge)
-                for function in ("sin", "cos")
-                for hinge in hinges
-            ),
-            *velocity_features(model, CLIPPED_AT),
-            Feature(f"{cart.name}/constraint_force", "N", -CLIPPED_AT, CLIPPED_AT, cart),
+        names = [model.joint(j).name for j in range(model.njnt)]
+        cart, *hinges = (Element("joint", name) for name in names)
+        force = Feature(f"{cart.name}/constraint_force", "N", -CLIPPED_AT, CLIPPED_AT, cart)
+        angles = [
+            Feature(f"{hinge.name}/{function}", "1", -1.0, 1.0, hinge)
+            for function in ("sin", "cos")
+            for hinge in hinges
         ]
+        velocities = velocity_features(model, CLIPPED_AT)
+        return [position_features(model)[0], *angles, *velocities, force]
 
     def step(self, action: Any) -> Any:
         """Take one step, and end the episode at the height that fits the length of the poles."""
@@ -249,15 +230,8 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         return observation, reward, self._fallen, truncated, info
 
     def _get_rew(self, x: float, y: float, terminated: bool) -> tuple[float, dict[str, float]]:
-        """Return Gymnasium's reward for poles of any length.
-
-        Args:
-            x: Place of the tip along the rail, m.
-            y: Height of the tip, m.
-            terminated: Whether the episode would end at that height for poles of the usual length.
-        """
-        part = (y - self._foot_m) * (self._plain_length_m / self._length_m)
-        height = part + self._plain_foot_m
+        """Return Gymnasium's reward for poles of any length with their tip at (x, y), m."""
+        height = (y - self._foot_m) * (self._plain_length_m / self._length_m) + self._plain_foot_m
         self._fallen = bool(height <= FALLEN_M)
         return cast("Any", super())._get_rew(x, height, self._fallen)
 

@@ -24,15 +24,9 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.envs.actions import check_action, check_arguments
+from shapechanger.envs.checks import check_action, check_arguments
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
-from shapechanger.envs.renderer import (
-    Renderer,
-    body_reach,
-    draw,
-    halve_textures,
-    prepare_scene,
-)
+from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures, prepare_scene
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, certify
@@ -49,10 +43,10 @@ from shapechanger.morphology.tree import Tree, tree_of
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
-# Distance of the camera from a body that it follows, in multiples of its reach; 3.5 m for the ant.
-_VIEW_DISTANCE_PER_REACH: Final = 3.0
-# Of a fixed camera: 2.04 m for the inverted pendulum, as Gymnasium's.
-_FIXED_DISTANCE_PER_REACH: Final = 4.1
+# Distance of a camera that follows a body, in multiples of its reach: 3.5 m for the ant; and of a
+# fixed one: 2.04 m for the inverted pendulum, as Gymnasium's.
+_FOLLOWING_PER_REACH: Final = 3.0
+_FIXED_PER_REACH: Final = 4.1
 BAD_STATE: Final = slice(
     int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
 )
@@ -60,11 +54,6 @@ BAD_STATE: Final = slice(
 
 # Arguments of every env that Gymnasium's constructors do not have, with their defaults.
 _OWN_ARGUMENTS: Final[dict[str, Any]] = {"shadows": None, "fast_model": True, "towards": None}
-
-
-def _seed_of(seed: Any) -> int:
-    """Return a seed as an integer; Gymnasium accepts no NumPy integers."""
-    return check_seed(seed, EnvArgumentError, largest=None)
 
 
 class Reshapable(MujocoEnv):
@@ -106,12 +95,9 @@ class Reshapable(MujocoEnv):
     fast_model: bool = True
     # Arguments that may be objects, and whose record for pickling is JSON.
     _as_json: frozenset[str] = frozenset()
-    # Whether planes without a material are drawn.
-    _draws_bare_floors: bool = False
-    # Whether a state has been set since the env was made.
-    _started: bool = False
-    # Whether a start state is being drawn.
-    _starting: bool = False
+    _draws_bare_floors: bool = False  # Planes without a material.
+    _started: bool = False  # A state has been set since the env was made.
+    _starting: bool = False  # A start state is being drawn.
 
     def _begin(self, body: BodyLike, arguments: dict[str, Any]) -> None:
         """Prepare what Gymnasium's constructor needs to compile the model.
@@ -142,20 +128,18 @@ class Reshapable(MujocoEnv):
         elif mode is not None:
             choose_gl()
         self._given_camera: dict[str, Any] | None = arguments.get("default_camera_config")
+        names = ("camera_id", "camera_name", "visual_options")
         self._renderer_arguments = {
             "max_geom": arguments.get("max_geom", 1000),
-            "camera_id": arguments.get("camera_id"),
-            "camera_name": arguments.get("camera_name"),
-            "visual_options": arguments.get("visual_options"),
             "shadows": own["shadows"],
+            **{name: arguments.get(name) for name in names},
         }
 
     def _finish(self, arguments: dict[str, Any]) -> None:
         """Derive what follows from the compiled model, and record what a pickle needs."""
         self._follow_body()
-        if self.observation_space.shape != (self.observation_layout.size,):
-            # Gymnasium's constructor has set the size for its own body.
-            shape = (self.observation_layout.size,)
+        shape = (self.observation_layout.size,)
+        if self.observation_space.shape != shape:  # Gymnasium's constructor has its own body's.
             self.observation_space = gym.spaces.Box(-np.inf, np.inf, shape, np.float64)
         self._renew_renderer()
         # Gymnasium's constructor has recorded its own arguments only.
@@ -179,18 +163,17 @@ class Reshapable(MujocoEnv):
 
     def _record_body(self) -> None:
         """Record the present body for pickling and in the spec, unless a reset drew it."""
-        if self._ends is not None:
-            return
-        if self._spec is not None:
-            self._spec.kwargs["body"] = to_json(self.body)
-        self._ezpickle_kwargs["body"] = to_json(self.body)
+        for record in (self._ezpickle_kwargs, {} if self._spec is None else self._spec.kwargs):
+            if self._ends is None:
+                record["body"] = to_json(self.body)
 
     def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Compile the present body instead of the plain file."""
         model = compile_body(self._load_family(), self.body)
         # As in Gymnasium's own method: the frame buffer must be as large as the frame.
-        model.vis.global_.offwidth = max(model.vis.global_.offwidth, self.width)
-        model.vis.global_.offheight = max(model.vis.global_.offheight, self.height)
+        buffer = model.vis.global_
+        buffer.offwidth = max(buffer.offwidth, self.width)
+        buffer.offheight = max(buffer.offheight, self.height)
         return model, mujoco.MjData(model)
 
     def body_spec(self) -> mujoco.MjSpec:
@@ -235,12 +218,11 @@ class Reshapable(MujocoEnv):
             MorphologyError: If the body cannot be built.
             EnvArgumentError: If the seed is not a whole number from 0.
         """
-        if seed is not None:
-            seed = _seed_of(seed)
         for name in options or {}:
             if name != "body":
                 raise UnknownName("option of reset", name, ("body",))
         if seed is not None:
+            seed = check_seed(seed, EnvArgumentError, largest=None)
             self._body_rng = np.random.default_rng(seed)
         if options:
             self._change_body(self.family.body(options["body"]))
@@ -333,23 +315,17 @@ class Reshapable(MujocoEnv):
 
     def _renew_renderer(self) -> None:
         """Render the present body from here on."""
-        renderer = self.mujoco_renderer
-        renderer.close()
-        trunk = travelling_body(self.model)
-        camera = self._given_camera or cast("dict[str, Any]", renderer.default_cam_config or {})
-        if trunk is not None and self._given_camera is None:
-            camera = {"distance": _VIEW_DISTANCE_PER_REACH * self.reach, "elevation": -20.0}
-        elif self._given_camera is None:
+        self.mujoco_renderer.close()
+        trunk, camera = travelling_body(self.model), self._given_camera
+        if not camera and trunk is not None:
+            camera = {"distance": _FOLLOWING_PER_REACH * self.reach, "elevation": -20.0}
+        elif not camera:
             # Gymnasium's distance fits its own pole: a longer one would be cut.
-            least = _FIXED_DISTANCE_PER_REACH * self.reach
-            middle = self.model.body(1).pos.tolist()
-            camera = {"distance": max(camera.get("distance", 0.0), least), "lookat": middle}
+            default = cast("dict[str, Any]", self.mujoco_renderer.default_cam_config or {})
+            distance = max(default.get("distance", 0.0), _FIXED_PER_REACH * self.reach)
+            camera = {"distance": distance, "lookat": self.model.body(1).pos.tolist()}
         self.mujoco_renderer = Renderer(
-            self.model,
-            self.data,
-            camera,
-            self.width,
-            self.height,
+            *(self.model, self.data, camera, self.width, self.height),
             # A camera with a given `lookat` does not follow the body.
             follow=None if "lookat" in camera else trunk,
             **self._renderer_arguments,
@@ -363,11 +339,8 @@ class Reshapable(MujocoEnv):
         ):
             lost = [name for name in old.names if name not in new]
             gained = [name for name in new.names if name not in old]
-            changes = [
-                f"{word} {', '.join(names[:3])}{' and more' * (len(names) > 3)}"
-                for word, names in (("it loses", lost), ("it gains", gained))
-                if names
-            ]
+            moves = (("it loses", lost), ("it gains", gained))
+            changes = [f"{verb} {', '.join(names[:3])}" for verb, names in moves if names]
             if not changes and old.names != new.names:
                 changes = ["its order changes"]
             bounds = [(one.low.tolist(), one.high.tolist()) for one in (old, new)]
@@ -404,39 +377,19 @@ class Reshapable(MujocoEnv):
         return self.family.name
 
     def arguments_towards(self, target: Reshapable, alpha: float) -> dict[str, Any]:
-        """Return arguments that make a body on the way to the body of another env.
-
-        Args:
-            target: An env of the same family.
-            alpha: The part of the way, 0 to 1.
-
-        Raises:
-            MorphologyError: If `alpha` lies outside [0, 1].
-        """
+        """Return arguments that make a body at `alpha`, 0 to 1, of the way to another env's."""
         return {"body": to_json(interpolate(self.body, target.body, alpha))}
 
     def arguments_between(self, target: Reshapable) -> dict[str, Any]:
-        """Return arguments that draw a body between this one and another env's at each reset.
-
-        Args:
-            target: An env of the same family and spaces.
-        """
+        """Return arguments that draw a body between this one and another env's at each reset."""
         ends = {"body": to_json(self.body), "towards": to_json(target.body)}
         # A fast model that serves one episode takes longer to find than it saves.
         return {**ends, "fast_model": False}
 
     def drawn_bodies(self, count: int, seed: int, split: Split) -> list[str]:
-        """Return bodies of the family as JSON, drawn as `Family.sample` does.
-
-        Args:
-            count: How many.
-            seed: Seed of the draws.
-            split: Part of the family to draw from.
-
-        Raises:
-            EnvArgumentError: If the seed is not a whole number from 0.
-        """
-        return [to_json(body) for body in self.family.sample(count, _seed_of(seed), split)]
+        """Return bodies of the family as JSON, drawn as `Family.sample` does."""
+        seed = check_seed(seed, EnvArgumentError, largest=None)
+        return [to_json(body) for body in self.family.sample(count, seed, split)]
 
     @property
     def tree(self) -> Tree:

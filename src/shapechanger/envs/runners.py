@@ -32,16 +32,11 @@ from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
 from shapechanger.morphology import Cut, compile_body
 from shapechanger.morphology.families import BodyLike, Family, length_axes, strength_axes
-from shapechanger.morphology.pose import Lift, standing_height, start_pose, trunk_lift
+from shapechanger.morphology.pose import standing_height, start_pose, trunk_lift
 
 
 def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
-    """Family of runners in a plane, whose parts are feet cut short.
-
-    Args:
-        name: Its name.
-        legs: Thigh, shank and foot of each leg.
-    """
+    """Family of runners in a plane with thigh, shank and foot of each leg; its parts are stumps."""
     limbs = [limb for leg in legs.values() for limb in leg]
     return Family(
         name,
@@ -57,13 +52,8 @@ HALF_CHEETAH: Final = _runner(
     {"back leg": ("bthigh", "bshin", "bfoot"), "front leg": ("fthigh", "fshin", "ffoot")},
 )
 HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")})
-WALKER2D: Final = _runner(
-    "Walker2d",
-    {
-        "right leg": ("thigh", "leg", "foot"),
-        "left leg": ("thigh_left", "leg_left", "foot_left"),
-    },
-)
+_LEFT: Final = ("thigh_left", "leg_left", "foot_left")
+WALKER2D: Final = _runner("Walker2d", {"right leg": ("thigh", "leg", "foot"), "left leg": _LEFT})
 SWIMMER: Final = Family("Swimmer", {"Swimmer": ()})
 
 # Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
@@ -164,19 +154,15 @@ class HealthyRunner(Runner):
         if not (lift and plain_lift and plain_stands and self.standing_height):
             return self._gymnasiums_z_range
         growth = self.standing_height / plain_stands
-        low, high = self._gymnasiums_z_range
-        return _grown(low, growth, plain_lift, lift), _grown(high, growth, plain_lift, lift)
+        # From positions of the trunk's joint to heights, m, and back.
+        heights = (plain_lift.at_zero_m + plain_lift.up * z for z in self._gymnasiums_z_range)
+        low, high = (lift.number_at(growth * height_m) for height_m in heights)
+        return low, high
 
     @property
     def healthy_z_range(self) -> tuple[float, float]:
         """Heights between which the body is healthy, m, as positions of the trunk's joint."""
         return self._healthy_z_range
-
-
-def _grown(number: float, growth: float, before: Lift, after: Lift) -> float:
-    """Convert a position of one trunk's joint to a body that stands `growth` times as high."""
-    height_m = before.at_zero_m + before.up * number
-    return after.number_at(growth * height_m)
 
 
 class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
@@ -53,25 +54,32 @@ def film_study(
     source_policy: Path | None = None,
     shadows: bool = False,
 ) -> list[FilmStrip]:
-    """Play each arm's median seed for ten seconds, from the same start."""
+    """Play each arm's median seed for ten seconds, from the same start.
+
+    Args:
+        study: The study.
+        folder: Its folder.
+        film: File of a film of all scenes side by side; None for no film.
+        source_policy: File of the source policy; None for the study's own.
+        shadows: Whether frames have shadows.
+    """
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0
     scenes = _scenes(study, folder, source_policy)
     # Bodies of one family have one scale.
     distances: dict[str, float] = {}
-    for scene in scenes:
-        if scene.env.id in CATALOGUE:
-            family = CATALOGUE[scene.env.id].family
-            distances[family] = max(view_distance(scene.env), distances.get(family, 0.0))
+    for env in (scene.env for scene in scenes if scene.env.id in CATALOGUE):
+        family = CATALOGUE[env.id].family
+        distances[family] = max(view_distance(env), distances.get(family, 0.0))
     for scene in scenes:
         frames, fps, measured = _play(scene, distances, shadows)
         if not frames:
             return []
-        places = np.linspace(0, len(frames) - 1, _PICTURES).round().astype(int)
         gap = np.full((_HEIGHT, _GAP, 3), 255, np.uint8)
+        places = np.linspace(0, len(frames) - 1, _PICTURES).round().astype(int).tolist()
         pieces: list[NDArray[np.uint8]] = []
-        for place in places.tolist():
+        for place in places:
             pieces += [gap, frames[place]]
         row = np.concatenate(pieces[1:], axis=1)
         jpeg = cast("Any", iio).imwrite("<bytes>", row, extension=".jpg", quality=80)
@@ -88,11 +96,9 @@ def film_study(
 
 def view_distance(env_ref: EnvRef) -> float:
     """Return the distance from which frames of an env of the catalogue show its body, m."""
-    env: Any = env_ref.make()
-    try:
-        return float(env.unwrapped.mujoco_renderer.default_cam_config["distance"])
-    finally:
-        env.close()
+    with closing(env_ref.make()) as env:
+        inner: Any = env.unwrapped
+        return float(inner.mujoco_renderer.default_cam_config["distance"])
 
 
 def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
@@ -103,15 +109,14 @@ def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
 
     def policy(run: Run) -> Act:
         file = given if given is not None and run.kind == SOURCE else run.policy_file(folder)
-        loaded = learner.load(file)
-        return loaded.act
+        return learner.load(file).act
 
     trained = bool(study.of(SOURCE))
-    has_source = trained or given is not None
-    if has_source:
+    if has_source := trained or given is not None:
         middle = Run(SOURCE, median_index(study, SOURCE) if trained else 0)
-        acting = policy(middle)
-        scenes.append(_Scene("source, in the source", plan.task.source, acting, None, drives))
+        scenes.append(
+            _Scene("source, in the source", plan.task.source, policy(middle), None, drives)
+        )
     for arm in sorted(plan.arms, key=lambda arm: arm == "scratch"):  # The baseline comes last.
         run = Run(arm, median_index(study, arm))
         target = plan.target_of(run)
@@ -136,26 +141,22 @@ def _play(
 ) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, and the default measure over them."""
     size: dict[str, Any] = {}
+    entry = CATALOGUE.get(scene.env.id)
     if not scene.drives:
         finer = {"width": _FINER * _WIDTH, "height": _FINER * _HEIGHT}
-        size = {"render_mode": "rgb_array", **finer}
-        if scene.env.id in CATALOGUE:
-            size["shadows"] = shadows
-    env: Any = scene.env.make(**size)
-    if scene.env.id in CATALOGUE:
-        camera = env.unwrapped.mujoco_renderer.default_cam_config
-        camera["distance"] = distances[CATALOGUE[scene.env.id].family]
+        size = {"render_mode": "rgb_array", **finer, **({"shadows": shadows} if entry else {})}
+    with closing(scene.env.make(**size)) as env:
+        inner: Any = env.unwrapped
+        if entry:
+            inner.mujoco_renderer.default_cam_config["distance"] = distances[entry.family]
 
-    def frame() -> NDArray[Any]:
-        if scene.drives:
-            return env.unwrapped.world.outside(
-                _WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_FOLLOWING_RAD
-            )
-        parts = np.asarray(env.render()).reshape(_HEIGHT, _FINER, _WIDTH, _FINER, 3)
-        return parts.mean(axis=(1, 3)).astype(np.uint8)
+        def frame() -> NDArray[Any]:
+            if scene.drives:
+                return inner.world.outside(_WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_FOLLOWING_RAD)
+            parts = np.asarray(env.render()).reshape(_HEIGHT, _FINER, _WIDTH, _FINER, 3)
+            return parts.mean(axis=(1, 3)).astype(np.uint8)
 
-    try:
-        if scene.drives and not hasattr(env.unwrapped, "world"):
+        if scene.drives and not hasattr(inner, "world"):
             return [], 0.0, ""  # A robot.
         hold_out(env)
         fps = float(env.metadata["render_fps"])
@@ -175,5 +176,3 @@ def _play(
         fell = f", ends after {len(frames) / fps:.1f} s" if over and len(frames) < steps else ""
         unit = "" if measure.unit == "1" else f" {measure.unit}"
         return frames, fps, f"{measure.name} {value:.2f}{unit}{fell}"
-    finally:
-        env.close()

@@ -88,19 +88,14 @@ def load_suite(name: str) -> SuiteFile:
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{path} is not valid TOML: {error}.") from None
     except msgspec.ValidationError as error:
-        raise StudyError(f"{path}{_explain(text, str(error))}") from None
-
-
-def _explain(text: str, reason: str) -> str:
-    """Locate a mistake in a TOML file and suggest the nearest key."""
-    unknown = re.search(r"unknown field `(\w+)`(?: - at `\$\.(\w+))?", reason)
-    if unknown is None:
-        return f"{place_of(text, ValueError(reason))}: {reason}."
-    key, table = unknown.groups()
-    kind = {None: SuiteFile, "sweep": _Sweep}.get(table, _Body)
-    known = [field.name for field in msgspec.structs.fields(kind)]
-    error = UnknownName("key of a suite" if table is None else f"key in {table}", key, known)
-    return f"{place_of(text, error)}: {error}"
+        reason: Exception = error
+        if unknown := re.search(r"unknown field `(\w+)`(?: - at `\$\.(\w+))?", str(error)):
+            key, table = unknown.groups()
+            kind = {None: SuiteFile, "sweep": _Sweep}.get(table, _Body)
+            known = [field.name for field in msgspec.structs.fields(kind)]
+            reason = UnknownName(f"key in {table}" if table else "key of a suite", key, known)
+        sentence = str(reason).rstrip(".")
+        raise StudyError(f"{path}{place_of(text, reason)}: {sentence}.") from None
 
 
 @contextmanager
@@ -123,7 +118,12 @@ def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
             "A suite names its studies in one way: as envs, as pairs, or as sources with targets "
             "or a sweep."
         )
-    targets = [*suite.targets, *(_swept(suite.sweep) if suite.sweep else ())]
+    targets = [*suite.targets]
+    if sweep := suite.sweep:
+        targets += [
+            _Body(sweep.env, f"{sweep.env}-{value:g}", [{**sweep.edit, sweep.field: value}])
+            for value in sweep.values
+        ]
     pairs = [*permutations(suite.envs, 2), *suite.pairs, *product(suite.sources, targets)]
     tasks = [
         (f"{_name(one)}-to-{_name(other)}", TransferTask(_ref(one), _ref(other)))
@@ -135,13 +135,6 @@ def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
     return tasks
 
 
-def _swept(sweep: _Sweep) -> list[_Body]:
-    return [
-        _Body(sweep.env, f"{sweep.env}-{value:g}", [{**sweep.edit, sweep.field: value}])
-        for value in sweep.values
-    ]
-
-
 def _ref(env: _Env) -> EnvRef:
     if isinstance(env, str):
         return driven(env_ref(env))
@@ -150,7 +143,7 @@ def _ref(env: _Env) -> EnvRef:
 
 
 def _name(env: _Env) -> str:
-    """The env's name as a part of a folder's name."""
-    if isinstance(env, _Body):
-        return env.name or "-".join([_name(env.env), *env.lenses])
-    return short_name(env)
+    """Return the env's name as a part of a folder's name."""
+    if isinstance(env, str):
+        return short_name(env)
+    return env.name or "-".join([short_name(env.env), *env.lenses])

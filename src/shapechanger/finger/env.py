@@ -14,7 +14,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.measure import Measure
-from shapechanger.envs.actions import check_action
+from shapechanger.envs.checks import check_action
 from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS

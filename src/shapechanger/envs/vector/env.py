@@ -16,8 +16,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
-from shapechanger.envs.actions import check_actions
 from shapechanger.envs.checks import (
+    check_actions,
     masked_options,
     one_seed_each,
     require_boxes,
