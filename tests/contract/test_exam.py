@@ -176,16 +176,6 @@ def _play(envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
         envs.close()
 
 
-def test_a_vector_changes_its_bodies_at_reset() -> None:
-    """Options of reset reach every env of the vector."""
-    envs = gym.make_vec("shapechanger/Ant-v1", num_envs=2)
-    try:
-        envs.reset(seed=0, options={"body": "BigAnt"})
-        assert [len(body) for body in envs.get_attr("body")] == [1, 1]
-    finally:
-        envs.close()
-
-
 def test_an_id_names_the_module_that_registers_it() -> None:
     """`module:id` works without importing the package."""
     script = (

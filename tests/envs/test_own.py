@@ -13,7 +13,6 @@ import pytest
 import shapechanger
 from shapechanger.contract.env_ref import EnvRef, env_traits
 from shapechanger.contract.measure import FORWARD_SPEED, RETURN
-from shapechanger.envs.own import OwnRobotEnv
 from shapechanger.errors import (
     BrokenModel,
     EmptyShift,
@@ -190,21 +189,6 @@ def test_a_robot_is_made_again_from_its_spec(dog: Path) -> None:
     assert again.spec.kwargs["task"] == REAR
 
 
-def test_arguments_of_gymnasium_may_be_objects(dog: Path) -> None:
-    """The spec records path, task, rig and body as JSON."""
-    dog.write_text(DOG.replace('<geom name="floor" type="plane" size="20 20 1"/>', ""))
-    given = {"path": dog, "task": Rear, "rig": (AddFloor(),), "body": Stretch("back", 1.2)}
-    env = gym.make("shapechanger/OwnRobot-v1", **given)
-    assert env.spec is not None
-    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
-    np.testing.assert_array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
-
-
-def test_render_modes_are_known_before_there_is_an_env() -> None:
-    """`gym.make` warns otherwise."""
-    assert "rgb_array" in OwnRobotEnv.metadata["render_modes"]
-
-
 def test_a_study_makes_it_by_id(dog: Path) -> None:
     """With arguments that JSON can hold, also a body and a rig as lists of objects."""
     edits = [{"edit": "stretch", "body": "front", "factor": 1.5}]
@@ -334,13 +318,6 @@ def test_wrong_arguments_are_refused(
     """In one sentence that names what exists."""
     with pytest.raises(error, match=sentence):
         EnvRef("shapechanger/OwnRobot-v1", {"path": str(dog), **arguments}).make()
-
-
-def test_tasks_that_return_nonsense_are_refused(dog: Path) -> None:
-    env = shapechanger.from_mjcf(dog, Nonsense())
-    env.reset(seed=0)
-    with pytest.raises(TaskError, match="The reward term 'nonsense' of the task 'Nonsense' is nan"):
-        env.step(np.zeros(2))
 
 
 def test_observed_numbers_must_exist(dog: Path) -> None:

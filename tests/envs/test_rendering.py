@@ -400,3 +400,31 @@ def test_floors_do_not_end(ant: Any) -> None:
     far = ant.render().astype(int)
     np.testing.assert_array_equal(data.geom_xpos[floor], before)
     assert np.abs(near - far).mean() < 3.0
+
+
+# Textures.
+
+_PIXELS = ("tex_data", "tex_adr", "tex_width", "tex_height")
+
+
+def _textured(**arguments: Any) -> Any:
+    with gym.make("shapechanger/Ant-v1", **arguments) as env:
+        return env.unwrapped.model
+
+
+def test_only_textures_differ_without_rendering() -> None:
+    """All other arrays equal an env's with rendering."""
+    plain, drawn = _textured(), _textured(render_mode="rgb_array")
+    assert plain.ntexdata < 0.3 * drawn.ntexdata
+    for name in dir(drawn):
+        value = getattr(drawn, name)
+        if isinstance(value, np.ndarray) and name not in _PIXELS and name[0] != "_":
+            np.testing.assert_array_equal(getattr(plain, name), value, err_msg=name)
+
+
+def test_floor_textures_keep_their_size() -> None:
+    """Floor textures keep their resolution; uniform ones shrink."""
+    model = _textured()
+    flat = model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D
+    assert model.tex_width[flat].tolist() == [100]
+    assert model.tex_width[~flat].tolist() == [50, 63]
