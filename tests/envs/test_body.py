@@ -21,6 +21,7 @@ from gymnasium.envs.registration import EnvSpec
 from shapechanger.envs import CATALOGUE
 from shapechanger.envs.ant import ANT, LEGS
 from shapechanger.errors import (
+    BadAction,
     BrokenModel,
     EnvArgumentError,
     MorphologyError,
@@ -359,6 +360,19 @@ def test_an_argument_of_another_type_is_refused(
     env = gym.make(f"shapechanger/{env_id}-v1")
     with env, pytest.raises(UnknownName, match=r"Did you mean 'body'\?"):
         env.reset(options={"boddy": env_id})
+
+
+@pytest.mark.parametrize(
+    ("action", "sentence"),
+    [
+        ([[1.0], [1.0, 2.0]], "Ant-v1 takes arrays of numbers as actions"),
+        (["a"] * 8, "takes numbers as actions, got <U1"),
+        (np.zeros(7), r"takes actions of shape \(8,\), got \(7,\)"),
+    ],
+)
+def test_a_wrong_action_is_refused(ant: Any, action: Any, sentence: str) -> None:
+    with pytest.raises(BadAction, match=sentence):
+        ant.step(action)
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True, "3", [3]])

@@ -20,8 +20,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 from shapechanger.contract.env_ref import is_reward_term, layouts_of
-from shapechanger.errors import LayoutError, ShapechangerError
-from shapechanger.layout import Layout
+from shapechanger.errors import ShapechangerError
 
 MakeEnv = Callable[[], gym.Env[Any, Any]]
 """Makes a new env."""
@@ -73,7 +72,7 @@ def shares_no_memory(make: MakeEnv) -> None:
 def names_every_number(make: MakeEnv) -> None:
     """Layouts have the sizes and bounds of the spaces."""
     with make() as env:
-        observation, action = _layouts(env)
+        observation, action = layouts_of(env)
         for side, layout, space, kinds in (
             # An image is one block of a layout, and so is each part of a Dict.
             ("observation", observation, env.observation_space, (gym.spaces.Box, gym.spaces.Dict)),
@@ -130,7 +129,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
 def starts_where_it_may(make: MakeEnv) -> None:
     """Starts differ between seeds and are within the ranges of the layout."""
     with closing(make()) as env:
-        layout, space = _layouts(env)[0], env.observation_space
+        layout, space = layouts_of(env)[0], env.observation_space
         seen = [np.asarray(gym.spaces.flatten(space, env.reset(seed=i)[0])) for i in range(20)]
     starts = np.stack(seen)
     _require(
@@ -165,18 +164,11 @@ def examine(make: MakeEnv) -> Iterator[str]:
 
     Raises:
         BrokenPromise: If the env fails a check.
+        LayoutError: If it publishes no layouts.
     """
     for promise in PROMISES:
         promise(make)
         yield (promise.__doc__ or "").split("\n")[0]
-
-
-def _layouts(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
-    """Return the layouts of the env."""
-    try:
-        return layouts_of(env)
-    except LayoutError as error:
-        raise BrokenPromise(str(error)) from error
 
 
 def _same(first: _Rollout, second: _Rollout) -> bool:

@@ -340,8 +340,7 @@ def from_mjcf(
     file = Path(path).expanduser()
     # A spec then makes the same env wherever the program has gone.
     where = str(file.resolve()) if file.is_file() else fspath(path)
-    given: dict[str, Any] = {"path": where, "task": reference(task)}
-    given |= {"body": to_json(as_body(body))} if body else {}
-    given |= {"rig": to_json(as_body(rig))} if rig else {}
-    given |= {"task_options": dict(task_options)} if task_options else {}
+    given = {"body": body and to_json(as_body(body)), "rig": rig and to_json(as_body(rig))}
+    given |= {"path": where, "task": reference(task), "task_options": task_options}
+    given = {name: value for name, value in given.items() if value}
     return gym.make(OWN_ROBOT, max_episode_steps=max_episode_steps, **given, **arguments)
