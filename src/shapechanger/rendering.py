@@ -81,14 +81,10 @@ def require_known_gl() -> None:
 
 
 def open_context(width: int, height: int) -> Any:
-    """Open a context for drawing without a window, and make it current.
+    """Open a context for drawing without a window, of some pixels, and make it current.
 
     `mujoco.GLContext` follows `MUJOCO_GL` when MuJoCo was imported; this follows its present
     value. MuJoCo's own errors are late and of many kinds, and GLFW reports none.
-
-    Args:
-        width: Width, pixels.
-        height: Height, pixels.
 
     Raises:
         RenderError: If none opens.

@@ -217,13 +217,9 @@ class MotionReflexes:
     def sense(
         self, quantities: Mapping[str, float], is_silent: bool, done: Sequence[float], now_ns: int
     ) -> None:
-        """Update with a new sensing.
+        """Update with readings keyed by name and the applied value of each action, at a time, ns.
 
-        Args:
-            quantities: Readings keyed by name.
-            is_silent: Whether a distance sensor responded without a distance.
-            done: Applied value of each action.
-            now_ns: Robot's time, ns.
+        `is_silent` states whether a distance sensor responded without a distance.
         """
         limit_m = self._limit_m
         self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m

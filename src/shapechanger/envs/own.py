@@ -263,12 +263,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return self.data.xpos[self._trunk].copy()
 
     def seen(self, action: NDArray[Any], before: _Floats) -> RobotState:
-        """Return a task's view of the robot.
-
-        Args:
-            action: The last action, shape (nu,).
-            before: Where the trunk was before it, shape (3,), m.
-        """
+        """Return a task's view of the robot after an action, with the trunk's place before, m."""
         place = self.trunk_place()
         return RobotState(
             *(self.model, self.data, self.dt, place, (place - before) / self.dt),

@@ -186,11 +186,7 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
 
 
 def reference(task: Any) -> Any:
-    """Return `module:Name` of a class or function, so that JSON can hold it; else the task itself.
-
-    Args:
-        task: As of `as_task`.
-    """
+    """Return `module:Name` of a class or function, which JSON can hold; else the task itself."""
     module, name = getattr(task, "__module__", ""), getattr(task, "__qualname__", "")
     importable = module != "__main__" and name.isidentifier() and not isinstance(task, str)
     return f"{module}:{name}" if importable else task
@@ -214,12 +210,7 @@ def _found(name: str) -> Any:
 
 
 def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float]:
-    """Return the terms of the reward of a step.
-
-    Args:
-        task: The task.
-        name: Its name.
-        robot: What it sees.
+    """Return the terms of the reward of a step of a task, with its name.
 
     Raises:
         TaskError: If they are not a dict of finite numbers.

@@ -353,18 +353,13 @@ class Reshapable(MujocoEnv):
                     "make another env with this body and transfer with a body map."
                 )
 
-    # Interface of transfer studies; see `shapechanger.transfer`.
+    # Interface of transfer studies; see `shapechanger.contract.env_ref`.
 
     @staticmethod
     def certify_shift(
         source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
     ) -> Certificate:
-        """Compare two envs, including their wrappers; both are reset.
-
-        Args:
-            source: The env in which a policy is trained.
-            target: The env that it is transferred to.
-            allow_empty: Whether to accept envs that do not differ.
+        """Compare the envs of a transfer, including their wrappers; both are reset.
 
         Raises:
             EmptyShift: If they do not differ and `allow_empty` is false.
