@@ -193,16 +193,17 @@ class OwnRobotEnv(Reshapable, EzPickle):
     def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
         features = position_features(model) + velocity_features(model) + contact_features(model)
         names, moving = [feature.name for feature in features], model.nq + model.nv
-        if self._observed is None:
-            places = [i for i in range(moving) if i not in _place_on_floor(model)]
-        else:
-            found = {
-                pattern: {name for name in names if pattern == name or fnmatchcase(name, pattern)}
-                for pattern in self._observed
-            }
-            if missing := [pattern for pattern in found if not found[pattern]]:
-                raise UnknownName("observed number", missing[0], names)
-            places = [i for i, name in enumerate(names) if name in set().union(*found.values())]
+        places = sorted({*range(moving)} - _place_on_floor(model))
+        if self._observed is not None:
+            seen: set[int] = set()
+            for pattern in self._observed:
+                of_pattern = {
+                    i for i, n in enumerate(names) if n == pattern or fnmatchcase(n, pattern)
+                }
+                if not of_pattern:
+                    raise UnknownName("observed number", pattern, names)
+                seen |= of_pattern
+            places = sorted(seen)
         self._places = np.array(places, np.intp)
         self._contacts_observed = any(place >= moving for place in places)
         self._place_of = {name: place for place, name in enumerate(names)}
