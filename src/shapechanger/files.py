@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import codecs
+import errno
 import os
 import re
+import stat
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -52,6 +54,29 @@ def read_text(path: Path) -> str:
         is_utf_16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         found = "it is UTF-16" if is_utf_16 else f"byte {error.start} is not UTF-8"
         raise ValueError(f"{found}, so save it as UTF-8") from None
+
+
+def read_file(path: Path, most: int) -> bytes:
+    """Return the content of a regular file, which may come from a stranger.
+
+    Args:
+        path: The file; a pipe or a device, which may never end, is refused unread.
+        most: Largest size to read, bytes.
+
+    Raises:
+        OSError: If it cannot be read, is not a regular file, or is larger.
+    """
+    # Not blocking, because a pipe without a writer would otherwise block before it can be examined.
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    with open(fd, "rb") as file:
+        found = os.fstat(fd)
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, "it is not a regular file")
+        if found.st_size > most:
+            raise OSError(
+                errno.EFBIG, f"it has {found.st_size} bytes, more than the limit of {most}"
+            )
+        return file.read(found.st_size)
 
 
 def make_folder(folder: Path) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.demos.episodes import drop
+from shapechanger.demos.episodes import Drop, edit
 from shapechanger.finger.task import POLICIES
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.demos.exchange.small import all_of, content_of, drive
@@ -137,7 +137,7 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
 
 def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     """Episodes come back unchanged, including dropped steps; a second push replaces the first."""
-    drop(drive(tmp_path / "data", 5), 1, 2, "bad")
+    edit(drive(tmp_path / "data", 5), Drop(1, 2, "bad"))
     second = drive(tmp_path / "data", 3)
     assert run("demos", "push", tmp_path / "data", "ada/drive", "--public")[0] == 0
     repository = hub.repositories["datasets/ada/drive"]

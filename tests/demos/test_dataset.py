@@ -9,7 +9,7 @@ import pytest
 import simplejpeg
 
 from shapechanger.demos.dataset import load_dataset, merged
-from shapechanger.demos.episodes import EpisodeWriter, drop
+from shapechanger.demos.episodes import Drop, EpisodeWriter, edit
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.episodes.making import ACTIONS, STATES, header, step
 
@@ -33,7 +33,7 @@ def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
 
 def test_kept_steps_of_persons_are_loaded_in_order(tmp_path: Path) -> None:
     first, _ = _recorded(tmp_path), _recorded(tmp_path)
-    drop(first, 1, 1, "bad")
+    edit(first, Drop(1, 1, "bad"))
     data = load_dataset(tmp_path)
     assert data.episodes == (4, 5)
     np.testing.assert_allclose(data.actions[:, 0], [0, 0.2, 0.3, 0.4, 0, 0.1, 0.2, 0.3, 0.4])

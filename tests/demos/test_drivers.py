@@ -84,7 +84,7 @@ class Corrected:
         """Return who drives, and the remark."""
         self.world.touches = danger
         decision = self.pilot.decide(np.array(wanted, np.float32))
-        return decision.driver[0], decision.remark
+        return decision.decided.driver[0], decision.remark
 
 
 @pytest.mark.parametrize(
@@ -145,9 +145,9 @@ def test_a_policy_gets_its_part_of_the_observation(
     pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), corrected_by, 0)
     pilot.begin()
     decision = pilot.decide(env.reset(seed=0)[0])
-    assert decision.driver == "policy"
+    assert decision.decided.driver == "policy"
     assert env.action_space.contains(decision.carried_out)
-    np.testing.assert_array_equal(decision.carried_out, decision.meant)
+    assert decision.decided.action == tuple(decision.carried_out.tolist())
 
 
 @pytest.mark.parametrize(

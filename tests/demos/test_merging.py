@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.demos.episodes import drop, episodes_of, read_episode
+from shapechanger.demos.episodes import Drop, edit, episodes_of, read_episode
 from shapechanger.demos.merging import merge
 from shapechanger.errors import BrokenEpisode, DemosError
 from tests.demos.episodes.making import recorded
@@ -33,7 +33,7 @@ def test_duplicates_are_refused(tmp_path: Path) -> None:
     """An episode is recognized after its steps were judged; nothing is copied then."""
     one = recorded(tmp_path / "a")
     merge([one], tmp_path / "all")
-    drop(one, 0, 1, "bad")
+    edit(one, Drop(0, 1, "bad"))
     recorded(tmp_path / "b")
     with pytest.raises(DemosError, match="the same episode"):
         merge([tmp_path / "b", tmp_path / "a"], tmp_path / "all")

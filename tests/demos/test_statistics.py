@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import EpisodeWriter, drop, mark, read_episode
-from shapechanger.demos.episodes.records import durations_s
+from shapechanger.demos.episodes import (
+    Drop,
+    Episode,
+    EpisodeMark,
+    EpisodeWriter,
+    edit,
+    read_episode,
+)
 from shapechanger.demos.report import distributions, recording_html
 from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from tests.demos.episodes.making import header, recorded, step
@@ -33,8 +40,8 @@ def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
                 )
             )
         writer.close("collision")
-    drop(writer.path, 7, 7, "bad")
-    mark(writer.path, 5, "here")
+    edit(writer.path, Drop(7, 7, "bad"))
+    edit(writer.path, EpisodeMark(5, "here"))
     recorded(tmp_path / "none", 0)
     episode = read_episode(writer.path)
     assert (episode.origin, episode.reward, episode.outcome) == ("Car-v1", 7.0, "collision")
@@ -42,9 +49,13 @@ def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
     assert episode.seconds == pytest.approx(7 / 20)
     steering, throttle, distance, between = distributions([episode])
     assert steering.values.tolist() == speeds[:7]
-    assert (throttle.low, throttle.high) == (-1.0, 1.0)
+    assert (throttle.feature.low, throttle.feature.high) == (-1.0, 1.0)
     assert (distance.values.tolist(), distance.missing) == ([2.0, 4.0, 2.0], 4)
-    assert (between.name, between.unit, between.values.mean()) == ("time between steps", "ms", 50.0)
+    assert (between.feature.name, between.feature.unit, between.values.mean()) == (
+        "time between steps",
+        "ms",
+        50.0,
+    )
     page = recording_html("name", [episode])
     for part in ("Car-v1", "7 of 8", "Collisions", "step 5: here", "4 without a value"):
         assert part in page
@@ -52,6 +63,12 @@ def test_the_numbers_of_a_recording(tmp_path: Path) -> None:
     assert "-0.0476 to 0.0476: 4 steps, 57.1 %" in page
     assert "0.905 to 1: 2 steps, 28.6 %" in page
     assert "49.5 to 49.5 ms: 0 steps" in page
+
+
+def episode_with(times_ns: Sequence[int | None], hz: float) -> Episode:
+    """Return an episode whose steps have these times."""
+    steps = [step(n, captured_ns=ns, decided_ns=None, index=n) for n, ns in enumerate(times_ns)]
+    return Episode(Path(), header(control_hz=hz), tuple(steps), (), (), closed=True, outcome="")
 
 
 @settings(max_examples=50, deadline=None)
@@ -70,11 +87,11 @@ def test_durations_are_those_of_the_times(
     for part, pause_s in zip(parts, [*pauses_s, 0.0], strict=True):
         times_s += (times_s[-1] + np.cumsum(part)).tolist()
         times_s += [times_s[-1] + pause_s] if pause_s else []
-    found = durations_s([round(at_s * 1e9) for at_s in times_s], hz)
     driven_s = sum(part.sum() for part in parts) + (len(pauses_s) + 1) / hz
-    assert sum(found) == pytest.approx(driven_s, rel=1e-6)
-    assert durations_s([None] * 8, hz) == [1 / hz] * 8
-    assert durations_s([], hz) == []
+    found = episode_with([round(at_s * 1e9) for at_s in times_s], hz)
+    assert found.seconds == pytest.approx(driven_s, rel=1e-6)
+    assert episode_with([None] * 8, hz).durations_s == (1 / hz,) * 8
+    assert episode_with([], hz).durations_s == ()
 
 
 def test_jitter_is_measured_and_bounded() -> None:
@@ -89,5 +106,5 @@ def test_jitter_is_measured_and_bounded() -> None:
 
 def test_gaps_skip_dropped_steps(tmp_path: Path) -> None:
     path = recorded(tmp_path, 6)
-    drop(path, 2, 3, "bad")
+    edit(path, Drop(2, 3, "bad"))
     assert gaps_s(read_episode(path)) == pytest.approx([0.05, 0.05])

@@ -14,10 +14,9 @@ from rich.table import Table
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, options_of
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.demos.episodes.files import read_file
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import FingerError, OutputError, StudyError, UnknownName, check_seed
-from shapechanger.files import require_file, write_atomic
+from shapechanger.files import read_file, require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.export import finger_mjcf
 from shapechanger.finger.gap import resolve_gap, shipped_rig

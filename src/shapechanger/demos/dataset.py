@@ -19,7 +19,7 @@ from shapechanger.demos.episodes import (
     episodes_of,
     read_episode,
 )
-from shapechanger.demos.episodes.files import is_episode
+from shapechanger.demos.episodes.records import is_episode
 from shapechanger.demos.exchange import import_episodes
 from shapechanger.demos.exchange.format import kept_steps
 from shapechanger.demos.jpeg import decode_picture

@@ -7,11 +7,11 @@ when to intervene; here a rule with fixed thresholds does.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import TaskDemonstrator, layouts_of
 from shapechanger.demos.cloning.clone import Clone
-from shapechanger.demos.episodes import Driver
-from shapechanger.demos.recording import QUALITY, ObservationEncoder, RecordEpisodes, name_of
+from shapechanger.demos.episodes import Step
+from shapechanger.demos.recording import ObservationEncoder, RecordEpisodes, name_of, row
 from shapechanger.errors import DemosError
 from shapechanger.policy import load_policy
 
@@ -49,23 +49,18 @@ _RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}
 _CRAWLS_MPS: Final = 0.05  # Below this speed a vehicle does not collide.
 
 
-@dataclass(frozen=True, slots=True)
-class DriverDecision:
+class DriverDecision(NamedTuple):
     """The decision for one step.
 
     Attributes:
         carried_out: Action to pass to the env, shape (n,).
-        meant: Action to record as decided, shape (n,); differs where a demonstrator errs on
-            purpose.
-        driver: Who decided.
-        wanted: Action of a policy while somebody else drives.
+        decided: Step with the action to record as decided, which differs where a demonstrator errs
+            on purpose; its driver; and the action of a policy while somebody else drives.
         remark: Text of a mark to set; "" for none.
     """
 
     carried_out: NDArray[np.float32]
-    meant: NDArray[np.float32]
-    driver: Driver
-    wanted: NDArray[np.float32] | None = None
+    decided: Step
     remark: str = ""
 
 
@@ -96,8 +91,9 @@ class Pilot:
         self._act, self._expert = act, expert
         self._period_s = 1.0 / float(env.metadata.get("render_fps") or 20.0)
         self._world = getattr(env.unwrapped, "world", None)
-        # Where each value of an action is slowest; None if it has no speed, such as the steering.
-        self._rests = [_RESTS.get(name) for name in layouts_of(env)[1].names]
+        # Where each value of an action is slowest; NaN if it has no speed, such as the steering.
+        rests = [_RESTS.get(name, math.nan) for name in layouts_of(env)[1].names]
+        self._rests = np.array(rests, np.float32)
         self._corrects, self._lasted = False, 0
         self._placed, self._still_s = -1, 0.0
         self.steps = self.corrected = self.takeovers = 0
@@ -110,23 +106,25 @@ class Pilot:
 
     def decide(self, observation: Any) -> DriverDecision:
         """Return the decision for an observation."""
-        act, expert = self._act, self._expert
-        if act is None:
+        expert = self._expert
+        if self._act is None:
             if expert is None:
                 raise DemosError("Nobody drives: give a policy, an expert, or both.")
             meant, done = expert.act()
-            return DriverDecision(done, meant, "expert")
-        wanted = act(observation)
+            return DriverDecision(done, Step(action=row(meant), driver="expert"))
+        wanted = self._act(observation)
+        decided = Step(action=row(wanted), driver="policy")
         if expert is None:
-            return DriverDecision(wanted, wanted, "policy")
+            return DriverDecision(wanted, decided)
         right, _ = expert.act()
         remark = self._change(wanted, right)
         self.steps += 1
-        if self._corrects:
-            self.corrected += 1
-            self.takeovers += bool(remark)
-            return DriverDecision(right, right, "expert", wanted, remark)
-        return DriverDecision(wanted, wanted, "policy", None, remark)
+        if not self._corrects:
+            return DriverDecision(wanted, decided, remark)
+        self.corrected += 1
+        self.takeovers += bool(remark)
+        corrected = Step(action=row(right), driver="expert", wanted=decided.action)
+        return DriverDecision(right, corrected, remark)
 
     def _change(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> str:
         """Change the driver where it is time; return why, or "" without a change."""
@@ -146,9 +144,7 @@ class Pilot:
 
     def _gap(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> float:
         """Return the largest difference of two actions that is not slowness."""
-        slowest = right.copy()
-        for i, rest in enumerate(self._rests):
-            slowest[i] = right[i] if rest is None else rest
+        slowest = np.where(np.isnan(self._rests), right, self._rests)
         agreed = np.clip(wanted, np.minimum(slowest, right), np.maximum(slowest, right))
         return float(np.abs(wanted - agreed).max())
 
@@ -163,7 +159,7 @@ class Pilot:
         self._still_s += self._period_s
         if world.touches:
             return "it touches something"
-        drives_on = speed > _CRAWLS_MPS and action[-1] > (self._rests[-1] or 0.0)
+        drives_on = speed > _CRAWLS_MPS and action[-1] > np.nan_to_num(self._rests[-1])
         if drives_on and ahead_m < speed * _NEAR_S:
             return f"{ahead_m:.1f} m to what is ahead"
         return "it stands still" if self._still_s > _STILL_S else ""
@@ -220,7 +216,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
 
 def _clone(clone: Clone, path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
     """Check that a clone fits the env's frames, state and actions."""
-    encoder = ObservationEncoder(env, QUALITY)
+    encoder = ObservationEncoder(env)
     needs = {"image": clone.net.eyes != "none", "state": clone.card.observation is not None}
     if needs["image"] and not encoder.has_picture:
         raise DemosError(f"{path} drives by images, and {name_of(env)} shows none.")
@@ -253,22 +249,22 @@ def record_steps(
     Raises:
         OutputError: If a step cannot be written.
     """
-    last = env.steps + steps
-    first, episode = env.steps, seed
+    first = env.steps
     try:
-        while env.steps < last:
+        for episode in itertools.count(seed):
             observation, _ = env.reset(seed=episode)
             pilot.begin()
-            episode += 1
             over = False
-            while not over and env.steps < last:
+            while not over:
                 decision = pilot.decide(observation)
-                env.decide(decision.meant, decision.driver, decision.wanted)
+                env.decide(decision.decided)
                 observation, _, terminated, truncated, _ = env.step(decision.carried_out)
                 over = bool(terminated or truncated)
                 if decision.remark and not over:
                     env.mark(decision.remark)
                 on_step(env.steps - first)
+                if env.steps - first == steps:
+                    return
     except KeyboardInterrupt:
         env.end("stopped")
         raise

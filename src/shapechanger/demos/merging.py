@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
-from shapechanger.demos.episodes.files import free_path, is_episode
+from shapechanger.demos.episodes.records import free_path, is_episode
 from shapechanger.errors import DemosError, OutputError
 
 

@@ -118,8 +118,8 @@ def test_repair(data: Path, demos: Cli) -> None:
         file.write(b'{"kind":"step","st')
     (second / "frames" / "000009.jpg").unlink()
     printed = demos.output("repair", data)
-    assert f"{first.name}: kept 30 steps, moved 1 line aside, because it is cut off" in printed
-    assert f"{second.name}: kept 9 steps, moved 1 line aside" in printed
+    assert f"{first.name}: kept 30 steps, moved a line aside, because it is cut off" in printed
+    assert f"{second.name}: kept 9 steps, moved a line aside" in printed
     assert demos.output("repair", data).count("was complete") == 2
 
 

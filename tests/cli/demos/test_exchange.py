@@ -8,7 +8,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.cli.demos.recordings import DemosExport, DemosImport
-from shapechanger.demos.episodes import drop
+from shapechanger.demos.episodes import Drop, edit
 from shapechanger.errors import UnknownName
 from tests.cli.running import Cli
 from tests.demos.exchange.small import drive, keys_folder, tub_folder
@@ -55,7 +55,7 @@ def test_export_prints_a_summary_and_how_to_load(
 ) -> None:
     """Dropped steps are counted, and the Minari path is given."""
     path = drive(tmp_path / "data")
-    drop(path, 1, 2, "bad")
+    edit(path, Drop(1, 2, "bad"))
     DemosExport(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
     output = capsys.readouterr().out
     assert "3 steps of 2 episodes\n" in output
@@ -74,7 +74,7 @@ def test_an_unknown_format(tmp_path: Path) -> None:
 
 def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """How to load a LeRobot dataset is printed, and what takes dropped steps."""
-    drop(drive(tmp_path / "data"), 0, 0, "bad")
+    edit(drive(tmp_path / "data"), Drop(0, 0, "bad"))
     DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out
     assert "4 steps of 1 episode\nleft out 1 dropped step\n" in output

@@ -12,12 +12,13 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.demos.episodes import (
+    Drop,
     EpisodeHeader,
     EpisodeWriter,
+    Keep,
     Step,
-    drop,
+    edit,
     episodes_of,
-    keep,
     read_episode,
     repair,
 )
@@ -80,7 +81,7 @@ def test_fetching_copies_exactly_and_then_only_what_is_new(
     main(fetch)
     assert "40 steps kept of 40, 41 lines came" in capsys.readouterr().out
     assert files(data / first.name) == files(first)
-    drop(first, 0, 9, "bad")
+    edit(first, Drop(0, 9, "bad"))
     second = record(there, 3)
     main(fetch)
     output = capsys.readouterr().out
@@ -136,7 +137,7 @@ def test_edits_of_both_sides_survive(
     for _ in range(8):
         side = rng.choice([episode, local])
         first = rng.randrange(12)
-        rng.choice([drop, keep])(side, first, rng.randrange(first, 12), "bad")
+        edit(side, rng.choice([Drop, Keep])(first, rng.randrange(first, 12), "bad"))
         if side is local:
             mine.append((local / "steps.jsonl").read_bytes().splitlines(True)[-1])
         if rng.random() < 0.5:

@@ -1,12 +1,15 @@
 """A crash at any time costs at most the step being written."""
 
+import json
+import os
+import re
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import read_episode, repair
+from shapechanger.demos.episodes import Drop, EpisodeMark, edit, read_episode, repair
 from shapechanger.errors import BrokenEpisode
 from tests.demos.episodes.making import picture, recorded
 
@@ -21,16 +24,19 @@ def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFact
     file.write_bytes(content[:cut])
     whole = content[:cut].count(b"\n")
 
-    done = repair(path)
+    assert repair(path).startswith(f"kept {whole} steps, ")
 
-    assert done.kept == whole
     episode = read_episode(path)
     assert [s.index for s in episode.steps] == list(range(whole))
     assert all(episode.jpeg(s) == picture(s.index) for s in episode.steps)
     assert (episode.closed, episode.outcome) == (True, "cut off")
+    closed = json.loads((path / "episode.json").read_text())["closed"]
+    assert closed == {"steps": whole, "outcome": "cut off"}
+    lost = {file.name: file.read_bytes() for file in path.glob("lost/*")}
     torn = content[:cut].rpartition(b"\n")[2]
-    assert (path / "lost" / "steps.jsonl").read_bytes() == torn if torn else not done.lost
-    assert done.pictures == 5 - whole
+    assert lost.pop("steps.jsonl", b"") == torn
+    assert lost == {f"{n:06d}.jpg": picture(n) for n in range(whole, 5)}
+    assert repair(path) == f"was complete, with {whole} steps"
 
 
 @settings(max_examples=40)
@@ -45,31 +51,46 @@ def test_one_flipped_bit_costs_one_step(
     file.write_bytes(content)
     with pytest.raises(BrokenEpisode, match="is invalid, because"):
         read_episode(path)
-    assert repair(path).kept >= 3
+    repair(path)
     assert len(read_episode(path).steps) >= 3
 
 
 def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
+    """Marks and edits are lines, and not steps."""
     path = recorded(tmp_path)
+    edit(path, EpisodeMark(1, "a door"))
+    edit(path, Drop(2, 3, "bad"))
     before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
-    assert not repair(path).changed
+    assert repair(path) == "was complete, with 5 steps"
     assert {p: p.read_bytes() for p in path.rglob("*") if p.is_file()} == before
+
+
+@pytest.mark.parametrize("harm", ["missing", "short", "changed", "a pipe"])
+def test_a_damaged_image_is_detected_and_costs_its_step(tmp_path: Path, harm: str) -> None:
+    path = recorded(tmp_path)
+    edit(path, EpisodeMark(4, "a door"))
+    file = path / "frames" / "000002.jpg"
+    jpeg = file.read_bytes()
+    if harm in ("missing", "a pipe"):
+        file.unlink()
+    if harm == "a pipe":
+        os.mkfifo(file)
+    elif harm != "missing":
+        file.write_bytes(jpeg[:-1] + b"!" * (harm == "changed"))
+    with pytest.raises(BrokenEpisode, match=f"shapechanger demos repair {path}"):  # noqa: PT012
+        episode = read_episode(path)
+        episode.jpeg(episode.steps[2])
+    assert re.search("^kept 4 steps, moved a line aside, because its image 000002", repair(path))
+    read = read_episode(path)
+    assert [s.index for s in read.steps] == [0, 1, 3, 4]
+    assert [mark.text for mark in read.marks] == ["a door"]
 
 
 def test_images_without_a_step_are_all_kept(tmp_path: Path) -> None:
     path = recorded(tmp_path, close=False)
     for size in (20, 30):
         (path / "frames" / "000005.jpg").write_bytes(picture(5)[:size])
-        assert repair(path).pictures == 1
+        assert "images of no step: 1" in repair(path)
     lost = path / "lost"
     assert (lost / "000005.jpg").read_bytes() == picture(5)[:20]
     assert (lost / "000005-0001.jpg").read_bytes() == picture(5)[:30]
-
-
-def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
-    path = recorded(tmp_path)
-    (path / "frames" / "000002.jpg").unlink()
-    done = repair(path)
-    assert done.kept == 4
-    assert "000002.jpg is missing" in done.lost[0]
-    assert [s.index for s in read_episode(path).steps] == [0, 1, 3, 4]

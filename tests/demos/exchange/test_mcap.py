@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from shapechanger.demos.episodes import EpisodeWriter, Step, drop
+from shapechanger.demos.episodes import Drop, EpisodeWriter, Step, edit
 from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.errors import UnknownName
 from shapechanger.layout import Feature, Layout
@@ -63,7 +63,7 @@ def exported(tmp_path: Path) -> Path:
             writer.add(step, None if n == 1 else picture(n))
         writer.mark("here")
         writer.close("time")
-    drop(writer.path, 1, 1, "bad")
+    edit(writer.path, Drop(1, 1, "bad"))
     export_recording(tmp_path / "data", tmp_path / "out", "mcap", dropped=True)
     return tmp_path / "out/episode-0001.mcap"
 

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import DRIVERS, EpisodeWriter, Step, drop
+from shapechanger.demos.episodes import DRIVERS, Drop, EpisodeWriter, Step, edit
 from shapechanger.demos.exchange import export_recording, import_recording
 from tests.demos.exchange.small import (
     all_of,
@@ -112,7 +112,7 @@ def test_any_recording_round_trips(
         if data.draw(st.booleans()):
             first = data.draw(st.integers(0, len(steps) - 1))
             last = data.draw(st.integers(first, len(steps) - 1))
-            drop(writer.path, first, last, data.draw(_TEXTS))
+            edit(writer.path, Drop(first, last, data.draw(_TEXTS)))
         export_recording(place / "data", place / "x-v0", name, dropped=True)
         import_recording(place / "x-v0", place / "back")
         (before,), (after,) = all_of(place / "data"), all_of(place / "back")
@@ -163,7 +163,7 @@ def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
         for n, jpeg in enumerate((picture(0), None, None, picture(3)))
     ]
     path = record(tmp_path / "data", header(), steps)
-    drop(path, 0, 0, "bad")
+    edit(path, Drop(0, 0, "bad"))
     done = export_recording(tmp_path / "data", tmp_path / "csv", "csv")
     assert (done.steps, done.left_out) == (3, ("1 dropped step; --dropped includes them",))
     import_recording(tmp_path / "csv", tmp_path / "back")
@@ -188,7 +188,7 @@ def with_a_pause(data: Path) -> Path:
 def test_steps_that_do_not_follow_each_other_are_separate_episodes(
     tmp_path: Path, name: str, folder: str
 ) -> None:
-    drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
+    edit(with_a_pause(tmp_path / "data"), Drop(1, 1, "bad"))
     done = export_recording(tmp_path / "data", tmp_path / folder, name)
     assert (done.episodes, done.steps) == (3, 7)
     assert done.left_out[0].startswith("1 dropped step")
@@ -210,7 +210,7 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
 
 
 def test_a_whole_episode_is_not_split(tmp_path: Path) -> None:
-    drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
+    edit(with_a_pause(tmp_path / "data"), Drop(1, 1, "bad"))
     assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
     done = export_recording(tmp_path / "data", tmp_path / "all-v0", "minari", dropped=True)
     assert (done.episodes, done.steps) == (2, 8)

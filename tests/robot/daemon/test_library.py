@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import (
+    Drop,
     EpisodeHeader,
     EpisodeWriter,
+    Keep,
     Step,
-    drop,
-    keep,
+    edit,
     read_episode,
     read_outline,
 )
@@ -119,7 +120,7 @@ def test_a_summary_agrees_with_the_whole_episode(
     for good, one, other in [(True, 0, 0), *judgements]:
         first, last = sorted((one, other))
         if last < count:
-            (keep if good else drop)(path, first, last, "bad")
+            edit(path, (Keep if good else Drop)(first, last, "bad"))
         episode, summary = read_episode(path), recordings.summary(path.name)
         assert (summary.steps, summary.kept) == (len(episode.steps), len(episode.kept))
         assert summary.seconds == episode.seconds

@@ -85,7 +85,7 @@ class DemosRecord(OneEnv):
                 f"{counted(pilot.takeovers, 'time')}"
             )
         say(
-            f"wrote {env.steps} steps, {env.seconds / 60.0:.1f} minutes, in "
+            f"wrote {env.steps} steps, {env.steps / hz / 60.0:.1f} minutes, in "
             f"{counted(env.episodes, 'episode')} to {self.out}\n"
             f"look at them: shapechanger demos show {shlex.quote(str(self.out))} --out page.html"
         )

@@ -18,19 +18,17 @@ from shapechanger import hub
 from shapechanger.cli.console import counted, plain_console, say
 from shapechanger.cli.hub import Public, RepoName, Revision, features_text, readme
 from shapechanger.demos.episodes import (
+    Drop,
     Episode,
-    drop,
+    EpisodeMark,
+    Keep,
+    edit,
     episode_at,
     episodes_of,
-    keep,
-    mark,
     read_episode,
     repair,
 )
-from shapechanger.demos.episodes import (
-    Repair as Repaired,
-)
-from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS
+from shapechanger.demos.episodes.records import FRAMES, HEADER, STEPS
 from shapechanger.demos.exchange import export_recording, import_recording
 from shapechanger.demos.exchange.files import new_folder
 from shapechanger.demos.merging import merge
@@ -117,9 +115,9 @@ class DemosShow:
             ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())
             say(f"ended by: {ended}")
         for numbers in distributions(episodes):
-            of = "" if numbers.unit == "1" else f" {numbers.unit}"
+            of = "" if numbers.feature.unit == "1" else f" {numbers.feature.unit}"
             extent = f"{numbers.values.min():.3g} to {numbers.values.max():.3g}{of}"
-            say(f"{numbers.name}: {extent}, median {np.median(numbers.values):.3g}")
+            say(f"{numbers.feature.name}: {extent}, median {np.median(numbers.values):.3g}")
         broken = _say_broken(found)
         if self.out is not None:
             name = self.data.resolve().name
@@ -183,9 +181,9 @@ class DemosCut(_Steps):
         episode, first, last = self._range()
         least, most = episode.steps[0].index, episode.steps[-1].index
         if first > least:
-            drop(episode.path, least, first - 1, "cut")
+            edit(episode.path, Drop(least, first - 1, "cut"))
         if last < most:
-            drop(episode.path, last + 1, most, "cut")
+            edit(episode.path, Drop(last + 1, most, "cut"))
         _tell(episode.path)
 
 
@@ -194,7 +192,7 @@ class DemosBad(_Steps):
 
     def run(self) -> None:
         episode, first, last = self._range()
-        drop(episode.path, first, last, "bad")
+        edit(episode.path, Drop(first, last, "bad"))
         _tell(episode.path)
 
 
@@ -203,7 +201,7 @@ class DemosGood(_Steps):
 
     def run(self) -> None:
         episode, first, last = self._range()
-        keep(episode.path, first, last)
+        edit(episode.path, Keep(first, last))
         _tell(episode.path)
 
 
@@ -219,7 +217,7 @@ class DemosMark:
 
     def run(self) -> None:
         episode = episode_at(self.episode)
-        mark(episode.path, self.step, self.text)
+        edit(episode.path, EpisodeMark(self.step, self.text))
         say(f"marked step {self.step} of {episode.path}")
 
 
@@ -265,29 +263,12 @@ class DemosRepair:
         refused: list[DemosError] = []
         for path in episodes_of(self.data):
             try:
-                done = repair(path)
+                say(f"{path.name}: {repair(path)}")
             except DemosError as error:
                 refused.append(error)
-                continue
-            say(f"{path.name}: {_told(done)}")
         if refused:
             more = f" ({len(refused) - 1} more like it.)" if len(refused) > 1 else ""
             raise DemosError(f"{refused[0]}{more}")
-
-
-def _told(done: Repaired) -> str:
-    if not done.changed:
-        return f"was complete, with {done.kept} steps"
-    parts = [f"kept {done.kept} steps"]
-    if done.lost:
-        parts.append(f"moved {counted(len(done.lost), 'line')} aside, because {done.lost[0]}")
-        if len(done.lost) > 1:
-            parts[-1] += f", and so on ({len(done.lost) - 1} more)"
-    if done.pictures:
-        parts.append(f"moved {counted(done.pictures, 'image')} of no step aside")
-    if not done.was_closed:
-        parts.append("closed it")
-    return ", ".join(parts)
 
 
 PARTLY_IMPORTED: Final = 3

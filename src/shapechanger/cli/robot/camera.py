@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import change_profile, own_profile
-from shapechanger.demos.episodes.files import read_file
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture
 from shapechanger.errors import DemosError, OutputError, RobotError
+from shapechanger.files import read_file
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.vehicles.cameras.rectify import (

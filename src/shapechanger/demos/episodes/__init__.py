@@ -19,32 +19,37 @@ from __future__ import annotations
 
 from shapechanger.demos.episodes.reader import (
     Episode,
-    Repair,
-    drop,
+    edit,
     episode_at,
     episodes_of,
-    keep,
-    mark,
     read_episode,
     read_outline,
     repair,
 )
-from shapechanger.demos.episodes.records import DRIVERS, Driver, EpisodeHeader, Step
+from shapechanger.demos.episodes.records import (
+    DRIVERS,
+    Driver,
+    Drop,
+    EpisodeHeader,
+    EpisodeMark,
+    Keep,
+    Step,
+)
 from shapechanger.demos.episodes.writer import EpisodeWriter
 
 __all__ = [
     "DRIVERS",
     "Driver",
+    "Drop",
     "Episode",
     "EpisodeHeader",
+    "EpisodeMark",
     "EpisodeWriter",
-    "Repair",
+    "Keep",
     "Step",
-    "drop",
+    "edit",
     "episode_at",
     "episodes_of",
-    "keep",
-    "mark",
     "read_episode",
     "read_outline",
     "repair",

@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
+import io
 import json
 import math
-import os
 import stat
+from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, cast
 
 import msgspec
 
-from shapechanger.demos.episodes.files import (
+from shapechanger.demos.episodes.records import (
+    DRIVERS,
     FRAMES,
     HEADER,
-    LOST,
     MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
     STEPS,
-    free_path,
-    is_episode,
-    lock,
-    read_file,
-    write_all,
-)
-from shapechanger.demos.episodes.records import (
-    DRIVERS,
     Driver,
     Drop,
     Edit,
@@ -40,14 +34,23 @@ from shapechanger.demos.episodes.records import (
     Keep,
     Step,
     StepPicture,
-    durations_s,
+    append,
     encode_line,
+    free_path,
+    is_episode,
+    lock,
+    longest_period_s,
     parse_line,
-    split_lines,
 )
 from shapechanger.demos.episodes.writer import write_header
-from shapechanger.errors import BrokenEpisode, DemosError, UnknownName, translate_errors
-from shapechanger.files import write_atomic, writing
+from shapechanger.errors import BrokenEpisode, DemosError, UnknownName
+from shapechanger.files import read_file, write_atomic, writing
+
+_LOST: Final = "lost"
+"""Folder of an episode for what `repair` moves aside."""
+
+_CUT_OFF: Final = "cut off"
+"""Outcome of an episode that was not closed before `repair`."""
 
 
 @dataclass(frozen=True)
@@ -74,27 +77,43 @@ class Episode:
     outcome: str
 
     @cached_property
-    def kept(self) -> tuple[Step, ...]:
-        """The steps that were not excluded."""
-        gone: set[int] = set()
+    def excluded(self) -> dict[int, str]:
+        """Why each excluded step is excluded, keyed by its index."""
+        found: dict[int, str] = {}
+        indexes = [step.index for step in self.steps]
         for drop in self.drops:
             # A line may name a range far beyond the steps that exist.
-            reach = (s.index for s in self.steps if drop.first <= s.index <= drop.last)
-            (gone.difference_update if isinstance(drop, Keep) else gone.update)(reach)
-        return tuple(step for step in self.steps if step.index not in gone)
+            reach = indexes[bisect_left(indexes, drop.first) : bisect_right(indexes, drop.last)]
+            for index in reach:
+                if isinstance(drop, Keep):
+                    found.pop(index, None)
+                else:
+                    found[index] = drop.why
+        return found
+
+    @cached_property
+    def kept(self) -> tuple[Step, ...]:
+        """The steps that were not excluded."""
+        return tuple(step for step in self.steps if step.index not in self.excluded)
 
     @cached_property
     def durations_s(self) -> tuple[float, ...]:
-        """How long each step lasted by its time, s; pauses count as one period."""
-        times_ns = [step.clock_ns for step in self.steps]
-        return tuple(durations_s(times_ns, self.header.control_hz))
+        """How long each step lasted, until the time of the next one, s.
+
+        A step lasts one period if it is the last one, if a pause follows, or if a time is unknown.
+        """
+        hz, found = self.header.control_hz, list[float]()
+        for one, two in pairwise(self.steps):
+            now, later = one.clock_ns, two.clock_ns
+            passed_s = -1.0 if now is None or later is None else (later - now) / 1e9
+            found.append(passed_s if 0.0 <= passed_s <= longest_period_s(hz) else 1.0 / hz)
+        return (*found, 1.0 / hz) if self.steps else ()
 
     @property
     def seconds(self) -> float:
         """Duration of the kept steps, s."""
-        kept = {step.index for step in self.kept}
         lasted = zip(self.steps, self.durations_s, strict=True)
-        return math.fsum(seconds for step, seconds in lasted if step.index in kept)
+        return math.fsum(seconds for step, seconds in lasted if step.index not in self.excluded)
 
     @property
     def origin(self) -> str:
@@ -122,13 +141,19 @@ class Episode:
         """
         if step.picture is None:
             return None
-        with translate_errors(
-            OSError, to=lambda _: _broken(self.path, f"the image {step.frame} cannot be read")
-        ):
+        try:
             data = read_file(self.path / FRAMES / step.frame, MAX_PICTURE_BYTES)
+        except OSError as error:
+            raise _broken(self.path, f"the image {step.frame} cannot be read") from error
         if not step.picture.fits(data):
             raise _broken(self.path, f"the image {step.frame} was changed")
         return data
+
+
+def _broken(path: Path, why: str) -> BrokenEpisode:
+    return BrokenEpisode(
+        f"{path} is damaged: {why}. `shapechanger demos repair {path}` keeps all complete steps."
+    )
 
 
 def read_episode(path: Path) -> Episode:
@@ -139,17 +164,18 @@ def read_episode(path: Path) -> Episode:
         BrokenEpisode: If a line or an image is damaged or missing.
     """
     header, outcome = read_header(path)
-    lines = _scan(path, header, thorough=False)
-    for number, line in enumerate(lines, 1):
-        if line.wrong:
-            raise _broken(path, f"line {number} is invalid, because {line.wrong}")
-    return _episode(path, header, outcome, (line.content for line in lines))
+    lines: list[Step | Edit | None] = []
+    for _, line, wrong in _checked_lines(path, header):
+        if wrong:
+            raise _broken(path, f"line {len(lines) + 1} is invalid, because {wrong}")
+        lines.append(line)
+    return _episode(path, header, outcome, lines)
 
 
 class _StepTimes(msgspec.Struct, tag_field="kind", tag="step"):
     """The part of a step that a list of episodes needs; an hour has 72 000 steps."""
 
-    step: int
+    index: int = msgspec.field(name="step")
     captured_ns: int | None = None
     decided_ns: int | None = None
 
@@ -167,35 +193,26 @@ def read_outline(path: Path) -> Episode:
         OSError: If the steps cannot be read.
     """
     header, outcome = read_header(path)
-    steps: dict[int, Step] = {}
-    edits: list[Edit] = []
+    found: list[Step | Edit] = []
     with (path / STEPS).open("rb") as lines:
         for raw in lines:
-            with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
-                line = _OUTLINES.decode(raw)
-                if not isinstance(line, _StepTimes):
-                    edits.append(line)
-                elif raw.endswith(b"\n"):
-                    steps[line.step] = Step(
-                        index=line.step,
-                        driver="program",
-                        action=(),
-                        captured_ns=line.captured_ns,
-                        decided_ns=line.decided_ns,
-                    )
-    return _episode(path, header, outcome, [*steps.values(), *edits])
+            with suppress(msgspec.MsgspecError, UnicodeDecodeError):
+                line = _OUTLINES.decode(raw if raw.endswith(b"\n") else b"")
+                if isinstance(line, _StepTimes):
+                    line = Step(driver="program", action=(), **msgspec.structs.asdict(line))
+                found.append(line)
+    return _episode(path, header, outcome, found)
 
 
 def _episode(
-    path: Path, header: EpisodeHeader, outcome: str | None, lines: Iterable[Step | Edit | None]
+    path: Path, header: EpisodeHeader, outcome: str | None, lines: Sequence[Step | Edit | None]
 ) -> Episode:
-    found = [*lines]
     return Episode(
         path=path,
         header=header,
-        steps=tuple(line for line in found if isinstance(line, Step)),
-        marks=tuple(line for line in found if isinstance(line, EpisodeMark)),
-        drops=tuple(line for line in found if isinstance(line, Drop)),
+        steps=tuple(line for line in lines if isinstance(line, Step)),
+        marks=tuple(line for line in lines if isinstance(line, EpisodeMark)),
+        drops=tuple(line for line in lines if isinstance(line, Drop)),
         closed=outcome is not None,
         outcome=outcome or "",
     )
@@ -208,74 +225,57 @@ def read_header(path: Path) -> tuple[EpisodeHeader, str | None]:
         DemosError: If the header is missing or cannot be read.
     """
     try:
-        plain = json.loads(read_file(path / HEADER, MAX_TEXT_BYTES).decode())
-        if not isinstance(plain, dict):
+        fields: Any = json.loads(read_file(path / HEADER, MAX_TEXT_BYTES).decode())
+        if not isinstance(fields, dict):
             raise DemosError("it is not a JSON object.")
-        fields = cast("dict[str, Any]", plain)
-        header = EpisodeHeader.from_json(fields)
+        header = EpisodeHeader.from_json(cast("dict[str, Any]", fields))
     except FileNotFoundError:
         raise DemosError(f"{path} is not an episode: it has no {HEADER}.") from None
     except (OSError, ValueError, RecursionError) as error:
         reason = str(getattr(error, "strerror", None) or error).rstrip(".")
         raise DemosError(f"{path / HEADER} cannot be read: {reason}.") from error
-    closed = fields.get("closed")
-    if not isinstance(closed, dict):
-        return header, None
-    return header, str(cast("dict[str, Any]", closed).get("outcome", ""))
+    closed: Any = cast("dict[str, Any]", fields).get("closed")
+    is_closed = isinstance(closed, dict)
+    return header, str(cast("Any", closed).get("outcome", "")) if is_closed else None
 
 
-class _ScannedLine(NamedTuple):
-    """A line of `steps.jsonl`, what it holds, and why it is invalid; "" if it is valid."""
-
-    raw: bytes
-    content: Step | Edit | None
-    wrong: str
-
-
-def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[_ScannedLine]:
-    """Check every line of an episode, and the image that it names."""
+def _checked_lines(
+    path: Path, header: EpisodeHeader, *, thorough: bool = False
+) -> Iterator[tuple[bytes, Step | Edit | None, str]]:
+    """Yield each line of an episode, its content, and why it or its image is invalid, or ""."""
     try:
         content = read_file(path / STEPS, MAX_TEXT_BYTES)
     except OSError as error:
         raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
-    sizes = header.action_size, header.state_size
-    lines: list[_ScannedLine] = []
-    wrong_with = functools.cache(functools.partial(_wrong_with, path / FRAMES, thorough=thorough))
+    sizes = header.actions.size, header.states.size
+    fault_of = functools.cache(functools.partial(_image_fault, path / FRAMES, thorough=thorough))
     newest = -1
-    for raw in split_lines(content):
+    for raw in io.BytesIO(content):
         line, wrong = None, ""
         try:
             line = parse_line(raw)
         except ValueError as error:
             wrong = str(error)
         if isinstance(line, Step):
-            wrong = line.refusal(*sizes)
-            if not wrong and line.index <= newest:
-                wrong = f"it comes after step {newest}"
-            wrong = wrong or wrong_with(line.picture)
+            disorder = f"it comes after step {newest}" if line.index <= newest else ""
+            wrong = line.refusal(*sizes) or disorder or fault_of(line.picture)
             newest = max(newest, line.index)
-        lines.append(_ScannedLine(raw, line, wrong))
-    return lines
+        yield raw, line, wrong
 
 
-def _wrong_with(frames: Path, picture: StepPicture | None, *, thorough: bool) -> str:
+def _image_fault(frames: Path, picture: StepPicture | None, *, thorough: bool) -> str:
     """Return what is wrong with the image of a step, as part of a sentence; "" for nothing."""
     if picture is None:
         return ""
-    name = picture.name
+    path = frames / picture.name
     try:
-        found = (frames / name).stat()
-        if not stat.S_ISREG(found.st_mode):
-            return f"its image {name} is not a regular file"
-        if found.st_size != picture.size:
-            return f"its image {name} has {found.st_size} bytes instead of {picture.size}"
-        if thorough and not picture.fits(read_file(frames / name, MAX_PICTURE_BYTES)):
-            return f"its image {name} was changed"
-    except FileNotFoundError:
-        return f"its image {name} is missing"
+        found = path.stat()
+        is_same = stat.S_ISREG(found.st_mode) and found.st_size == picture.size
+        if is_same and thorough:
+            is_same = picture.fits(read_file(path, MAX_PICTURE_BYTES))
     except OSError as error:
-        return f"its image {name} cannot be read ({error.strerror})"
-    return ""
+        return f"its image {picture.name} cannot be read ({error.strerror})"
+    return "" if is_same else f"its image {picture.name} was changed"
 
 
 def episodes_of(data: Path) -> tuple[Path, ...]:
@@ -304,47 +304,18 @@ def episode_at(path: Path) -> Episode:
     if not path.exists() and path.parent.is_dir():
         known = [episode.name for episode in episodes_of(path.parent)]
         raise UnknownName("episode", path.name, known)
-    found = episodes_of(path)
-    if len(found) > 1:
-        raise DemosError(f"{path} has {len(found)} episodes: name one of them, such as {found[0]}.")
-    episode = read_episode(next(iter(found)))
+    first, *others = episodes_of(path)
+    if others:
+        raise DemosError(
+            f"{path} has {1 + len(others)} episodes: name one of them, such as {first}."
+        )
+    episode = read_episode(first)
     if not episode.steps:
         raise DemosError(f"{episode.path} has no steps.")
     return episode
 
 
-def _broken(path: Path, why: str) -> BrokenEpisode:
-    return BrokenEpisode(
-        f"{path} is damaged: {why}. `shapechanger demos repair {path}` keeps all complete steps."
-    )
-
-
-_CUT_OFF: Final = "cut off"
-"""Outcome of an episode that was not closed before `repair`."""
-
-
-class Repair(NamedTuple):
-    """Result of a repair.
-
-    Attributes:
-        kept: Number of valid steps.
-        lost: Why each removed line was invalid, as parts of sentences.
-        pictures: Number of images that belong to no step.
-        was_closed: Whether the episode had been closed before.
-    """
-
-    kept: int
-    lost: tuple[str, ...]
-    pictures: int
-    was_closed: bool
-
-    @property
-    def changed(self) -> bool:
-        """Return whether the repair changed anything."""
-        return bool(self.lost or self.pictures or not self.was_closed)
-
-
-def repair(path: Path) -> Repair:
+def repair(path: Path) -> str:
     """Keep every complete step of an episode, and close the episode.
 
     Invalid lines and unused images are moved to the folder `lost`, not deleted.
@@ -352,72 +323,62 @@ def repair(path: Path) -> Repair:
     Args:
         path: Folder of the episode.
 
+    Returns:
+        The number of steps, and what was done, as the end of a sentence.
+
     Raises:
         DemosError: If the folder is not an episode, or is being recorded now.
         OutputError: If it cannot be written to; the episode is unchanged then.
     """
     header, outcome = read_header(path)
-    fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
-    try:
-        lines = _scan(path, header, thorough=True)
-        good = [line for line in lines if not line.wrong]
-        bad = [line for line in lines if line.wrong]
-        kept = [line.content for line in good if isinstance(line.content, Step)]
+    done: list[str] = []
+    with lock(path / STEPS, f"{path} is being recorded at this moment."), writing(path):
+        lines = list(_checked_lines(path, header, thorough=True))
+        kept = [line for _, line, wrong in lines if isinstance(line, Step) and not wrong]
         used = {step.frame for step in kept}
         strays = sorted(p for p in (path / FRAMES).glob("*") if p.name not in used)
-        with writing(path):
-            if bad or strays:
-                (path / LOST).mkdir(exist_ok=True)
-            if bad:
-                lost = free_path(path / LOST, Path(STEPS).stem, Path(STEPS).suffix)
-                write_atomic(lost, b"".join(line.raw for line in bad))
-                write_atomic(path / STEPS, b"".join(line.raw for line in good))
-            for stray in strays:
-                stray.rename(free_path(path / LOST, stray.stem, stray.suffix))
+        wrongs = [wrong for _, _, wrong in lines if wrong]
+        if wrongs or strays:
+            (path / _LOST).mkdir(exist_ok=True)
+        if wrongs:
+            lost = free_path(path / _LOST, "steps", ".jsonl")
+            write_atomic(lost, b"".join(raw for raw, _, wrong in lines if wrong))
+            write_atomic(path / STEPS, b"".join(raw for raw, _, wrong in lines if not wrong))
+            more = f" and {len(wrongs) - 1} more" if len(wrongs) > 1 else ""
+            done.append(f"moved a line{more} aside, because {wrongs[0]}")
+        for stray in strays:
+            stray.rename(free_path(path / _LOST, stray.stem, stray.suffix))
+        if strays:
+            done.append(f"moved aside the images of no step: {len(strays)}")
         if outcome is None:
             write_header(path, header, {"steps": len(kept), "outcome": _CUT_OFF})
-    finally:
-        os.close(fd)
-    return Repair(len(kept), tuple(line.wrong for line in bad), len(strays), outcome is not None)
+            done.append("closed it")
+    return (
+        ", ".join([f"kept {len(kept)} steps", *done])
+        if done
+        else f"was complete, with {len(kept)} steps"
+    )
 
 
-def drop(path: Path, first: int, last: int, why: str) -> None:
-    """Exclude steps of an episode.
+def edit(path: Path, line: Edit) -> None:
+    """Mark a step of an episode, or exclude or include steps; recorded lines stay as they are.
 
     Args:
         path: Folder of the episode.
-        first: Index of the first step.
-        last: Index of the last step, inclusive.
-        why: Such as "cut" or "bad".
+        line: The mark, or the range of steps.
 
     Raises:
         DemosError: If there are no such steps, or the episode is being recorded.
         BrokenEpisode: If the episode is damaged.
         OutputError: If it cannot be written to.
     """
-    _append(path, Drop(first, last, why), first, last)
-
-
-def keep(path: Path, first: int, last: int, why: str = "") -> None:
-    """Include steps of an episode again; arguments and errors as in `drop`."""
-    _append(path, Keep(first, last, why), first, last)
-
-
-def mark(path: Path, step: int, text: str = "") -> None:
-    """Mark a step of an episode, with free text; errors as in `drop`."""
-    _append(path, EpisodeMark(step, text), step, step)
-
-
-def _append(path: Path, line: Edit, first: int, last: int) -> None:
-    episode = read_episode(path)
-    fd = lock(path / STEPS, f"{path} is being recorded at this moment.")
-    try:
-        if not episode.steps:
+    first, last = (line.step,) * 2 if isinstance(line, EpisodeMark) else (line.first, line.last)
+    steps = read_episode(path).steps
+    with lock(path / STEPS, f"{path} is being recorded at this moment.") as file:
+        if not steps:
             raise DemosError(f"{path} has no steps.")
-        least, most = episode.steps[0].index, episode.steps[-1].index
+        least, most = steps[0].index, steps[-1].index
         if not least <= first <= last <= most:
             raise DemosError(f"{path} has the steps {least} to {most}, and not {first} to {last}.")
         with writing(path / STEPS):
-            write_all(fd, encode_line(line))
-    finally:
-        os.close(fd)
+            append(file, encode_line(line))

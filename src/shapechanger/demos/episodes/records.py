@@ -1,21 +1,94 @@
-"""Records of an episode: the header in `episode.json` and the steps in `steps.jsonl`."""
+"""Records of an episode: its files, the header in `episode.json`, and lines of `steps.jsonl`."""
 
 from __future__ import annotations
 
 import binascii
+import fcntl
+import io
 import json
 import math
+import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal, cast
 
 import msgspec
 from msgspec import Meta
 
-from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
-from shapechanger.errors import DemosError, translate_errors
+from shapechanger.errors import DemosError, OutputError, translate_errors
+from shapechanger.files import writing
 from shapechanger.layout import Layout
+
+HEADER: Final = "episode.json"
+STEPS: Final = "steps.jsonl"
+FRAMES: Final = "frames"
+
+MAX_TEXT_BYTES: Final = 256 << 20
+"""Largest text file to read, bytes. An hour of steps has 30 MB in a car and 200 MB in a finger."""
+
+MAX_PICTURE_BYTES: Final = 16 << 20
+"""Largest image to write or read, bytes."""
+
+_MOST_OF_A_NAME: Final = 9999
+
+
+def is_episode(folder: Path) -> bool:
+    """Return whether `folder` contains an episode."""
+    return (folder / HEADER).is_file() or (folder / STEPS).is_file()
+
+
+def free_path(folder: Path, stem: str, ending: str = "") -> Path:
+    """Return a path in `folder` that does not exist, with the next free number where needed."""
+    path, begun, number = folder / f"{stem}{ending}", stem, 0
+    counted = re.fullmatch(r"(.*)-([0-9]{4})", stem, re.DOTALL)
+    if counted and int(counted[2]) < _MOST_OF_A_NAME:
+        begun, number = counted[1], int(counted[2])
+    while os.path.lexists(path):
+        if (number := number + 1) > _MOST_OF_A_NAME:
+            raise OutputError(f"{folder} has too many files with names like {stem}{ending}.")
+        path = folder / f"{begun}-{number:04d}{ending}"
+    return path
+
+
+def lock(path: Path, busy: str) -> io.FileIO:
+    """Open a file for appending, and lock it until it is closed; create the file if it is missing.
+
+    Args:
+        path: The file.
+        busy: Error message if another process holds the lock.
+
+    Raises:
+        DemosError: If another process holds the lock.
+        OutputError: If the file cannot be opened for writing.
+    """
+    with writing(path):
+        file = io.FileIO(path, "a+")  # Opening a pipe only for writing would block.
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            file.close()
+            if isinstance(error, BlockingIOError):
+                raise DemosError(busy) from None
+            raise
+    return file
+
+
+def append(file: io.FileIO, data: bytes) -> None:
+    """Append to a file completely, or leave the file as it was.
+
+    Raises:
+        OSError: If the data cannot be written.
+    """
+    before, written = os.fstat(file.fileno()).st_size, 0
+    try:
+        while written < len(data):
+            written += file.write(data[written:])
+    except OSError:
+        file.truncate(before)
+        raise
+
 
 _FORMAT: Final = 1
 """Version of the format. Readers refuse any other version."""
@@ -26,7 +99,6 @@ Clock = Literal["real", "twin", "none"]
 _Pixels = Annotated[int, Meta(ge=1)]
 # A stack of four grey images of 84 x 84, as state, is 28 224 values.
 _MAX_VALUES: Final = 1 << 17
-_MAX_INTEGER: Final = 1 << 62  # Sums of two fit into the 64 bits of NumPy and of other formats.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,21 +152,20 @@ class EpisodeHeader:
 
     def __post_init__(self) -> None:
         # A few bytes can describe more values than any memory holds.
-        if not (1 <= self.action_size <= _MAX_VALUES and 0 <= self.state_size <= _MAX_VALUES):
+        if not 1 <= self.actions.size <= _MAX_VALUES >= self.states.size:
             raise DemosError(
-                "action_layout must have at least one value, and each layout at most "
-                f"{_MAX_VALUES}."
+                f"action_layout must have a value, and each layout at most {_MAX_VALUES} values."
             )
 
     @property
-    def action_size(self) -> int:
-        """Number of values in an action."""
-        return Layout.from_json(self.action_layout).size
+    def actions(self) -> Layout:
+        """Meaning of the values of an action."""
+        return Layout.from_json(self.action_layout)
 
     @property
-    def state_size(self) -> int:
-        """Number of values in a state; 0 without states."""
-        return Layout.from_json(self.state_layout).size if self.state_layout else 0
+    def states(self) -> Layout:
+        """Meaning of the values of a state; empty without states."""
+        return Layout.from_json(self.state_layout) if self.state_layout else Layout(())
 
     def to_json(self) -> dict[str, Any]:
         """Return the header as JSON can hold it, with the layouts expanded for readability."""
@@ -116,12 +187,9 @@ class EpisodeHeader:
                 f"reads format {_FORMAT} only."
             )
         known = dict(plain)
-        for name in ("action_layout", "state_layout"):
-            if name in plain:  # As `Layout.to_json` writes it; null is "".
-                layout = plain[name] or ""
-                known[name] = layout and json.dumps(
-                    layout, separators=(",", ":"), ensure_ascii=False
-                )
+        for name in {"action_layout", "state_layout"} & known.keys():
+            layout = known[name] or ""  # As `Layout.to_json` writes it; null is "".
+            known[name] = layout and json.dumps(layout, separators=(",", ":"), ensure_ascii=False)
         with translate_errors(
             msgspec.ValidationError,
             to=lambda error: DemosError(f"The header is invalid ({error})."),
@@ -134,7 +202,8 @@ Driver = Literal["person", "policy", "expert", "program"]
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 
-_NS: Final = ("captured_ns", "decided_ns", "wall_ns")
+# Sums of two fit into the 64 bits of NumPy and of other formats.
+_Integer = Annotated[int, Meta(ge=-(1 << 62), le=1 << 62)]
 
 
 class StepPicture(msgspec.Struct, frozen=True, array_like=True):
@@ -178,15 +247,15 @@ class Step(
         picture: Its image on disk; None for none.
     """
 
-    index: int = msgspec.field(default=-1, name="step")
+    index: _Integer = msgspec.field(default=-1, name="step")
     driver: Driver
     action: tuple[float, ...]
     applied: tuple[float, ...] | None = None
     wanted: tuple[float, ...] | None = None
     state: tuple[float, ...] = ()
-    captured_ns: int | None = None
-    decided_ns: int | None = None
-    wall_ns: int | None = None
+    captured_ns: _Integer | None = None
+    decided_ns: _Integer | None = None
+    wall_ns: _Integer | None = None
     reward: float | None = None
     terms: dict[str, float] = {}
     terminated: bool = False
@@ -205,34 +274,19 @@ class Step(
         return self.decided_ns if self.captured_ns is None else self.captured_ns
 
     def refusal(self, action_size: int, state_size: int) -> str:
-        """Return why the step is invalid, as part of a sentence; "" if it is valid.
-
-        Args:
-            action_size: Number of values in an action.
-            state_size: Number of values in a state.
-        """
-        for name, size in (
-            ("action", action_size),
-            ("applied", action_size),
-            ("wanted", action_size),
-            ("state", state_size),
-        ):
+        """Return why the step does not fit layouts of these sizes, as part of a sentence, or ""."""
+        sizes = dict.fromkeys(("action", "applied", "wanted"), action_size) | {"state": state_size}
+        for name, size in sizes.items():
             values = getattr(self, name)
             if values is not None and len(values) != size:
                 return f"its {name} has {len(values)} values, but the layout has {size}"
-        for name in ("index", *_NS):
-            if abs(getattr(self, name) or 0) > _MAX_INTEGER:
-                return f"its {name} is too large"
-        if not all(math.isfinite(value) for value in self.action):
-            return f"its action is {list(self.action)}"
-        if self.driver not in DRIVERS:
-            return f"its driver is {self.driver!r}, not one of {', '.join(DRIVERS)}"
-        return ""
+        is_finite = all(map(math.isfinite, self.action))
+        return "" if is_finite else f"its action is {list(self.action)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON can hold it; empty fields are left out."""
         plain = msgspec.to_builtins(self, enc_hook=float).items()  # Of NumPy, too.
-        return {n: value if n == "frame" else _mapped(_as_json, value) for n, value in plain}
+        return {name: _mapped(_as_json, value) for name, value in plain}
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> Step:
@@ -252,8 +306,7 @@ def _mapped(change: Callable[[Any], Any], value: Any) -> Any:
     """Change a value, or each one of a list or a dictionary."""
     match value:
         case dict():
-            items = cast("dict[str, Any]", value).items()
-            return {name: change(one) for name, one in items}
+            return {name: change(one) for name, one in cast("dict[str, Any]", value).items()}
         case list() | tuple():
             return [change(one) for one in cast("Sequence[Any]", value)]
         case _:
@@ -299,32 +352,13 @@ class Keep(Drop, frozen=True, tag="keep"):
 Edit = EpisodeMark | Drop | Keep
 """Lines of `steps.jsonl` other than steps."""
 
-
 _PAUSE_PERIODS: Final = 30.0
 _SHORTEST_PAUSE_S: Final = 1.0  # A disk, or a rate that is not known well, takes this long.
-_NS_PER_S: Final = 1e9
 
 
 def longest_period_s(control_hz: float) -> float:
     """Return the longest time from one step to the next that is not a pause, s."""
     return max(_PAUSE_PERIODS / control_hz, _SHORTEST_PAUSE_S)
-
-
-def durations_s(times_ns: Sequence[int | None], control_hz: float) -> list[float]:
-    """Return how long each step lasted: until the next one, s.
-
-    A step lasts one period if it is the last one, if a pause follows, or if a time is unknown.
-
-    Args:
-        times_ns: Time of each step on one clock, ns.
-        control_hz: Steps per second.
-    """
-    period_s, longest_s = 1.0 / control_hz, longest_period_s(control_hz)
-    found: list[float] = []
-    for now, later in pairwise(times_ns):
-        passed_s = -1.0 if now is None or later is None else (later - now) / _NS_PER_S
-        found.append(passed_s if 0.0 <= passed_s <= longest_s else period_s)
-    return [*found, period_s] if times_ns else []
 
 
 _MAX_LINE: Final = 1 << 20
@@ -343,14 +377,11 @@ def encode_line(line: Step | Edit | dict[str, Any]) -> bytes:
     return body + _CHECK % binascii.crc32(body)
 
 
-def decode_line(line: bytes) -> dict[str, Any]:
-    r"""Decode what `encode_line` returned.
-
-    Args:
-        line: One line, with its `\n`.
+def parse_line(line: bytes) -> Step | Edit | None:
+    r"""Parse one line of `steps.jsonl`, with its `\n`; None for a kind of a later version.
 
     Raises:
-        ValueError: If the line is damaged; the message is part of a sentence.
+        ValueError: If the line is damaged or invalid; the message is part of a sentence.
     """
     if len(line) > _MAX_LINE:
         raise ValueError(f"it has {len(line)} bytes")
@@ -359,34 +390,16 @@ def decode_line(line: bytes) -> dict[str, Any]:
         raise ValueError("it is cut off or was changed")
     try:
         fields = json.loads(body + b"}")
+        match fields:
+            case {"kind": "step"}:
+                return Step.from_json(cast("dict[str, Any]", fields))
+            case {"kind": "mark" | "drop" | "keep"}:
+                return msgspec.convert(fields, Edit)
+            case dict():
+                return None
+            case _:
+                raise ValueError("it is not a JSON object")
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
-    if not isinstance(fields, dict):
-        raise ValueError("it is not a JSON object")
-    return cast("dict[str, Any]", fields)
-
-
-def parse_line(line: bytes) -> Step | Edit | None:
-    r"""Parse one line of `steps.jsonl`, with its `\n`; None for a kind of a later version.
-
-    Raises:
-        ValueError: If the line is damaged or invalid; the message is part of a sentence.
-    """
-    match decode_line(line):
-        case {"kind": "step"} as fields:
-            return Step.from_json(fields)
-        case {"kind": "mark" | "drop" | "keep"} as fields:
-            try:
-                return msgspec.convert(fields, Edit)
-            except msgspec.ValidationError as error:
-                raise ValueError(f"it is not a valid mark or edit ({error})") from error
-        case _:
-            return None
-
-
-def split_lines(content: bytes) -> list[bytes]:
-    r"""Split the content of a file at each `\n`, which stays; only the last line may lack it."""
-    # Not `splitlines`, which also splits at a `\r` that damage may have put there.
-    lines = [line + b"\n" for line in content.split(b"\n")]
-    last = lines.pop()[:-1]
-    return [*lines, last] if last else lines
+    except msgspec.ValidationError as error:
+        raise ValueError(f"it is not a valid mark or edit ({error})") from error

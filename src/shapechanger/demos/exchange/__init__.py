@@ -23,16 +23,16 @@ from types import MappingProxyType
 from typing import Final
 
 from shapechanger.demos.episodes import (
+    Drop,
     Episode,
     EpisodeHeader,
     EpisodeWriter,
     Step,
-    drop,
+    edit,
     episodes_of,
     read_episode,
 )
-from shapechanger.demos.episodes.files import is_episode
-from shapechanger.demos.episodes.records import Keep, longest_period_s
+from shapechanger.demos.episodes.records import is_episode, longest_period_s
 from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
 from shapechanger.demos.exchange.files import new_folder
 from shapechanger.demos.exchange.format import (
@@ -182,19 +182,16 @@ def _exchanged(
 
 
 def _rows(episode: Episode, steps: Sequence[Step]) -> Iterator[ExchangeStep]:
-    kept = {step.index for step in episode.kept}
-    drops = [drop for drop in reversed(episode.drops) if not isinstance(drop, Keep)]
     marks: dict[int, list[str]] = {}
     for mark in episode.marks:
         marks.setdefault(mark.step, []).append(mark.text)
     frame = ""
     for step in steps:
-        reasons = (drop.why for drop in drops if drop.first <= step.index <= drop.last)
         yield ExchangeStep(
             step=step,
             jpeg=episode.jpeg(step) if step.frame != frame else None,
             marks=tuple(marks.get(step.index, ())),
-            dropped=None if step.index in kept else next(reasons, ""),
+            dropped=episode.excluded.get(step.index),
         )
         frame = step.frame
 
@@ -402,7 +399,7 @@ def _write(episode: ExchangeEpisode, folder: Path, now: datetime) -> tuple[Path,
     pictures = 0
     excluded: dict[int, str] = {}
     with EpisodeWriter.create(
-        folder, episode.header, now=lambda: now, created=episode.header.created
+        folder, episode.header, now=now, created=episode.header.created
     ) as writer:
         for row in episode.rows:
             try:
@@ -424,5 +421,5 @@ def _write(episode: ExchangeEpisode, folder: Path, now: datetime) -> tuple[Path,
     runs = groupby(enumerate(excluded.items()), key=lambda it: (it[1][1], it[1][0] - it[0]))
     for (why, _), run in runs:
         indexes = [index for _, (index, _) in run]
-        drop(writer.path, indexes[0], indexes[-1], why)
+        edit(writer.path, Drop(indexes[0], indexes[-1], why))
     return writer.path, writer.steps, pictures

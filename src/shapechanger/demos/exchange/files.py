@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.demos.episodes.files import MAX_TEXT_BYTES, read_file
+from shapechanger.demos.episodes.records import MAX_TEXT_BYTES
 from shapechanger.demos.exchange.format import ExchangeEpisode
 from shapechanger.errors import (
     DemosError,
@@ -30,7 +30,7 @@ from shapechanger.errors import (
     OutputError,
     translate_errors,
 )
-from shapechanger.files import writing
+from shapechanger.files import read_file, writing
 from shapechanger.layout import Layout
 
 MAX_UNPACKED: Final = 64 << 20

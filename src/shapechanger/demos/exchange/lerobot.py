@@ -396,7 +396,7 @@ def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, s
     header, outcome = files.own_header(plain, where)
     runs = _converted(plain.get("drivers", []), list[tuple[Driver, int]], Path(where))
     drivers = islice(chain.from_iterable(repeat(*run) for run in runs), _MOST)
-    ours, theirs = ((one.action_size, one.state_size, one.image_size) for one in (header, found))
+    ours, theirs = ((one.actions.size, one.states.size, one.image_size) for one in (header, found))
     if ours != theirs:
         raise DemosError(
             f"{where} is of another dataset, with other actions, states or images: remove the "

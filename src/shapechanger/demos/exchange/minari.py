@@ -473,14 +473,14 @@ def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | N
     last = steps[-1]
     cut = [*(step.truncated for step in steps[:-1]), last.truncated or not last.terminated]
     rewards = [math.nan if step.reward is None else step.reward for step in steps]
-    column(_ACTION, np.float64, [step.action for step in steps], (header.action_size,))
+    column(_ACTION, np.float64, [step.action for step in steps], (header.actions.size,))
     column(_REWARD, np.float64, rewards)
     column(_TERMINATED, np.bool_, [step.terminated for step in steps])
     column(_TRUNCATED, np.bool_, cut)
     column(_STEP, h5py.string_dtype("utf-8"), rests)
     if header.state_layout:
         states = [step.state for step in (*steps, last)]
-        column(state_at, np.float64, states, (header.state_size,))
+        column(state_at, np.float64, states, (header.states.size,))
     if picture is not None:
         append(observed[-1], observed[-1][-1])
         column(_FRAME, np.int64, frames)

@@ -18,10 +18,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES, read_file
+from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import DemosError, OutputError, translate_errors
+from shapechanger.files import read_file
 
 _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import time
 from collections import Counter
@@ -11,9 +12,17 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.demos.episodes import Episode
-from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode, lock, write_all
 from shapechanger.demos.episodes.reader import read_header
-from shapechanger.demos.episodes.records import Step, parse_line, split_lines
+from shapechanger.demos.episodes.records import (
+    FRAMES,
+    HEADER,
+    STEPS,
+    Step,
+    append,
+    is_episode,
+    lock,
+    parse_line,
+)
 from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from shapechanger.errors import (
     DemosError,
@@ -63,9 +72,9 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
     folder = here if is_episode(here) else part
     with translate_errors(OSError, to=lambda error: cannot_write(folder, error)):
         (folder / FRAMES).mkdir(parents=True, exist_ok=True)
-    fd = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
+    file = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
     try:
-        have = _complete_lines(folder, fd)
+        have = _complete_lines(folder, file)
         # Lines up to the last step are the robot's; marks and edits of both sides follow.
         begin = 1 + max((n for n, line in enumerate(have) if line.startswith(_STEP)), default=-1)
         edits, theirs = have[begin:], list[bytes]()
@@ -80,12 +89,12 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
             new = lines[max(begin - piece.first, 0) :]
             theirs += new
             if not edits:
-                write_all(fd, b"".join(new))
+                append(file, b"".join(new))
             piece = robot.fetch(name, piece.first + len(lines))
         own = _without(edits, theirs)
         if edits and (merged := have[:begin] + theirs + own) != have:
             write_atomic(folder / STEPS, b"".join(merged))
-        os.fsync(fd)
+        os.fsync(file.fileno())
         # A header that was closed here, by a repair, and only here, stays.
         if not (folder / HEADER).is_file() or read_header(folder)[1] is None:
             write_atomic(folder / HEADER, piece.header.encode())
@@ -97,7 +106,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
             raise
         raise cannot_write(folder, error) from error
     finally:
-        os.close(fd)
+        file.close()
     return len(_without(theirs, edits)), len(own)
 
 
@@ -113,13 +122,13 @@ def _without(lines: Sequence[bytes], others: Sequence[bytes]) -> list[bytes]:
     return found
 
 
-def _complete_lines(folder: Path, fd: int) -> list[bytes]:
+def _complete_lines(folder: Path, file: io.FileIO) -> list[bytes]:
     """Return the local lines, after removing a truncated last one."""
-    lines = split_lines((folder / STEPS).read_bytes())
+    lines = io.BytesIO((folder / STEPS).read_bytes()).readlines()
     if lines and not lines[-1].endswith(b"\n"):
         if (folder / HEADER).is_file():
             raise DemosError(f"{folder} is not whole: `shapechanger demos repair {folder}` first.")
-        os.ftruncate(fd, sum(map(len, lines[:-1])))
+        file.truncate(sum(map(len, lines[:-1])))
         lines.pop()
     return lines
 

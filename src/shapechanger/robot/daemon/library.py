@@ -10,17 +10,17 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from shapechanger.demos.episodes import Step, drop, keep, read_outline
-from shapechanger.demos.episodes.files import (
+from shapechanger.demos.episodes import Drop, Keep, Step, edit, read_outline
+from shapechanger.demos.episodes.records import (
     FRAMES,
     HEADER,
     MAX_PICTURE_BYTES,
     STEPS,
     is_episode,
-    read_file,
+    parse_line,
 )
-from shapechanger.demos.episodes.records import parse_line
 from shapechanger.errors import DemosError, ShapechangerError
+from shapechanger.files import read_file
 from shapechanger.robot.daemon.recorder import Worker
 from shapechanger.robot.link import messages
 
@@ -61,10 +61,8 @@ class RecordingLibrary:
                     return self._piece(self._path(question.episode), question)
                 case messages.Judge():
                     path = self._path(question.episode)
-                    if question.keep:
-                        keep(path, question.first, question.last)
-                    else:
-                        drop(path, question.first, question.last, "bad")
+                    span = question.first, question.last
+                    edit(path, Keep(*span) if question.keep else Drop(*span, "bad"))
                     return messages.Recordings(episodes=(self.summary(question.episode),))
         except (ShapechangerError, OSError, ValueError) as error:
             return messages.Refused(reason=str(error))
