@@ -187,7 +187,6 @@ def _with_rest(text: str) -> Callable[[Path], None]:
     ("form", "spoil", "expected"),
     [
         ("keys", _table(b"file", b"\xff"), "is not text in UTF-8"),
-        ("keys", _edit("steps.csv", lambda t: t.decode().encode("utf-16")), "but in UTF-16"),
         ("keys", _edit("steps.csv", lambda t: b""), "no column of an action"),
         ("keys", _edit("steps.csv", lambda t: t.splitlines(True)[0]), "There is nothing to import"),
         ("keys", _edit("steps.csv", lambda t: t + b'"open'), "is not valid CSV"),
@@ -207,7 +206,7 @@ def _with_rest(text: str) -> Callable[[Path], None]:
             ("minari", _with_rest(text), "infos/step of step 0 of episode_0 is damaged: ")
             for text in ("{", "7", "{}", "[" * 10**5, '{"step": {}, "marks": [], "dropped": null}')
         ),
-        ("minari", lambda f: (f / "data/main_data.hdf5").unlink(), "which is not in"),
+        ("minari", lambda f: (f / "data/main_data.hdf5").unlink(), "names: restore it"),
         ("minari", _edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
         ("minari", _edit("data/metadata.json", lambda b: b[:3000]), "is not valid JSON"),
         ("minari", _swap("data/metadata.json", b'"hdf5"', b'"arrow"'), "'arrow'"),
@@ -232,14 +231,14 @@ def test_folders_of_unknown_format(tmp_path: Path) -> None:
     """Empty, missing, ambiguous and parent folders each have an error."""
     out = tmp_path / "data"
     (tmp_path / "empty").mkdir()
-    assert "is empty" in refused(tmp_path / "empty", out)
+    assert "nothing that can be imported" in refused(tmp_path / "empty", out)
     (tmp_path / "file").write_text("x")
     assert "is a file: give the folder" in refused(tmp_path / "file", out)
-    assert "There is no" in refused(tmp_path / "gone", out)
+    assert "does not exist" in refused(tmp_path / "gone", out)
     drive(tmp_path / "mine")
     assert "is a recording already" in refused(tmp_path / "mine", out)
     tub = tub_folder(tmp_path / "above/tub", [{"user/angle": 0.0, "user/throttle": 0.5}])
-    assert f"{tub} in it is tub: import that" in refused(tmp_path / "above", out)
+    assert f"{tub} in it is tub." in refused(tmp_path / "above", out)
     (tub / "steps.csv").write_text("steering\n0\n")
     assert "looks like tub and csv" in refused(tub, out)
     assert import_recording(tub, out, "csv").steps == 1
@@ -276,8 +275,8 @@ def test_invalid_outputs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"control_hz": 10.0}, "20, and .* 10: a Minari dataset has one kind"),
-        ({"image_size": (80, 60)}, "40 x 32, and .* 80 x 60"),
+        ({"control_hz": 10.0}, "other steps a second than .* a Minari dataset has one kind"),
+        ({"image_size": (80, 60)}, "other images than"),
     ],
 )
 def test_episodes_of_two_kinds(tmp_path: Path, changes: dict[str, object], expected: str) -> None:
@@ -316,9 +315,9 @@ def test_nothing_to_export(tmp_path: Path) -> None:
     record(tmp_path / "bare", bare, [(Step(action=(0.0, 0.0), driver="person"), None)])
     with pytest.raises(DemosError, match="neither images nor a state"):
         export_recording(tmp_path / "bare", tmp_path / "out-v0", "minari")
-    with pytest.raises(DemosError, match="cannot mark excluded steps"):
+    with pytest.raises(DemosError, match="no option 'dropped'"):
         export_recording(tmp_path / "bare", tmp_path / "out", "tub", dropped=True)
-    with pytest.raises(DemosError, match="are of lerobot, and not of csv"):
+    with pytest.raises(DemosError, match="csv has no option 'images', unlike lerobot"):
         export_recording(tmp_path / "bare", tmp_path / "out", "csv", images=True)
 
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from shapechanger.demos.exchange import Imported, import_recording
+from shapechanger.demos.exchange import Converted, import_recording
 from shapechanger.demos.exchange.imports import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.exchange.small import all_of, picture, tub_folder
@@ -39,7 +39,7 @@ def records(
     ]
 
 
-def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Imported]:
+def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Converted]:
     """Import a tub, and return the numbers of the records of each episode, by their steering."""
     out = folder.with_name(f"{folder.name}-data-{len(list(folder.parent.iterdir()))}")
     done = import_recording(folder, out, **options)
@@ -301,7 +301,7 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
         record |= {"_session_id": n // 12, "_timestamp_ms": T0_MS + n * (50 if n < 12 else 100)}
     folder = tub_folder(tmp_path / "tub", made)
     (warning,) = imported(folder)[1].warnings
-    assert warning.startswith("The drive from record 12 has 10 steps a second, and the drive from")
+    assert warning.startswith("The drives have from 10 to 20 steps a second: a policy learns")
     with pytest.raises(DemosError, match="--hz must be positive"):
         imported(folder, hz=-1.0)
 
