@@ -88,23 +88,6 @@ class Duty:
         return min(max((duty - self.start) / (self.full - self.start), 0.5 / _STEPS), 1.0)
 
 
-class Persistence:
-    """Condition that counts once it has held for `for_s` seconds without interruption."""
-
-    def __init__(self, for_s: float) -> None:
-        self._for_ns = round(for_s * 1e9)
-        self._since_ns: int | None = None
-
-    def holds(self, condition: bool, now_ns: int) -> bool:
-        """Update with the condition at a time, ns; return whether it has held for long enough."""
-        if not condition:
-            self._since_ns = None
-            return False
-        if self._since_ns is None:
-            self._since_ns = now_ns
-        return now_ns - self._since_ns >= self._for_ns
-
-
 class Bump:
     """Block forward motion during a contact and for `hold_ms` after it.
 
@@ -147,19 +130,22 @@ class Stall:
     """
 
     def __init__(self, after_s: float, threshold: float) -> None:
-        self._after_s = after_s
+        self._after_ns = round(after_s * 1e9)
         self._threshold = threshold
-        self._pushed = {1: Persistence(after_s), -1: Persistence(after_s)}
+        self._pushing = 0
+        self._since_ns = 0
         self.way = 0
         self.watches = False
 
     def sense(self, quantities: Mapping[str, float], push: float, now_ns: int) -> None:
         """Update with readings keyed by name and the applied push, -1 to 1, at a time, ns."""
-        self.watches = self._after_s > 0.0 and "speed" in quantities
+        self.watches = self._after_ns > 0 and "speed" in quantities
         stands = self.watches and abs(quantities["speed"]) < _STANDS_M_PER_S
-        for way, pushed in self._pushed.items():
-            if pushed.holds(stands and way * push > self._threshold, now_ns):
-                self.way = way
+        pushing = (push > self._threshold) - (push < -self._threshold) if stands else 0
+        if pushing != self._pushing:
+            self._pushing, self._since_ns = pushing, now_ns
+        if pushing and now_ns - self._since_ns >= self._after_ns:
+            self.way = pushing
 
     def ask(self, push: float) -> None:
         """Update with the push that the command asks for."""
@@ -178,14 +164,16 @@ class Propulsion:
         self._actions = actions
         # A turning action may propel, as a tank's does, but never forward.
         self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != "steering")
+        self._rests = [(i, actions[i].rest) for i in self.forward]
         # Actions whose profile gives a speed.
         self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
 
     def push(self, values: Sequence[float]) -> float:
         """Return the forward push, -1 to 1; negative is backward."""
-        if not self.forward:
-            return 0.0
-        return sum([values[i] - self._actions[i].rest for i in self.forward]) / len(self.forward)
+        push = 0.0
+        for i, rest in self._rests:
+            push += values[i] - rest
+        return push / len(self._rests) if self._rests else 0.0
 
     def speed(self, values: Sequence[float]) -> float | None:
         """Return the speed that the profile gives for this push, m/s; None if it gives none."""
@@ -215,9 +203,9 @@ class MotionReflexes:
         self._is_far = True
 
     def sense(
-        self, quantities: Mapping[str, float], is_silent: bool, done: Sequence[float], now_ns: int
+        self, quantities: Mapping[str, float], is_silent: bool, push: float, now_ns: int
     ) -> None:
-        """Update with readings keyed by name and the applied value of each action, at a time, ns.
+        """Update with readings keyed by name and the applied push, -1 to 1, at a time, ns.
 
         `is_silent` states whether a distance sensor responded without a distance.
         """
@@ -226,21 +214,25 @@ class MotionReflexes:
         is_heard = "distance" in quantities and not is_silent
         self._is_far = limit_m <= 0.0 or not self._measures_distance or is_heard
         self.bump.sense(quantities, now_ns)
-        self.stall.sense(quantities, self.propulsion.push(done), now_ns)
+        self.stall.sense(quantities, push, now_ns)
 
     def hold_back(self, aims: Sequence[float], now_ns: int) -> tuple[tuple[float, ...], str]:
         """Return the target of each action without forbidden motion, and why it was changed."""
-        self.stall.ask(self.propulsion.push(aims))
+        if self.stall.way:
+            self.stall.ask(self.propulsion.push(aims))
+        bumped, stalled = self.bump.blocks(now_ns), self.stall.way
+        if self._is_far and not (bumped or self._is_near or stalled):
+            return tuple(aims), ""
         reasons = (
-            (1, self.bump.blocks(now_ns), "Not forward: the bumper touched something."),
+            (1, bumped, "Not forward: the bumper touched something."),
             (1, self._is_near, "Not forward: something is near."),
             (1, not self._is_far, "Not forward: the distance ahead is not known."),
-            (1, self.stall.way > 0, "Not forward: it pushes and does not move."),
-            (-1, self.stall.way < 0, "Not backward: it pushes and does not move."),
+            (1, stalled > 0, "Not forward: it pushes and does not move."),
+            (-1, stalled < 0, "Not backward: it pushes and does not move."),
         )
         forbidden = [(way, reason) for way, holds, reason in reasons if holds]
         kept, given = list(aims), dict[str, None]()
-        for i in self.propulsion.forward if forbidden else ():
+        for i in self.propulsion.forward:
             rest = self._actions[i].rest
             asked = [reason for way, reason in forbidden if way * (aims[i] - rest) > 0.0]
             if asked:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shapechanger.contract.limits import MotionReflexes, Persistence, aimed, clipped, slewed
+from shapechanger.contract.limits import MotionReflexes, aimed, clipped, slewed
 from shapechanger.contract.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import Order
@@ -21,6 +21,23 @@ from shapechanger.robot.guard.sensors import Sensing
 # Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor
 # starts, must not stop the robot.
 _BELIEVED_AFTER_S = 0.5
+
+
+class Persistence:
+    """Condition that counts once it has held for `for_s` seconds without interruption."""
+
+    def __init__(self, for_s: float) -> None:
+        self._for_ns = round(for_s * 1e9)
+        self._since_ns: int | None = None
+
+    def holds(self, condition: bool, now_ns: int) -> bool:
+        """Update with the condition at a time, ns; return whether it has held for long enough."""
+        if not condition:
+            self._since_ns = None
+            return False
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        return now_ns - self._since_ns >= self._for_ns
 
 
 class RobotHealth:
@@ -240,7 +257,8 @@ class Rules:
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
         """Update with new sensor readings."""
-        self._reflexes.sense(sensing.quantities, bool(sensing.silent), self._done, now_ns)
+        push = self._reflexes.propulsion.push(self._done)
+        self._reflexes.sense(sensing.quantities, bool(sensing.silent), push, now_ns)
         self._health.sense(sensing, now_ns)
         # Faulty servos have released, and an intermittent magnet is loose: a person has to inspect
         # them and arm again.

@@ -206,6 +206,7 @@ class SensedVehicle:
         self.sources: dict[str, str] = {}
         self._parts = self._outputs()
         self._reflexes = MotionReflexes(plan)
+        self._push = 0.0
         self._measured_by: dict[str, str] = {}
         opened = [
             (one, _SENSORS[one.driver](one.settings, world))
@@ -228,20 +229,19 @@ class SensedVehicle:
         aims: tuple[float, ...] | None = None
         clips = ""
         if command is not None:
-            aims = tuple(aimed(a, value) for a, value in zip(actions, command, strict=True))
+            aims = tuple(map(aimed, actions, command))
             clips = _CLIPPED if any(map(clipped, actions, command)) else ""
         end_ns = self.now_ns + ns
         while self.now_ns < end_ns:
             tick_ns = min(self._tick_ns, end_ns - self.now_ns)
             self.now_ns += tick_ns
             self._world.advance(tick_ns / 1e9, self._parts)
-            push = self._reflexes.propulsion.push(self.applied)
-            direction = float((push > 0.0) - (push < 0.0))
+            direction = float((self._push > 0.0) - (self._push < 0.0))
             quantities: dict[str, float] = {}
             if direction == 0.0:  # The zero of a gyroscope follows.
                 self._read(self._slow, quantities, direction)
             self._read(self._fast, quantities, direction)
-            self._reflexes.sense(quantities, False, self.applied, self.now_ns)
+            self._reflexes.sense(quantities, False, self._push, self.now_ns)
             if self.now_ns >= end_ns:
                 if direction != 0.0:
                     self._read(self._slow, quantities, direction)
@@ -249,7 +249,8 @@ class SensedVehicle:
             if aims is not None:
                 kept, reason = self._reflexes.hold_back(aims, self.now_ns)
                 self.reason = f"{reason} {clips}".strip()
-                self._follow(kept, tick_ns / 1e9)
+                if kept != self.applied:
+                    self._follow(kept, tick_ns / 1e9)
 
     def _read(
         self, sensors: Sequence[tuple[str, _Read]], quantities: dict[str, float], direction: float
@@ -270,20 +271,19 @@ class SensedVehicle:
         speed = reflexes.propulsion.speed(self.applied)
         if "speed" not in quantities and speed is not None:
             quantities["speed"], sources["speed"] = speed, "estimated"
-        signs = [name for name in ("bump", "stall") if name in quantities]
-        if signs:
-            sign = next((name for name in signs if quantities[name] > 0.0), signs[0])
-            quantities["collision"] = float(quantities[sign] > 0.0)
-            sources["collision"] = "estimated" if sign == "stall" else sources[sign]
+        bump, stall = quantities.get("bump"), quantities.get("stall", 0.0)
+        if bump is not None and (bump > 0.0 or stall == 0.0):
+            quantities["collision"], sources["collision"] = bump, sources["bump"]
+        elif "stall" in quantities:
+            quantities["collision"], sources["collision"] = stall, "estimated"
         self.quantities, self.sources = quantities, sources
 
     def _follow(self, aims: tuple[float, ...], elapsed_s: float) -> None:
-        if aims == self.applied:
-            return
         self.applied = tuple(
             slewed(action, now, aim, elapsed_s)
             for action, now, aim in zip(self._plan.actions, self.applied, aims, strict=True)
         )
+        self._push = self._reflexes.propulsion.push(self.applied)
         self._parts = self._outputs()
 
     def _outputs(self) -> Mapping[str, float | None]:
