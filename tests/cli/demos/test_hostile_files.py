@@ -360,21 +360,24 @@ LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "a task of 8 MiB": (
         column(PLACES, "tasks", lambda n: [["x" * (8 << 20)]] * n),
-        "a text of more than 4096 characters",
+        "`str` of length <= 4096",
     ),
     "an image of 128 MiB": (
         column(ROWS, CAMERA, lambda n: [{"bytes": bytes((n == 0) << 27)} for n in range(n)]),
         "bytes, but claims",
     ),
-    "two images of 15 MiB in all rows": (column(ROWS, CAMERA, two_pictures), "unpacks to more"),
+    "two images of 15 MiB in all rows": (
+        column(ROWS, CAMERA, two_pictures),
+        "far more bytes than its files",
+    ),
     "a million rows": (many_rows, "bytes, but claims"),
     "an episode twice": (
         column(PLACES, "episode_index", lambda n: [0] * n),
-        "meta/episodes has twice: 0",
+        "does not have each episode once",
     ),
     "an action of 10^9 values": (
         lambda f: edit(f / "meta/info.json", "2\n            ],", "1000000000\n            ],"),
-        "has the shape",
+        "no numeric feature 'action'",
     ),
     "a file elsewhere": (
         lambda f: edit(f / "meta/info.json", "data/chunk", "../secret/chunk"),

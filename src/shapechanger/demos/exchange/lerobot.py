@@ -140,7 +140,7 @@ class _Dataset:
         self._video = f"videos/{camera.key}/" if camera and camera.kind == "video" else ""
         self._entries = self._read_entries()
         self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
-        self._paths: dict[float, list[Path]] = defaultdict(list)
+        self._groups: dict[float, dict[Path, set[int]]] = {}
         self._find_rows()
         self._filmed: dict[str, list[_Entry]] = defaultdict(list)
         self._videos: dict[str, VideoTimes | str] = {}
@@ -169,16 +169,18 @@ class _Dataset:
             if ours:
                 about, outcome, drivers = _own(ours[number], about, f"{own}, episode {number}")
             pictures = self._pictures(entry) if self._video else repeat(None, entry.length)
-            if len(paths := self._paths[number]) != 1:
-                pictures = f"with rows in {len(paths)} files"
+            if len(places := self._groups.get(number, {})) != 1:
+                pictures = f"with rows in {len(places)} files"
             if isinstance(pictures, str):
                 self._context.leave_out("episode", pictures, number)
                 continue
-            records = self._records(entry, paths[0], pictures, drivers)
+            records = self._records(entry, *places.popitem(), pictures, drivers)
             rest = [f"{frame} of episode {number}" for frame in range(entry.length)]
             rows = imports.rows_of(records, self._size, self._context, "step", rest)
             name = f"{self._folder}, episode {number}"
             yield ExchangeEpisode(header=about, rows=rows, name=name, outcome=outcome)
+            if self._most_bytes < 0:
+                raise DemosError(f"{self._folder} has images of far more bytes than its files.")
 
     def _choose_features(self, features: Sequence[_Feature]) -> None:
         """Choose the action, the states, the camera and single numbers, and report the others."""
@@ -211,7 +213,7 @@ class _Dataset:
         entries: list[_Entry] = []
         for path in sorted((self._folder / EPISODES).glob("*/*.parquet")):
             files.inside(self._folder, str(path.relative_to(self._folder)), path)
-            for batch in _batches(path, names):
+            for _, batch in _batches(path, names):
                 rows = batch.rename_columns(list(fields)).to_pylist()
                 entries += _converted(rows, list[_Entry], path, strict=False)
         found = {entry.episode_index: entry for entry in entries}
@@ -233,20 +235,21 @@ class _Dataset:
         unknown = set[str]()
         for name in names:
             try:
-                path, numbers = files.inside(self._folder, name, INFO), set[float]()
-                for batch in _batches(path, _KEYS[:1]):
-                    numbers.update(_vectors(batch, _KEYS[0], 1, path).ravel().tolist())
+                path, groups = files.inside(self._folder, name, INFO), dict[float, set[int]]()
+                for group, batch in _batches(path, _KEYS[:1]):
+                    for number in np.unique(_vectors(batch, _KEYS[0], 1, path)).tolist():
+                        groups.setdefault(number, set()).add(group)
             except DemosError as error:
                 self._context.leave_out("file", imports.unreadable(error), name)
                 continue
             self._most_bytes += _MAX_PACKED * path.stat().st_size
             unknown |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
-            for number in sorted(numbers):
-                self._paths[number].append(path)
+            for number, found in groups.items():
+                self._groups.setdefault(number, {})[path] = found
         for column in sorted(unknown - self._info.features.keys()):
             if not column.startswith("__index_level_"):  # Of pandas.
                 self._context.leave_out("column", f"that {INFO} does not describe", column)
-        for number in sorted(self._paths.keys() - self._entries.keys()):
+        for number in sorted(self._groups.keys() - self._entries.keys()):
             self._context.leave_out("episode", f"that {EPISODES} does not have", f"{number:g}")
 
     def _video_name(self, entry: _Entry) -> str:
@@ -273,9 +276,7 @@ class _Dataset:
         # If an image is lost, the ones after it moved up, and nothing says which one is lost.
         if late_s > half_s:
             return f"of {name}, which begins {late_s:.4g} s later than {EPISODES} says"
-        if times.is_cut_off:
-            self._context.leave_out("file", "that is cut off, without the images after that", name)
-        elif early_s > half_s:
+        if early_s > half_s:
             return f"of {name}, which ends {early_s:.4g} s earlier than {EPISODES} says"
         if min(late_s, early_s) < -half_s:
             more_s = -min(late_s, early_s)
@@ -303,6 +304,7 @@ class _Dataset:
         self,
         entry: _Entry,
         path: Path,
+        groups: Iterable[int],
         pictures: Iterable[NDArray[np.uint8] | None],
         drivers: Sequence[Driver],
     ) -> Iterator[SourceRecord]:
@@ -313,23 +315,29 @@ class _Dataset:
         steps = enumerate(pictures)
         done, read = 0, b""
         stored = [self._stored] if self._stored else []
-        for batch in _batches(path, [*sizes, *stored], number):
+        for _, batch in _batches(path, [*sizes, *stored], groups):
             columns = {key: _vectors(batch, key, size, path) for key, size in sizes.items()}
-            rows = int(batch.num_rows)
+            ours = np.flatnonzero(columns[_KEYS[0]] == number)
+            if not len(ours):
+                continue
+            here = slice(ours[0], ours[-1] + 1)
+            columns = {key: values[here] for key, values in columns.items()}
+            rows = len(columns[_ACTION])
             frames = np.arange(done, done + rows)
             done += rows
-            first, keys = entry.dataset_from_index, np.hstack([columns[key] for key in _KEYS[1:]])
-            right = np.stack([frames, frames + first, frames / rate_hz], axis=1)
+            first, keys = entry.dataset_from_index, np.hstack([columns[key] for key in _KEYS])
+            right = [np.full(rows, number), frames, frames + first, frames / rate_hz]
+            right = np.stack(right, axis=1)
             if done > entry.length or not np.allclose(keys, right, _ROUNDING, _TOLERANCE_S):
                 raise DemosError(f"{path}: keys of episode {number} do not fit {EPISODES}.")
-            images: list[Any] | None = batch.column(self._stored).to_pylist() if stored else None
+            images = batch.column(self._stored)[here] if stored else None
             for row in range(rows):
                 frame, picture = next(steps)
                 single = {key: float(columns[key][row, 0]) for key in self._columns}
                 reward, is_done = single.get(_REWARD, math.nan), bool(single.get(DONE, False))
                 ended = bool(single.get(_TERMINATED, is_done))
                 if images is not None:
-                    picture = _bytes(images[row])
+                    picture = _bytes(images[row].as_py())
                     self._most_bytes -= 0 if picture == read else len(picture)
                     read = picture
                     if self._most_bytes < 0:
@@ -407,36 +415,32 @@ def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, s
     return replace(header, clock=clock, notes=found.notes | header.notes), outcome, list(drivers)
 
 
-def _batches(path: Path, columns: Sequence[str], number: int | None = None) -> Iterator[Any]:
-    """Yield the rows of a Parquet file, or those of an episode, a few at a time, in order."""
-    arrow, parquet, system, data = (
-        files.library(name, "lerobot")
-        for name in ("pyarrow", "pyarrow.parquet", "pyarrow.fs", "pyarrow.dataset")
-    )
+def _batches(
+    path: Path, columns: Sequence[str], groups: Iterable[int] | None = None
+) -> Iterator[tuple[int, Any]]:
+    """Yield the rows of a Parquet file, or of its groups, a few at a time, with their group."""
+    arrow, parquet = (files.library(name, "lerobot") for name in ("pyarrow", "pyarrow.parquet"))
     try:
-        about, size = parquet.read_metadata(path), path.stat().st_size
-        groups = map(about.row_group, range(about.num_row_groups))
-        parts = [group.column(n) for group in groups for n in range(group.num_columns)]
-        claimed = sum(max(part.total_uncompressed_size, 8 * part.num_values) for part in parts)
-        if claimed > files.MAX_UNPACKED + _MAX_PACKED * size or about.num_rows > size:
-            raise DemosError(f"{path} has {size} bytes, but claims to unpack to {claimed}.")
-        known = about.schema.to_arrow_schema().names
-        if missing := [key for key in columns if key not in known]:
-            raise DemosError(f"{path} has no column {missing[0]!r}.")
-        # Many rows may share one large value, which is in memory once for each.
-        read = [part for part in parts if part.path_in_schema.startswith(tuple(columns))]
-        largest = max((part.total_uncompressed_size for part in read), default=1)
         # Otherwise a whole row group is in memory, which may be an episode of images.
-        frugal = {"use_buffered_stream": True, "buffer_size": 1 << 20, "pre_buffer": False}
-        options = data.ParquetFragmentScanOptions(**frugal)
-        form = data.ParquetFileFormat(default_fragment_scan_options=options)
-        fragment = form.make_fragment(str(path), filesystem=system.LocalFileSystem())
-        yield from fragment.to_batches(
-            columns=list(columns),
-            filter=None if number is None else data.field(_KEYS[0]) == number,
-            batch_size=max(1, min(_ROWS, files.MAX_UNPACKED // max(1, largest))),
-            use_threads=False,
-        )
+        with parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:
+            about, size = file.metadata, path.stat().st_size
+            parts = [
+                about.row_group(group).column(n)
+                for group in range(about.num_row_groups)
+                for n in range(about.num_columns)
+            ]
+            claims = [max(part.total_uncompressed_size, 8 * part.num_values) for part in parts]
+            if (most := sum(claims)) > files.MAX_UNPACKED + _MAX_PACKED * size:
+                raise DemosError(f"{path} has {size} bytes, but claims to unpack to {most}.")
+            if about.num_rows > size:
+                raise DemosError(f"{path} has {size} bytes, but claims {about.num_rows} rows.")
+            if missing := [key for key in columns if key not in file.schema_arrow.names]:
+                raise DemosError(f"{path} has no column {missing[0]!r}.")
+            # Many rows may share one large value, which is in memory once for each.
+            rows = max(1, min(_ROWS, files.MAX_UNPACKED // max([1, *claims])))
+            for group in range(about.num_row_groups) if groups is None else sorted(groups):
+                for batch in file.iter_batches(rows, row_groups=[group], columns=columns):
+                    yield group, batch
     except (arrow.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
         raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error

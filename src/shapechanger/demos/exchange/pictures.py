@@ -8,6 +8,7 @@ damaged ones are refused, never filled up.
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES
-from shapechanger.demos.exchange.files import library
+from shapechanger.demos.exchange.files import MAX_UNPACKED, library
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
 from shapechanger.errors import DemosError, OutputError, translate_errors
 from shapechanger.files import read_file
@@ -28,6 +29,7 @@ _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"
 _PNG_DEPTH: Final = slice(24, 25)  # Position of the number of bits of a value.
 _OPAQUE: Final = 255
+_MAX_SAMPLES: Final = 1 << 21  # Of a video: 10 hours at 60 Hz, and 50 MB of FFmpeg's index.
 
 
 class PictureError(DemosError):
@@ -163,7 +165,6 @@ class VideoTimes:
         keys: Decoding time of the key frame with which decoding an image begins, shape (n,).
         tick_s: Length of a tick, s.
         size: Width and height of the images, pixels.
-        is_cut_off: Whether the end of the file is missing.
     """
 
     ticks: NDArray[np.int64]
@@ -171,13 +172,51 @@ class VideoTimes:
     keys: NDArray[np.int64]
     tick_s: Fraction
     size: tuple[int, int]
-    is_cut_off: bool
+
+
+def _require_whole(path: Path) -> None:
+    """Refuse an MP4 file that is cut off, or whose tables claim far more than it can hold.
+
+    FFmpeg allocates an entry for each sample that is claimed, again for each edit, and instead of
+    samples of sound for each 1024 in a chunk, before any is read (ISO/IEC 14496-12, 4.2, 8.6-8.8).
+    """
+    at, size, tables = 0, path.stat().st_size, bytearray()
+    with path.open("rb") as file:
+        while at < size:
+            file.seek(at)
+            head = file.read(16)
+            length = int.from_bytes(head[:4], "big")
+            length = int.from_bytes(head[8:], "big") if length == 1 else length or size - at
+            if length < 8 or at + length > size:
+                raise DemosError(f"{path} is damaged or cut off at byte {at}.")
+            if head[4:8] != b"mdat":
+                if len(tables) + length > MAX_UNPACKED:
+                    raise DemosError(f"{path} has tables of more than {MAX_UNPACKED} bytes.")
+                file.seek(at)
+                tables += file.read(length)
+            at += length
+
+    def claimed(kinds: bytes, offset: int) -> int:
+        ends = [match.end() + offset for match in re.finditer(kinds, tables)]
+        return sum(int.from_bytes(tables[end : end + 4], "big") for end in ends)
+
+    samples = claimed(b"stsz|stz2", 8) + claimed(b"trun", 4)
+    in_chunks = 0
+    for match in re.finditer(b"stsc", tables):
+        runs = tables[match.end() + 8 :][
+            : 12 * int.from_bytes(tables[match.end() + 4 :][:4], "big")
+        ]
+        each = np.frombuffer(runs[: len(runs) // 12 * 12], ">u4")[1::3]
+        in_chunks += int(each.max(initial=0)) // 1024 * claimed(b"stco|co64", 4)
+    if (samples + in_chunks) * (1 + claimed(b"elst", 4)) > _MAX_SAMPLES or b"cmov" in tables:
+        raise DemosError(f"{path} claims to have more than {_MAX_SAMPLES} images.")
 
 
 @contextmanager
 def _opened(path: Path) -> Generator[tuple[Any, Any]]:
     """Open an MP4 file of a stranger; yield the container and its first stream of images."""
     av = library("av", "lerobot")
+    _require_whole(path)
     strict = {"max_pixels": str(MAX_PIXELS), "err_detect": "explode"}
     with (
         translate_errors(
@@ -225,20 +264,7 @@ def read_times(path: Path) -> VideoTimes:
             raise DemosError(f"{path} has two images at one time.")
         seconds = ticks.astype(np.float64) * float(stream.time_base)
         size = (codec.width, codec.height)
-        return VideoTimes(ticks, seconds, keys, stream.time_base, size, _is_cut_off(path))
-
-
-def _is_cut_off(path: Path) -> bool:
-    """Return whether a box of an MP4 file ends after the file (ISO/IEC 14496-12, 4.2)."""
-    at, size = 0, path.stat().st_size
-    with path.open("rb") as file:
-        while at < size:
-            file.seek(at)
-            head = file.read(16)
-            length = int.from_bytes(head[:4], "big")
-            length = int.from_bytes(head[8:], "big") if length == 1 else length or size - at
-            at += max(length, 8)
-    return at > size
+        return VideoTimes(ticks, seconds, keys, stream.time_base, size)
 
 
 def read_pictures(
