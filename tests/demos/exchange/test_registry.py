@@ -100,8 +100,8 @@ def test_a_format_of_a_name_that_is_taken(installed: Path) -> None:
 
 def test_the_columns_are_documented() -> None:
     lines = [("Field", *FORMATS), ("---",) * (1 + len(FORMATS))]
-    for field, column in COLUMNS.items():
-        named = (f"`{name}`" if (name := column.names.get(form)) else "" for form in FORMATS)
+    for field, names in COLUMNS.items():
+        named = (f"`{name}`" if (name := names.get(form)) else "" for form in FORMATS)
         lines.append((f"`{field}`", *named))
     table = "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines)
     assert table in DOCS.read_text()

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -25,7 +26,6 @@ from typing import Final
 from shapechanger.demos.episodes import (
     Drop,
     Episode,
-    EpisodeHeader,
     EpisodeWriter,
     Step,
     edit,
@@ -45,7 +45,6 @@ from shapechanger.demos.exchange.format import (
 )
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.files import writing
-from shapechanger.layout import Layout
 
 __all__ = [
     "Converted",
@@ -177,23 +176,22 @@ def _exchanged(
         with suppress(ValueError, OverflowError):
             began = datetime.fromisoformat(header.created) + timedelta(seconds=since_s)
             header = replace(header, created=began.isoformat(timespec="milliseconds"))
-    rows, name = _rows(episode, steps), episode.path.name
-    return ExchangeEpisode(header=header, rows=rows, name=name, outcome=outcome)
 
+    def rows() -> Iterator[ExchangeStep]:
+        marks, frame = defaultdict[int, list[str]](list), ""
+        for mark in episode.marks:
+            marks[mark.step].append(mark.text)
+        for step in steps:
+            yield ExchangeStep(
+                step=step,
+                jpeg=episode.jpeg(step) if step.frame != frame else None,
+                marks=tuple(marks[step.index]),
+                dropped=episode.excluded.get(step.index),
+            )
+            frame = step.frame
 
-def _rows(episode: Episode, steps: Sequence[Step]) -> Iterator[ExchangeStep]:
-    marks: dict[int, list[str]] = {}
-    for mark in episode.marks:
-        marks.setdefault(mark.step, []).append(mark.text)
-    frame = ""
-    for step in steps:
-        yield ExchangeStep(
-            step=step,
-            jpeg=episode.jpeg(step) if step.frame != frame else None,
-            marks=tuple(marks.get(step.index, ())),
-            dropped=episode.excluded.get(step.index),
-        )
-        frame = step.frame
+    name = episode.path.name
+    return ExchangeEpisode(header=header, rows=rows(), name=name, outcome=outcome)
 
 
 def _consecutive(
@@ -249,18 +247,19 @@ def _passed_s(one: Step, two: Step, unknown_s: float = 0.0) -> float:
 
 
 def _require_alike(episodes: Sequence[ExchangeEpisode], title: str) -> None:
-    kinds: list[dict[str, object]] = []
-    for header in (episode.header for episode in episodes):
-        states = Layout.from_json(header.state_layout) if header.state_layout else ()
-        kind = {"actions": Layout.from_json(header.action_layout), "states": states}
-        kinds.append({what: [*map(str, features)] for what, features in kind.items()})
-        kinds[-1] |= {"images": header.image_size, "steps a second": f"{header.control_hz:g}"}
-    for episode, kind in zip(episodes, kinds, strict=True):
-        for what, value in kind.items():
-            if value != kinds[0][what]:
+    first = episodes[0]
+    for episode in episodes:
+        one, two = episode.header, first.header
+        for what, differ in {
+            "actions": one.actions != two.actions,
+            "states": one.states != two.states,
+            "images": one.image_size != two.image_size,
+            "steps a second": f"{one.control_hz:g}" != f"{two.control_hz:g}",
+        }.items():
+            if differ:
                 raise DemosError(
-                    f"{episode.name} has other {what} than {episodes[0].name}, but a {title} "
-                    "dataset has one kind of episode: export each kind to its own."
+                    f"{episode.name} has other {what} than {first.name}, but a {title} dataset has "
+                    "one kind of episode: export each kind to its own."
                 )
 
 
@@ -320,12 +319,13 @@ def import_recording(
     """
     context = ImportContext(camera=camera, hz=hz, strict=strict)
     found, read = _read(path, format, context)
-    now: datetime | None = None
     episodes = steps = pictures = 0
+    now = datetime.now(UTC)
     with new_folder(out, path) as folder:
         for episode in read:
-            # The folders of all episodes begin with the same time, so that their order is kept.
-            now = now or _began(episode.header)
+            if not episodes:  # One time begins the names of all folders, so that order is kept.
+                with suppress(ValueError):
+                    now = datetime.fromisoformat(episode.header.created).astimezone(UTC)
             written, added, shown = _write(episode, folder, now)
             if context.left_out and not added:  # All its steps.
                 shutil.rmtree(written)
@@ -355,14 +355,6 @@ def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterato
         raise DemosError(f"--hz must be positive, got {context.hz:g}.")
     assert form.read is not None
     return form.name, form.read(path, context)
-
-
-def _began(header: EpisodeHeader) -> datetime:
-    """Return when an episode began; the current time if that is unknown."""
-    try:
-        return datetime.fromisoformat(header.created).astimezone(UTC)
-    except ValueError:
-        return datetime.now(UTC)
 
 
 def find_format(path: Path) -> str:

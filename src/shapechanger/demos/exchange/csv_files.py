@@ -5,7 +5,7 @@ value that nothing measured. Texts are written as JSON with its quotes, so that 
 one for a formula, and line ends and other special characters survive.
 
 Without a header, `steps.csv` is a table of others: its columns are known by their names or aliases
-in `COLUMNS`, and its images lie in the same folder.
+of them, and its images lie in the same folder.
 """
 
 from __future__ import annotations
@@ -35,18 +35,20 @@ from shapechanger.demos.exchange.format import (
 )
 from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.errors import DemosError, translate_errors
-from shapechanger.layout import Layout
 
 _TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
-_NAMES: Final = {field: column.names["csv"] for field, column in COLUMNS.items()}
-_VECTORS: Final = [f for f, column in COLUMNS.items() if column.kind in {"action", "state"}]
+_NAMES: Final = {field: names["csv"] for field, names in COLUMNS.items()}
+_VECTORS: Final = [field for field, name in _NAMES.items() if name.endswith("/")]
 _IN_JSON: Final = ("terms", "stop_reason", "marks", "dropped")
-_KNOWN_AS: Final = {key: (_NAMES["action"] + one.name, 1) for key, one in COMMANDS.items()} | {
-    alias: (_NAMES[field], factor)
-    for field, column in COLUMNS.items()
-    for alias, factor in column.aliases.items()
+_TEXTS: Final = ("frame", "driver", *_IN_JSON)
+_KNOWN_AS: Final = {
+    **{key: (_NAMES["action"] + one.name, 1) for key, one in COMMANDS.items()},
+    **dict.fromkeys(("file", "image", "picture", "filename"), ("frame", 1)),
+    **dict.fromkeys(("timestamp", "time"), ("captured_ns", 10**9)),
+    **dict.fromkeys(("timestamp_ms", "milliseconds"), ("captured_ns", 10**6)),
+    "done": ("terminated", 1),
 }
 """Columns of `steps.csv`, each with its factor to their unit, by names in tables of others."""
 
@@ -63,12 +65,10 @@ def _tables_of(folder: Path) -> list[Path]:
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
     """Return the names of the columns of each field of a step, in order."""
-    states = Layout.from_json(header.state_layout) if header.state_layout else ()
-    actions = Layout.from_json(header.action_layout)
-    values = {"action": value_names(actions), "state": value_names(states)}
+    actions, states = value_names(header.actions), value_names(header.states)
+    values = dict.fromkeys(_VECTORS, actions) | {"state": states}
     return {
-        field: [_NAMES[field] + name for name in values.get(column.kind, [""])]
-        for field, column in COLUMNS.items()
+        field: [name + value for value in values.get(field, [""])] for field, name in _NAMES.items()
     }
 
 
@@ -229,15 +229,14 @@ def _record(
 ) -> SourceRecord:
     fields: dict[str, Any] = {} if factors is None else {"driver": "person"}
     for field, names in columns.items():
-        kind = COLUMNS[field].kind
         values = [cell for name in names if (cell := cells[name].strip())]
-        if comma and kind not in {"text", "picture", "json"}:
+        if comma and field not in _TEXTS:
             values = [value.replace(",", ".") for value in values]
         factor = (factors or {}).get(names[0], 1) if names else 1
         if field in _VECTORS:
             fields |= {field: values} if values else {}
         elif not values:
-            if factors is None and kind == "flag":
+            if factors is None and field in {"terminated", "truncated"}:
                 raise ValueError(f"{names[0]} is empty")
         elif field in _IN_JSON:
             fields[field] = json.loads(values[0])

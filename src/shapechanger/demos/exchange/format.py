@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Literal, NamedTuple, cast
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,62 +15,31 @@ from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 
-Kind = Literal["action", "state", "picture", "time", "number", "flag", "text", "json", "index"]
-
-
-class Column(NamedTuple):
-    """A column of a step.
-
-    Attributes:
-        kind: Its type; "action" and "state" are vectors, "time" is a whole number of ns.
-        names: Its name in each format that has it.
-        aliases: Names in tables of others, each with its factor to the unit of the field.
-    """
-
-    kind: Kind
-    names: Mapping[str, str]
-    aliases: Mapping[str, int]
-
-
 FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
 _NAMES: Final = """
-step        | index   | step        |                    | frame_index               | _index          | /step
-frame       | picture | frame       | observations/image | observation.images.camera | cam/image_array | /camera
-driver      | text    | driver      | infos/step         |                           | user/mode       | /step
-action      | action  | action/     | actions            | action                    | user/, pilot/   | /action
-applied     | action  | applied/    | infos/step         |                           |                 | /applied
-wanted      | action  | wanted/     | infos/step         |                           | pilot/          | /wanted
-state       | state   | state/      | observations/state | observation.state         | other numbers   | /state
-captured_ns | time    | captured_ns | infos/step         | timestamp                 | _timestamp_ms   | log time
-decided_ns  | time    | decided_ns  | infos/step         |                           |                 | log time
-wall_ns     | time    | wall_ns     | infos/step         |                           | _timestamp_ms   | /step
-reward      | number  | reward      | rewards            | next.reward               |                 | /reward
-terms       | json    | terms       | infos/step         |                           |                 | /reward
-terminated  | flag    | terminated  | terminations       | next.terminated           |                 | /step
-truncated   | flag    | truncated   | truncations        | next.done                 |                 | /step
-stop_reason | text    | stop_reason | infos/step         |                           |                 | /step
-marks       | json    | marks       | infos/step         |                           |                 | /step
-dropped     | text    | dropped     | infos/step         |                           |                 | /step
+step        | step        |                    | frame_index               | _index          | /step
+frame       | frame       | observations/image | observation.images.camera | cam/image_array | /camera
+driver      | driver      | infos/step         |                           | user/mode       | /step
+action      | action/     | actions            | action                    | user/, pilot/   | /action
+applied     | applied/    | infos/step         |                           |                 | /applied
+wanted      | wanted/     | infos/step         |                           | pilot/          | /wanted
+state       | state/      | observations/state | observation.state         | other numbers   | /state
+captured_ns | captured_ns | infos/step         | timestamp                 | _timestamp_ms   | log time
+decided_ns  | decided_ns  | infos/step         |                           |                 | log time
+wall_ns     | wall_ns     | infos/step         |                           | _timestamp_ms   | /step
+reward      | reward      | rewards            | next.reward               |                 | /reward
+terms       | terms       | infos/step         |                           |                 | /reward
+terminated  | terminated  | terminations       | next.terminated           |                 | /step
+truncated   | truncated   | truncations        | next.done                 |                 | /step
+stop_reason | stop_reason | infos/step         |                           |                 | /step
+marks       | marks       | infos/step         |                           |                 | /step
+dropped     | dropped     | infos/step         |                           |                 | /step
 """  # noqa: E501
-_ALIASES: Final[dict[str, dict[str, int]]] = {
-    "frame": dict.fromkeys(("file", "image", "picture", "filename"), 1),
-    "captured_ns": {
-        **dict.fromkeys(("timestamp", "time"), 10**9),
-        **dict.fromkeys(("timestamp_ms", "milliseconds"), 10**6),
-    },
-    "terminated": {"done": 1},
-}
-_CELLS: Final = [[cell.strip() for cell in line.split("|")] for line in _NAMES.split("\n")[1:-1]]
-
 COLUMNS: Final = {
-    field: Column(
-        cast("Kind", kind),
-        {form: name for form, name in zip(FORMATS, names, strict=True) if name},
-        _ALIASES.get(field, {}),
-    )
-    for field, kind, *names in _CELLS
+    field: {form: name for form, name in zip(FORMATS, names, strict=True) if name}
+    for field, *names in (map(str.strip, row.split("|")) for row in _NAMES.split("\n")[1:-1])
 }
-"""All columns of a step by the names of their fields, in the order of `steps.csv`."""
+"""Names of the fields of a step in each format that has them, in the order of `steps.csv`."""
 
 COMMANDS: Final = {
     "steering": Feature("steering", "1", -1.0, 1.0),
@@ -79,11 +48,6 @@ COMMANDS: Final = {
     **{key: Feature(key, "1", 0.0, 1.0) for key in ("forward", "backward", "right", "left")},
 }
 """Values of an action by their names in tables of others; a key that is held is 1."""
-
-
-def name_in(form: str, field: str) -> str:
-    """Return the name of a field in a format."""
-    return COLUMNS[field].names[form]
 
 
 DEFAULT_HZ: Final = 20.0

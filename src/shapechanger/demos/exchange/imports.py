@@ -91,31 +91,23 @@ def rows_of(
         what: A record, as a noun for reports.
         rest: Names of all records, of which those are reported that a damaged file does not have.
     """
-    read: object = None
     shown: object = None
-    jpeg: bytes | None = None
-    reason, done = "", 0
+    done = 0
     try:
-        for record in records:
-            done += 1
+        for done, record in enumerate(records, 1):  # noqa: B007
             frame = record.picture if record.frame is None else record.frame
-            new = size is not None and record.picture is not None and frame != shown
-            fault = record.fault or _fault(record.step)
-            if new and not fault:
-                if frame != read:
-                    read, reason = frame, ""
-                    try:
-                        jpeg, *_ = load_jpeg(record.picture, size)
-                    except PictureError as error:
-                        reason = str(error)
-                fault = reason
+            jpeg, fault = None, record.fault or _fault(record.step)
+            if size is not None and record.picture is not None and frame != shown and not fault:
+                try:
+                    jpeg, *_ = load_jpeg(record.picture, size)
+                except PictureError as error:
+                    fault = str(error)
             if fault:
                 context.leave_out(what, fault, record.name)
                 continue
-            shown = frame if new else shown
-            picture = jpeg if new else None
+            shown = shown if jpeg is None else frame
             yield ExchangeStep(
-                step=record.step, jpeg=picture, marks=record.marks, dropped=record.dropped
+                step=record.step, jpeg=jpeg, marks=record.marks, dropped=record.dropped
             )
     except DemosError as error:
         for name in rest[done:]:
@@ -176,38 +168,36 @@ def stretches(
         Records that follow each other without a pause, with their rate in Hz and whether their
         times are known and believed.
     """
-    times_ns: list[list[int]] = []
     periods_ns: list[list[float]] = []  # From one record to the next, per number that they differ.
     for part in parts:
-        times = [ns for record in part if (ns := record.step.captured_ns) is not None]
-        if 0 < len(times) < len(part):
+        missing = sum(record.step.captured_ns is None for record in part)
+        if 0 < missing < len(part):
             context.warn(
-                f"{len(part) - len(times)} of the {len(part)} {what}s from {part[0].name} have no "
-                "valid time: the times of the others are left out."
+                f"{missing} of the {len(part)} {what}s from {part[0].name} have no valid time: the "
+                "times of the others are left out."
             )
-            times = []
-        pairs = zip(pairwise(times), pairwise(part), strict=False)
-        periods_ns.append(
-            [(b - a) / max(1, two.number - one.number) for (a, b), (one, two) in pairs]
-        )
-        times_ns.append(times)
-    rates, are_believed = _rates(periods_ns, context, stated_hz)
+            _leave_out_times(part)
+        pairs = pairwise(() if missing else part)
+        periods_ns.append([_passed_ns(a, b) / max(1, b.number - a.number) for a, b in pairs])
+    rates = _rates(periods_ns, context, stated_hz)
+    if rates is None:
+        rates = [context.hz or stated_hz or DEFAULT_HZ] * len(parts)
+        for part in parts:
+            _leave_out_times(part)
     found: list[tuple[list[SourceRecord], float, bool]] = []
     pauses_s: list[float] = []
     backwards: list[tuple[float, str]] = []
-    for times, part, hz in zip(times_ns, parts, rates, strict=True):
-        starts, is_timed = [0], are_believed and bool(times)
-        for number, (now, later) in enumerate(pairwise(times if is_timed else ()), 1):
-            passed_s = (later - now) / _NS_PER_S
-            if passed_s < 0.0:
-                backwards.append((-passed_s, part[number].name))
-            elif passed_s > longest_period_s(hz):
-                pauses_s.append(passed_s)
-            else:
+    for part, hz in zip(parts, rates, strict=True):
+        starts, is_timed = [0], part[0].step.captured_ns is not None
+        for number, (now, later) in enumerate(pairwise(part if is_timed else ()), 1):
+            passed_s = _passed_ns(now, later) / _NS_PER_S
+            if 0.0 <= passed_s <= longest_period_s(hz):
                 continue
             starts.append(number)
-        for record in part if not is_timed else ():
-            record.step = replace(record.step, captured_ns=None)
+            if passed_s < 0.0:
+                backwards.append((-passed_s, later.name))
+            else:
+                pauses_s.append(passed_s)
         found += [(part[one:two], hz, is_timed) for one, two in pairwise([*starts, len(part)])]
     if pauses_s:
         context.note(
@@ -222,42 +212,51 @@ def stretches(
     return found
 
 
+def _passed_ns(one: SourceRecord, two: SourceRecord) -> int:
+    return (two.step.captured_ns or 0) - (one.step.captured_ns or 0)
+
+
+def _leave_out_times(part: Iterable[SourceRecord]) -> None:
+    for record in part:
+        record.step = replace(record.step, captured_ns=None)
+
+
 def _rates(
     periods_ns: Sequence[Sequence[float]], context: ImportContext, stated_hz: float | None
-) -> tuple[list[float], bool]:
-    """Return the rate of each session, and whether its times are believed."""
+) -> list[float] | None:
+    """Return the rate of each session; None if the times contradict the one that is stated."""
     measured = measured_hz([*chain.from_iterable(periods_ns)])
+    about = f"{1e3 / (measured or inf):.4g} ms apart, {measured or 0.0:.4g} a second"
     if (hz := context.hz or stated_hz) is not None:
         if measured is None or 1.0 / _RATE_RATIO < measured / hz < _RATE_RATIO:
-            return [hz] * len(periods_ns), True
+            return [hz] * len(periods_ns)
         (context.warn if context.hz is None else context.note)(
-            f"The records are {_described(measured)} by their times, and not the {hz:g} Hz that "
-            "are stated: these times are left out."
+            f"The records are {about} by their times, and not the {hz:g} Hz that are stated: "
+            "these times are left out."
         )
-        return [hz] * len(periods_ns), False
+        return None
     if measured is None:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
-        return [DEFAULT_HZ] * len(periods_ns), True
-    each = [measured_hz(part) if len(part) >= _MIN_PERIODS else None for part in periods_ns]
-    known = [hz for hz in each if hz is not None] or [measured]
-    rates = [_nominal_hz(measured)] * len(periods_ns)
-    if max(known) > _RATE_RATIO * min(known):
-        rates = [_nominal_hz(hz or measured) for hz in each]
+        return [DEFAULT_HZ] * len(periods_ns)
+    each = [(len(part) >= _MIN_PERIODS and measured_hz(part)) or measured for part in periods_ns]
+    differ = max(each) > _RATE_RATIO * min(each)
+    rates = [_nominal_hz(hz if differ else measured) for hz in each]
+    if differ:
         context.warn(
-            f"The drives have from {min(known):.3g} to {max(known):.3g} steps a second: a policy "
+            f"The drives have from {min(each):.3g} to {max(each):.3g} steps a second: a policy "
             "learns from one rate at a time."
         )
     elif abs(measured / rates[0] - 1.0) > _WHOLE[0][1]:
         context.note(
-            f"The records are {_described(measured)}, which is taken to be {rates[0]:g} Hz; --hz "
-            "states another rate."
+            f"The records are {about}, which is taken to be {rates[0]:g} Hz; --hz states another "
+            "rate."
         )
-    if odd := [hz for hz in rates if not _SLOWEST_HZ <= hz <= _FASTEST_HZ]:
+    if not all(_SLOWEST_HZ <= hz <= _FASTEST_HZ for hz in rates):
         context.warn(
-            f"The records are {_described(odd[0])}, which no robot has ({_SLOWEST_HZ:g} to "
-            f"{_FASTEST_HZ:g} Hz): perhaps a conversion set their times. State the rate with --hz."
+            f"The records are {about}, but robots have {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz: "
+            "perhaps a conversion set their times. State the rate with --hz."
         )
-    return rates, True
+    return rates
 
 
 def measured_hz(periods_ns: Sequence[float]) -> float | None:
@@ -286,10 +285,6 @@ def _nominal_hz(measured: float) -> float:
         if abs(measured / nominal - 1.0) <= tolerance:
             return nominal
     return float(f"{measured:.4g}")
-
-
-def _described(hz: float) -> str:
-    return f"{1e3 / hz:.4g} ms apart, {hz:.4g} a second"
 
 
 def features_of(

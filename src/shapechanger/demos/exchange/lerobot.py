@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Driver, EpisodeHeader, Step
 from shapechanger.demos.exchange import files, imports
-from shapechanger.demos.exchange.format import ExchangeEpisode, Format, ImportContext, name_in
+from shapechanger.demos.exchange.format import COLUMNS, ExchangeEpisode, Format, ImportContext
 from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, write
 from shapechanger.demos.exchange.pictures import VideoTimes, read_pictures, read_times
@@ -37,7 +37,7 @@ from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
 
 _ACTION, _STATE, _REWARD, _TERMINATED = (
-    name_in("lerobot", field) for field in ("action", "state", "reward", "terminated")
+    COLUMNS[field]["lerobot"] for field in ("action", "state", "reward", "terminated")
 )
 # Largest difference between the time of a step and that of its image, s: `tolerance_s` of lerobot
 # 0.4.4. Rounding to 32 bits and to the ticks of the video is allowed in addition.

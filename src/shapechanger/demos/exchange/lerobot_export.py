@@ -12,14 +12,14 @@ LeRobot takes the time of a step to be its number divided by the rate, so the ro
 kept. Numbers have 32 bits. A state that nothing measured is the middle of its range, because one
 NaN would make all statistics of a dataset NaN.
 
-Statistics have LeRobot's keys and its way to combine episodes (`compute_stats.py` of lerobot
-0.4.4); docs/exchange.md says where their numbers differ.
+Statistics have LeRobot's keys (`compute_stats.py` of lerobot 0.4.4); docs/exchange.md says where
+their numbers differ.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import groupby, islice
 from pathlib import Path
@@ -31,15 +31,14 @@ from numpy.typing import NDArray
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange.files import library, own_fields
 from shapechanger.demos.exchange.format import (
+    COLUMNS,
     ExchangeEpisode,
     ExportContext,
     decoded_steps,
-    name_in,
     value_names,
 )
 from shapechanger.demos.exchange.pictures import VideoWriter
 from shapechanger.errors import DemosError
-from shapechanger.layout import Layout
 
 INFO: Final = "meta/info.json"
 EPISODES: Final = "meta/episodes"
@@ -47,11 +46,11 @@ EPISODES: Final = "meta/episodes"
 OURS: Final = "meta/shapechanger.json"
 """Shapechanger's own file, which LeRobot ignores."""
 
-DONE: Final = name_in("lerobot", "truncated")
+DONE: Final = COLUMNS["truncated"]["lerobot"]
 """Whether an episode ended with a step, for any reason."""
 
 _ACTION, _STATE, _CAMERA, _REWARD, _TERMINATED = (
-    name_in("lerobot", field) for field in ("action", "state", "frame", "reward", "terminated")
+    COLUMNS[field]["lerobot"] for field in ("action", "state", "frame", "reward", "terminated")
 )
 _DATA_PATH: Final = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _VIDEO_PATH: Final = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
@@ -85,14 +84,14 @@ class _Dataset:
         self._folder = folder
         self._context = context
         self._header = header = first.header
-        self._states = Layout.from_json(header.state_layout) if header.state_layout else None
         self._is_filmed = header.image_size is not None and not context.images
         self._rate = Fraction(header.control_hz).limit_denominator(_SMALLEST_FRACTION)
         self._fps = self._rate.numerator if self._rate.denominator == 1 else float(self._rate)
         self._tasks: list[str] = []
         self._places: list[dict[str, Any]] = []  # A row for each episode.
-        self._stats: list[dict[str, _Columns]] = []
         self._headers: list[dict[str, Any]] = []
+        self._parts: list[_Columns] = []  # The numbers of all steps.
+        self._levels = np.zeros((_LEVELS, 3), np.int64)  # How many pixels have each level.
         self._table: Any = None
         self._videos: list[VideoWriter] = []
 
@@ -103,8 +102,8 @@ class _Dataset:
         task = self._context.task or str(said)
         self._tasks += [] if task in self._tasks else [task]
         video = self._new_video() if self._is_filmed else None
-        histograms = np.zeros((_LEVELS, 3), np.int64)
-        steps = self._with_images(episode, video, histograms)
+        levels = np.zeros_like(self._levels)
+        steps = self._with_images(episode, video, levels)
         parts: list[_Columns] = []
         drivers: list[str] = []
         while chunk := list(islice(steps, _ROWS)):
@@ -113,13 +112,6 @@ class _Dataset:
             parts.append(columns)
             drivers += [step.driver for step, _ in chunk]
         count = len(drivers)
-        numbers = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-        stats = {key: _stats_of(values.astype(np.float64)) for key, values in numbers.items()}
-        if header.image_size is not None:
-            levels = np.repeat(np.arange(_LEVELS)[:, None] / (_LEVELS - 1), 3, axis=1)
-            found = _stats_of(levels, histograms)
-            stats[_CAMERA] = {name: value.reshape(-1, 1, 1) for name, value in found.items()}
-            stats[_CAMERA]["count"] = np.array([count])
         place: dict[str, Any] = {
             "episode_index": len(self._places),
             "tasks": [task],
@@ -134,10 +126,11 @@ class _Dataset:
             part["from_timestamp"] = float((video.frames - count) / self._rate)
             part["to_timestamp"] = float(video.frames / self._rate)
             place |= {f"videos/{_CAMERA}/{name}": value for name, value in part.items()}
-        for key, found in stats.items():
-            place |= {f"stats/{key}/{name}": value.tolist() for name, value in found.items()}
+        for key, found in _statistics(parts, levels).items():
+            place |= {f"stats/{key}/{name}": value for name, value in found.items()}
         self._places.append(place)
-        self._stats.append(stats)
+        self._parts += parts
+        self._levels += levels
         runs = [[driver, len(list(group))] for driver, group in groupby(drivers)]
         self._headers.append(own_fields(episode) | {"drivers": runs})
         self.steps += count
@@ -156,17 +149,17 @@ class _Dataset:
         return self._videos[-1]
 
     def _with_images(
-        self, episode: ExchangeEpisode, video: VideoWriter | None, histograms: NDArray[np.int64]
+        self, episode: ExchangeEpisode, video: VideoWriter | None, levels: NDArray[np.int64]
     ) -> Iterator[tuple[Step, bytes]]:
-        """Yield steps with their images, and add the images to the video and the histograms."""
-        shown, counts = np.empty(0, np.uint8), np.zeros_like(histograms)
+        """Yield steps with their images, and add the images to the video and the levels."""
+        shown, counts = np.empty(0, np.uint8), np.zeros_like(levels)
         size = self._header.image_size
         for row, jpeg, pixels in decoded_steps(episode.rows, size, episode.name, "LeRobot"):
             if pixels is not None:
                 colours = pixels.reshape(-1, 3).T
                 counts = np.stack([np.bincount(c, minlength=_LEVELS) for c in colours], axis=1)
                 shown = pixels
-            histograms += counts
+            levels += counts
             if video is not None:
                 video.add(shown)
             yield row.step, jpeg
@@ -175,9 +168,9 @@ class _Dataset:
         """Return the numbers of steps, the first one with a number, shape (n, k) each."""
         frames = np.arange(first, first + len(steps))[:, None]
         columns: _Columns = {_ACTION: _in_32_bits([step.action for step in steps])}
-        if self._states is not None:
+        if layout := self._header.states:
             states = np.array([step.state for step in steps])
-            middles = np.repeat([f.middle for f in self._states], [f.size for f in self._states])
+            middles = np.repeat([f.middle for f in layout], [f.size for f in layout])
             columns[_STATE] = _in_32_bits(np.where(np.isfinite(states), states, middles))
         if self._context.rewarded:
             columns[_REWARD] = _in_32_bits([[step.reward] for step in steps])
@@ -222,9 +215,10 @@ class _Dataset:
             key: {"dtype": str(values.dtype), "shape": [values.shape[1]], "names": None}
             for key, values in columns.items()
         }
-        found[_ACTION] |= _names_of(Layout.from_json(self._header.action_layout))
-        if self._states is not None:
-            found[_STATE] |= _names_of(self._states)
+        for key, layout in ((_ACTION, self._header.actions), (_STATE, self._header.states)):
+            if layout:  # The units are our own addition, which LeRobot ignores.
+                units = [feature.unit for feature in layout for _ in range(feature.size)]
+                found[key] |= {"names": value_names(layout), "units": units}
         if self._header.image_size is not None:
             width, height = self._header.image_size
             found[_CAMERA] = {
@@ -251,10 +245,7 @@ class _Dataset:
         tasks = arrow.table({"task_index": range(len(self._tasks)), _INDEX: self._tasks})
         tasks = tasks.replace_schema_metadata({"pandas": json.dumps(pandas)})
         self._parquet.write_table(tasks, self._folder / "meta/tasks.parquet")
-        stats = {
-            key: {name: value.tolist() for name, value in _combined(self._stats, key).items()}
-            for key in self._features
-        }
+        stats = _statistics(self._parts, self._levels)
         info: dict[str, Any] = {
             "codebase_version": "v3.0",
             "robot_type": self._header.body or self._header.robot or None,
@@ -282,38 +273,34 @@ def _in_32_bits(values: Any) -> NDArray[np.float32]:
         return np.asarray(values, np.float64).astype(np.float32)
 
 
-def _names_of(layout: Layout) -> dict[str, list[str]]:
-    """Return the names of values; the units are our own addition, which LeRobot ignores."""
-    units = [feature.unit for feature in layout for _ in range(feature.size)]
-    return {"names": value_names(layout), "units": units}
+def _statistics(
+    parts: Sequence[_Columns], levels: NDArray[np.int64]
+) -> dict[str, dict[str, list[Any]]]:
+    """Return the statistics of numbers, and of images by how many pixels have each level."""
+    found: dict[str, dict[str, list[Any]]] = {}
+    for key in parts[0]:
+        values = np.concatenate([part[key] for part in parts]).astype(np.float64)
+        numbers = _stats_of(values, np.ones(values.shape, np.int64))
+        found[key] = {name: value.tolist() for name, value in numbers.items()}
+        found[key]["count"] = [len(values)]
+    if levels.any():
+        values = np.repeat(np.arange(_LEVELS)[:, None] / (_LEVELS - 1), 3, axis=1)
+        colours = _stats_of(values, levels)
+        found[_CAMERA] = {name: value.reshape(3, 1, 1).tolist() for name, value in colours.items()}
+        found[_CAMERA]["count"] = found[_ACTION]["count"]
+    return found
 
 
-def _stats_of(values: NDArray[Any], weights: NDArray[np.int64] | None = None) -> _Columns:
+def _stats_of(values: NDArray[np.float64], weights: NDArray[np.int64]) -> _Columns:
     """Return the statistics of columns, shape (n, k), with the weight of each value: (k,) each."""
-    present = np.ones(values.shape, bool) if weights is None else weights > 0
     mean = np.average(values, axis=0, weights=weights)
     quantiles = np.quantile(
         values, list(_QUANTILES.values()), axis=0, method="inverted_cdf", weights=weights
     )
     return {
-        "min": values.min(axis=0, where=present, initial=np.inf),
-        "max": values.max(axis=0, where=present, initial=-np.inf),
+        "min": values.min(axis=0, where=weights > 0, initial=np.inf),
+        "max": values.max(axis=0, where=weights > 0, initial=-np.inf),
         "mean": mean,
         "std": np.sqrt(np.average((values - mean) ** 2, axis=0, weights=weights)),
-        "count": np.array([len(values)]),
         **dict(zip(_QUANTILES, quantiles, strict=True)),
-    }
-
-
-def _combined(episodes: Sequence[Mapping[str, _Columns]], key: str) -> _Columns:
-    """Return the statistics of a feature over all episodes, each weighted by its count."""
-    every = {name: np.stack([one[key][name] for one in episodes]) for name in episodes[0][key]}
-    weights = every["count"][:, 0].reshape(-1)
-    found = {name: np.average(values, axis=0, weights=weights) for name, values in every.items()}
-    spread = every["std"] ** 2 + (every["mean"] - found["mean"]) ** 2
-    return found | {
-        "min": every["min"].min(axis=0),
-        "max": every["max"].max(axis=0),
-        "std": np.sqrt(np.average(spread, axis=0, weights=weights)),
-        "count": every["count"].sum(axis=0),
     }

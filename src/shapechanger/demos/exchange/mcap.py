@@ -11,8 +11,8 @@
 
 Messages are JSON, and their schemas state the units. Log times are on the robot's clock, ns:
 of the capture for images and states, of the decision for actions, and never moved. Where a time
-is unknown, the step follows the one before at the rate of the episode, or precedes the first one
-with a time. The header of the episode is the metadata `shapechanger`. Format: mcap.dev/spec.
+is unknown, the step follows the one before at the rate of the episode, from 0 on. The header of the
+episode is the metadata `shapechanger`. Format: mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -78,36 +78,19 @@ def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
         schema = {"title": name, "type": "object", "properties": properties}
         number = writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
         channels[topic] = writer.register_channel(f"/{topic}", "json", number)
-    for row, seen_ns in _timed(episode):
-        steps += 1
+    period_ns = round(_NS_PER_S / header.control_hz)
+    seen_ns = -period_ns
+    for steps, row in enumerate(episode.rows, 1):  # noqa: B007
+        clock_ns = row.step.clock_ns
+        if clock_ns is None or clock_ns < 0:  # MCAP has no negative times.
+            clock_ns = max(0, seen_ns + period_ns)
+        seen_ns = clock_ns
         acted_ns = max(seen_ns, row.step.decided_ns or 0)
         for topic, message in _messages(row, seen_ns, layouts):
             at_ns = seen_ns if topic in {"camera", "state"} else acted_ns
             data = json.dumps(message, allow_nan=False).encode()
             writer.add_message(channels[topic], log_time=at_ns, publish_time=at_ns, data=data)
     return steps
-
-
-def _timed(episode: ExchangeEpisode) -> Iterator[tuple[ExchangeStep, int]]:
-    """Yield the steps, each with the time of its observation, ns."""
-    period_ns = round(_NS_PER_S / episode.header.control_hz)
-    waiting: list[ExchangeStep] = []  # Of unknown time, before the first step of a known one.
-    at_ns = -period_ns
-    for row in episode.rows:
-        clock_ns = row.step.clock_ns
-        if clock_ns is not None and clock_ns >= 0:  # MCAP has no negative times.
-            at_ns = clock_ns
-        elif at_ns < 0 and episode.header.clock != "none":
-            waiting.append(row)
-            continue
-        else:
-            at_ns = max(0, at_ns + period_ns)
-        for number, earlier in enumerate(waiting):
-            yield earlier, max(0, at_ns - (len(waiting) - number) * period_ns)
-        waiting.clear()
-        yield row, at_ns
-    for number, row in enumerate(waiting):
-        yield row, number * period_ns
 
 
 def _messages(

@@ -35,6 +35,7 @@ from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import files, imports
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
 from shapechanger.demos.exchange.format import (
+    COLUMNS,
     DEFAULT_HZ,
     ExchangeEpisode,
     ExportContext,
@@ -42,7 +43,6 @@ from shapechanger.demos.exchange.format import (
     ImportContext,
     decoded_steps,
     few,
-    name_in,
 )
 from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
@@ -55,7 +55,7 @@ _MAIN: Final = "main_data.hdf5"
 _OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
 _OBSERVATIONS, _FRAME, _JPEG = "observations", "infos/frame", "infos/jpeg"
 _ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
-    name_in("minari", field) for field in ("action", "reward", "terminated", "truncated", "driver")
+    COLUMNS[field]["minari"] for field in ("action", "reward", "terminated", "truncated", "driver")
 )
 _IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys of a step that its JSON lacks.
 _STORAGE: Final = "minari.dataset.minari_storage"

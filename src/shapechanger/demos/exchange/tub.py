@@ -34,6 +34,7 @@ from msgspec.structs import replace
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange import files, imports
 from shapechanger.demos.exchange.format import (
+    COLUMNS,
     COMMANDS,
     ExchangeEpisode,
     ExportContext,
@@ -42,7 +43,6 @@ from shapechanger.demos.exchange.format import (
     counted,
     few,
     kept_steps,
-    name_in,
 )
 from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.errors import DemosError, translate_errors
@@ -55,7 +55,7 @@ _RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _IMAGE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
 _ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
 _USER, _PILOT = ([f"{who}/{axis}" for axis in ("angle", "throttle")] for who in ("user", "pilot"))
-_IMAGE, _MODE = name_in("tub", "frame"), name_in("tub", "driver")
+_IMAGE, _MODE = COLUMNS["frame"]["tub"], COLUMNS["driver"]["tub"]
 _CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
