@@ -9,7 +9,6 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.cli.demos.recordings import DemosExport, DemosImport
 from shapechanger.demos.episodes import Drop, edit
-from shapechanger.errors import UnknownName
 from tests.cli.running import Cli
 from tests.demos.exchange.small import drive, keys_folder, tub_folder
 
@@ -65,11 +64,6 @@ def test_export_prints_a_summary_and_how_to_load(
     assert "minari.load_dataset('drive-v0')" in output
     DemosExport(tmp_path / "data", tmp_path / "csv", "csv", dropped=True).run()
     assert "5 steps of 1 episode\n" in capsys.readouterr().out
-
-
-def test_an_unknown_format(tmp_path: Path) -> None:
-    with pytest.raises(UnknownName, match="Did you mean 'minari'"):
-        DemosExport(drive(tmp_path / "data"), tmp_path / "out", "mniari").run()
 
 
 def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

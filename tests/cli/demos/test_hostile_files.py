@@ -121,14 +121,9 @@ EPISODES: dict[str, Callable[[Path], object]] = {
     "steps of 8 GiB": lambda e: sparse(e / "steps.jsonl", 8 * GIB),
     "steps that are a pipe": lambda e: pipe(e / "steps.jsonl"),
     "steps that are a device": lambda e: link(e / "steps.jsonl", "/dev/zero"),
-    "a header that is a device": lambda e: link(e / "episode.json", "/dev/zero"),
     "an image that is a device": lambda e: (
         steps_with(frame=["000009.jpg", 0, "0"])(e),
         link(e / "frames/000009.jpg", "/dev/zero"),
-    ),
-    "an image that is a pipe": lambda e: (
-        steps_with(frame=["000001.jpg", 0, "0"])(e),
-        pipe(e / "frames/000001.jpg"),
     ),
     "an image of 8 GiB": lambda e: (
         steps_with(frame=["000001.jpg", 8 * GIB, "0"])(e),
@@ -137,19 +132,10 @@ EPISODES: dict[str, Callable[[Path], object]] = {
     "an image elsewhere": steps_with(frame=["../../../secret.jpg", 6, "0"]),
     "a header nested deeply": lambda e: (e / "episode.json").write_bytes(b"[" * 100_000),
     "a step nested deeply": added(nested()),
-    "a step that is cut off": lambda e: (e / "steps.jsonl").write_bytes(
-        (e / "steps.jsonl").read_bytes()[:-20]
-    ),
     "a layout of 10^12 values": header_with(action_layout=LAYOUT),
     "a state of 10^12 values": header_with(state_layout=LAYOUT),
-    "a layout without features": header_with(action_layout={"features": 7}),
     "a rate of nothing": header_with(control_hz=1e-320),
-    "a rate that is text": header_with(control_hz="20"),
     "an action of 10^400": steps_with(action=[HUGE, 0]),
-    "a time of 10^400": steps_with(captured_ns=HUGE),
-    "an index of 10^400": steps_with(step=HUGE),
-    "a driver that is a list": steps_with(driver=["person"]),
-    "terms that are text": steps_with(terms="x" * 1000),
 }
 
 
@@ -224,23 +210,8 @@ def test_a_hostile_picture_is_refused(tmp_path: Path, jail: Jail, name: str) -> 
         refuse(jail(*command))
 
 
-@pytest.fixture(scope="module")
-def bomb(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """300 MB of zeros in about a megabyte."""
-    path = tmp_path_factory.mktemp("bomb") / "bomb.zip"
-    with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
-        archive.open("t.npy", "w", force_zip64=True) as file,
-    ):
-        for _ in range(300):
-            file.write(bytes(1 << 20))
-    return path
-
-
 @pytest.mark.parametrize("command", ["list", "merge", "import", "export", "train", "repair"])
-def test_a_file_in_place_of_a_folder_is_refused(
-    tmp_path: Path, jail: Jail, bomb: Path, command: str
-) -> None:
+def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path, jail: Jail, command: str) -> None:
     """An archive is not unpacked, and a pickle, an HDF5 file or a pipe not opened."""
     options = {
         "merge": ("--out", tmp_path / "out"),
@@ -248,12 +219,12 @@ def test_a_file_in_place_of_a_folder_is_refused(
         "export": ("--out", tmp_path / "out", "--to", "csv"),
         "train": ("--out", tmp_path / "policy.safetensors"),
     }
-    (tmp_path / "bomb.zip").hardlink_to(bomb)
-    (tmp_path / "evil.npz").hardlink_to(bomb)
+    with zipfile.ZipFile(tmp_path / "evil.zip", "w") as archive:
+        archive.writestr("steps.csv", "steering\n0\n")
     (tmp_path / "evil.pkl").write_bytes(b"cos\nsystem\n(S'touch pwned'\ntR.")
     sparse(tmp_path / "evil.hdf5", 8 * GIB)
     os.mkfifo(tmp_path / "pipe")
-    for name in ("bomb.zip", "evil.npz", "evil.pkl", "evil.hdf5", "pipe"):
+    for name in ("evil.zip", "evil.pkl", "evil.hdf5", "pipe"):
         text = refuse(jail(command, tmp_path / name, *options.get(command, ())))
         assert "is a file" in text
 
@@ -279,18 +250,6 @@ TUBS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: edit(f / "manifest.json", '"catalog_1.catalog"', '"catalog_0.catalog"'),
         "names a catalog twice",
     ),
-    "a catalog elsewhere": (
-        lambda f: edit(f / "manifest.json", "catalog_0.catalog", "../secret"),
-        "leaves the folder",
-    ),
-    "an image twice": (
-        lambda f: edit(f / "catalog_0.catalog", "1_cam", "0_cam"),
-        "of another record",
-    ),
-    "an image elsewhere": (
-        lambda f: edit(f / "catalog_0.catalog", "1_cam", "../../1_cam"),
-        "leaves the folder",
-    ),
     "an image of 60000 x 60000 pixels": (
         lambda f: (f / "images/1_cam_image_array_.jpg").write_bytes(huge()),
         "1 record with a damaged image",
@@ -301,17 +260,12 @@ TUBS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: (f / "catalog_0.catalog").write_text("[" * 100_000),
         "with damaged JSON",
     ),
-    "a manifest that is cut off": (
-        lambda f: (f / "manifest.json").write_text("[]\n[]\n"),
-        "manifest.json is damaged",
-    ),
 }
 
 
 @pytest.mark.parametrize("name", TUBS)
 def test_a_hostile_tub_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
     """The error names the file, and nothing is written."""
-    (tmp_path / "secret").write_text("{}")
     records = [{"user/angle": 0.0, "user/throttle": 0.1, "_timestamp_ms": 50 * n} for n in range(4)]
     tub_folder(tmp_path / "tub", records)
     spoil, words = TUBS[name]
@@ -379,10 +333,6 @@ LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: edit(f / "meta/info.json", "2\n            ],", "1000000000\n            ],"),
         "no numeric feature 'action'",
     ),
-    "a file elsewhere": (
-        lambda f: edit(f / "meta/info.json", "data/chunk", "../secret/chunk"),
-        "leaves the folder",
-    ),
     "rows that are a pipe": (lambda f: pipe(f / ROWS), "There is no"),
     "metadata of 8 GiB": (lambda f: sparse(f / PLACES, 8 * GIB), "not an intact Parquet file"),
     "metadata nested deeply": (
@@ -395,7 +345,6 @@ LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
 @pytest.mark.parametrize("name", LEROBOTS)
 def test_a_hostile_lerobot_dataset_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
     """A few kilobytes of Parquet can claim any number of rows, values and bytes."""
-    (tmp_path / "secret").mkdir()
     for count in (30, 2):
         drive(tmp_path / "data", count)
     export_recording(tmp_path / "data", tmp_path / "set", "lerobot", images=True)
@@ -421,19 +370,9 @@ def endless(file: h5py.File, place: str) -> None:
 
 
 DATASETS: dict[str, tuple[str, Callable[[h5py.File, str], object], str]] = {
-    "a soft link to itself": (
-        REWARDS,
-        lambda f, at: f.__setitem__(at, h5py.SoftLink(f"/{at}")),
-        "has no 'rewards' that is an array in this file",
-    ),
     "an external link": (
         REWARDS,
         lambda f, at: f.__setitem__(at, h5py.ExternalLink("/etc/passwd", "/x")),
-        "has no 'rewards' that is an array in this file",
-    ),
-    "data in another file": (
-        REWARDS,
-        lambda f, at: f.create_dataset(at, (5,), "f8", external=[("/etc/passwd", 0, 40)]),
         "has no 'rewards' that is an array in this file",
     ),
     "a chunk of a gigabyte": (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import simplejpeg
+from PIL import Image
 
 from shapechanger.demos.episodes import (
     Episode,
@@ -32,6 +34,13 @@ def picture(seed: int, width: int = 40, height: int = 32, *, grey: bool = False)
         colorspace="GRAY" if grey else "RGB",
         colorsubsampling="Gray" if grey else "420",
     )
+
+
+def image_file(pixels: np.ndarray, kind: str = "PNG", mode: str | None = None) -> bytes:
+    """Return an image file of another kind."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).convert(mode).save(file, kind)
+    return file.getvalue()
 
 
 def huge(width: int = 60_000, height: int = 60_000) -> bytes:

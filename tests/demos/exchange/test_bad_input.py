@@ -83,7 +83,11 @@ FALSE = b"false,false"
 @pytest.mark.parametrize(
     ("own", "spoil", "expected"),
     [
-        (False, lambda f: (f / "2.jpg").unlink(), "1 line with an image that is missing: line 3"),
+        (
+            False,
+            lambda f: (f / "2.jpg").unlink(),
+            "1 line with an image that cannot be read (No such file or directory): line 3",
+        ),
         (False, _edit("2.jpg", lambda jpeg: huge()), "with a damaged image: line 3"),
         (False, _edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
         (False, _table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "line 3: it is not a valid step"),

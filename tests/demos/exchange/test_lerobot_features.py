@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import shutil
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
-from PIL import Image
 
 from shapechanger.demos.exchange import ImportContext, import_recording
 from shapechanger.demos.exchange.lerobot import FORMAT
@@ -25,18 +23,10 @@ from tests.demos.exchange.lerobot_set import (
     write_set,
     write_video,
 )
-from tests.demos.exchange.small import all_of, picture
+from tests.demos.exchange.small import all_of, image_file
 
 AXES = ["height", "width", "channels"]
 COUNT = 16
-
-
-def png(pixels: np.ndarray | Image.Image, kind: str = "PNG") -> bytes:
-    """Return an image file."""
-    file = io.BytesIO()
-    image = pixels if isinstance(pixels, Image.Image) else Image.fromarray(pixels)
-    image.save(file, kind)
-    return file.getvalue()
 
 
 def plain(number: int, channels: int = 3) -> np.ndarray:
@@ -51,53 +41,8 @@ def stored(images: list[Any], feature: dict[str, Any] | None = None) -> dict[str
     return {"video": False, "columns": {CAMERA: column}, "features": {CAMERA: described}}
 
 
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda n: png(plain(n)),
-        lambda n: png(plain(n, 1)),  # Grey.
-        lambda n: png(np.dstack([plain(n), np.full((SIZE, SIZE), 255, np.uint8)])),
-        lambda n: png(Image.fromarray(plain(n)).quantize()),
-    ],
-)
-def test_images_of_8_bits_keep_their_brightness(tmp_path: Path, draw: Any) -> None:
-    folder = write_set(tmp_path / "set", **stored([draw(n) for n in range(COUNT)]))
-    pairs, context = pairs_of(folder)
-    assert pairs == [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
-    assert not context.left_out
-
-
-DEPTH = np.linspace(400, 4000, SIZE * SIZE).reshape(SIZE, SIZE)
-FADED = np.dstack([plain(5), np.full((SIZE, SIZE), 128, np.uint8)])
-
-
-@pytest.mark.parametrize(
-    ("image", "reason"),
-    [
-        (png(DEPTH.astype(np.uint16)), "more than 8 bits a value, like that of a depth camera"),
-        (png(DEPTH.astype(np.float32), "TIFF"), "not JPEG, PNG or BMP"),
-        (png(FADED), "partly transparent"),
-        (png(np.zeros((8, 16, 3), np.uint8)), "of 16 x 8 pixels, and not 32 x 32"),
-        pytest.param(png(plain(5))[:60], "a damaged image", id="cut PNG"),
-        (picture(0, SIZE, SIZE)[:200], "a damaged image"),
-        (None, "an empty image"),
-    ],
-)
-def test_other_images_are_named(tmp_path: Path, image: bytes | None, reason: str) -> None:
-    """A step with another image is left out; a dataset with nothing else is refused."""
-    images = [png(plain(n)) for n in range(COUNT)]
-    folder = write_set(tmp_path / "set", **stored([*images[:5], image, *images[6:]]))
-    pairs, context = pairs_of(folder)
-    assert pairs == [[(n, n) for n in range(8) if n != 5], [(n, n) for n in range(8, 16)]]
-    with pytest.raises(DemosError, match=f"1 step (with|whose).*{reason}.*5 of episode 0"):
-        context.require_whole(folder)
-    folder = write_set(tmp_path / "all", **stored([image] * COUNT))
-    with pytest.raises(DemosError, match=f"nothing to import.*16 steps (with|whose).*{reason}"):
-        import_recording(folder, tmp_path / "back")
-
-
 def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
-    images = [png(plain(n // 4)) for n in range(COUNT)]
+    images = [image_file(plain(n // 4)) for n in range(COUNT)]
 
     def spoil(rows: list[dict[str, Any]]) -> None:
         rows[4]["action"] = [4.0, float("nan")]
@@ -115,17 +60,12 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("shape", "named"),
-    [
-        ([3, SIZE, 16], ["channels", "height", "width"]),
-        ([SIZE, 16, 3], None),
-        ([3, SIZE, 16], None),
-        ([SIZE, 16], None),
-    ],
+    [([3, SIZE, 16], AXES), ([SIZE, 16, 3], None), ([3, SIZE, 16], None), ([SIZE, 16], None)],
 )
 def test_axes_are_found_by_the_number_of_colours(
     tmp_path: Path, shape: list[int], named: list[str] | None
 ) -> None:
-    images = [png(plain(n)[:, :16]) for n in range(COUNT)]
+    images = [image_file(plain(n)[:, :16]) for n in range(COUNT)]
     options = stored(images, {"shape": shape, "names": named})
     import_recording(write_set(tmp_path / "set", **options), tmp_path / "back")
     assert {one.header.image_size for one in all_of(tmp_path / "back")} == {(16, SIZE)}
@@ -143,29 +83,19 @@ def test_other_features_are_named(tmp_path: Path) -> None:
             "observation.words": {"dtype": "string", "shape": [1], "names": None},
             "next.success": {"dtype": "bool", "shape": [1], "names": None},
         },
-        columns={"observation.images.depth": numbers},
+        columns={"observation.images.depth": numbers, "extra": numbers},
     )
-    pairs, context = pairs_of(folder)
-    assert sum(map(len, pairs)) == COUNT
-    (line,) = context.left_out_lines()
-    assert line == (
-        "3 features with images of an unknown kind or of depth: observation.images.depth "
-        "(uint16, 4 x 4 x 1), observation.points (float32, 480 x 640 x 3), observation.scan "
-        "(depth16, 480 x 640)"
-    )
-    assert context.notes == [
-        "The feature observation.words (string, 1) is not imported.",
-        "The feature next.success (bool, 1) is not imported.",
-    ]
-
-
-def test_columns_without_a_feature_are_named(tmp_path: Path) -> None:
-    images = pa.array([{"bytes": png(DEPTH.astype(np.uint16)), "path": "x.png"}] * COUNT)
-    folder = write_set(tmp_path / "set", columns={"observation.images.depth": images})
     pairs, context = pairs_of(folder)
     assert sum(map(len, pairs)) == COUNT
     assert context.left_out_lines() == [
-        "1 column that meta/info.json does not describe: observation.images.depth"
+        "3 features with images of an unknown kind or of depth: observation.images.depth "
+        "(uint16, 4 x 4 x 1), observation.points (float32, 480 x 640 x 3), observation.scan "
+        "(depth16, 480 x 640)",
+        "1 column that meta/info.json does not describe: extra",
+    ]
+    assert context.notes == [
+        "The feature observation.words (string, 1) is not imported.",
+        "The feature next.success (bool, 1) is not imported.",
     ]
 
 
@@ -252,7 +182,7 @@ PLAYLIST = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
         ({"info": {"data_path": "../../{chunk_index}"}}, "leaves the folder"),
         ({"info": {"data_path": "{chunk_index:99d}"}}, "There is no .*99d"),
         ({"info": {"data_path": None}}, "Expected `str`, got `null`.*data_path"),
-        ({"info": {"data_path": "**/*"}}, r"There is no .*\[\*\]"),
+        ({"info": {"data_path": "**/*"}}, r"There is no .*\*"),
         ({"info": {"video_path": "/etc/{video_key}"}}, "video cannot be read.*leaves the folder"),
         (
             {"features": {"action": {"dtype": "string", "shape": [1]}}},

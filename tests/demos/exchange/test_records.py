@@ -6,6 +6,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,10 +20,49 @@ from shapechanger.demos.exchange.imports import (
     stretches,
     with_pictures,
 )
-from tests.demos.exchange.small import header, picture
+from shapechanger.demos.exchange.pictures import PictureError, load_jpeg
+from shapechanger.demos.jpeg import decode_picture
+from tests.demos.exchange.small import header, huge, image_file, picture
 
 GOOD = [picture(n) for n in range(4)]
 BAD: list[Any] = [b"", bytes(9), GOOD[0][:99], picture(0, 8, 8), Path("/nowhere.jpg")]
+
+
+LEVEL = np.full((32, 40, 3), 102, np.uint8)
+DEPTH = np.linspace(400, 4000, 32 * 40).reshape(32, 40)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode"),
+    [*(("PNG", mode) for mode in ("RGB", "RGBA", "L", "P")), ("BMP", "RGB"), ("BMP", "1")],
+)
+def test_images_of_8_bits_become_jpegs(kind: str, mode: str) -> None:
+    data, context = image_file(LEVEL, kind, mode), ImportContext()
+    jpeg, size, is_new = load_jpeg(data)
+    assert (size, is_new) == ((40, 32), True)
+    assert mode == "1" or abs(float(decode_picture(jpeg, "").mean()) - 102) < 1
+    step = Step(action=(0.0,), driver="person")
+    with_pictures([SourceRecord(name="0", step=step, picture=data)], "record", context)
+    assert context.notes == ["1 image encoded as JPEG of quality 100."]
+
+
+@pytest.mark.parametrize(
+    ("image", "reason"),
+    [
+        (image_file(DEPTH.astype(np.uint16)), "more than 8 bits a value, like that of a depth"),
+        (image_file(DEPTH.astype(np.float32), "TIFF"), "not JPEG, PNG or BMP"),
+        (image_file(np.dstack([LEVEL, LEVEL[..., :1]])), "partly transparent"),
+        (image_file(LEVEL)[:60], "a damaged image"),
+        (picture(0)[:200], "a damaged image"),
+        (huge(), "a damaged image"),
+        (picture(0, 16, 8), "of 16 x 8 pixels, and not 40 x 32"),
+        (None, "an empty image"),
+        (bytes(99), "an empty image"),
+    ],
+)
+def test_other_images_are_named(image: bytes | None, reason: str) -> None:
+    with pytest.raises(PictureError, match=reason):
+        load_jpeg(image, (40, 32))
 
 
 @settings(max_examples=25, deadline=None)

@@ -189,6 +189,7 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
     tmp_path: Path, name: str, folder: str
 ) -> None:
     edit(with_a_pause(tmp_path / "data"), Drop(1, 1, "bad"))
+    assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
     done = export_recording(tmp_path / "data", tmp_path / folder, name)
     assert (done.episodes, done.steps) == (3, 7)
     assert done.left_out[0].startswith("1 dropped step")
@@ -207,14 +208,6 @@ def test_steps_that_do_not_follow_each_other_are_separate_episodes(
     began = [datetime.fromisoformat(one.header.created) for one in back]
     after_s = [round((one - began[0]).total_seconds(), 3) for one in began]
     assert after_s == [0.0, 0.1, 7.32]
-
-
-def test_a_whole_episode_is_not_split(tmp_path: Path) -> None:
-    edit(with_a_pause(tmp_path / "data"), Drop(1, 1, "bad"))
-    assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
-    done = export_recording(tmp_path / "data", tmp_path / "all-v0", "minari", dropped=True)
-    assert (done.episodes, done.steps) == (2, 8)
-    assert "split at 1 pause (up to" in done.notes[0]
 
 
 _BEGUN = 10**18

@@ -8,11 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from shapechanger.demos.exchange import Converted, import_recording
 from shapechanger.demos.exchange.imports import measured_hz
@@ -134,7 +132,11 @@ def in_manifest(old: str, new: str) -> Callable[[Path], object]:
 @pytest.mark.parametrize(
     ("spoil", "expected", "lost"),
     [
-        (lambda f: (f / "images/3_cam_image_array_.jpg").unlink(), "that is missing: 3", {3}),
+        (
+            lambda f: (f / "images/3_cam_image_array_.jpg").unlink(),
+            "cannot be read (No such file or directory): 3",
+            {3},
+        ),
         (
             lambda f: (f / "images/0_cam_image_array_.jpg").write_bytes(picture(0, 80, 32)),
             "1 record with an image of 80 x 32 pixels, and not 40 x 32: 0",
@@ -304,20 +306,6 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
     assert warning.startswith("The drives have from 10 to 20 steps a second: a policy learns")
     with pytest.raises(DemosError, match="--hz must be positive"):
         imported(folder, hz=-1.0)
-
-
-@pytest.mark.parametrize(
-    ("mode", "form"), [("RGB", "BMP"), ("L", "PNG"), ("P", "PNG"), ("1", "BMP")]
-)
-def test_pictures_of_other_formats(tmp_path: Path, mode: str, form: str) -> None:
-    made = [r | {"cam/image_array": f"{r['_index']}_cam.{form.lower()}"} for r in records(3)]
-    folder = tub_folder(tmp_path / "tub", made)
-    image = Image.fromarray(np.full((32, 40), 100, np.uint8)).convert(mode)
-    for record in made:
-        image.save(folder / "images" / record["cam/image_array"], form)
-    _, done = imported(folder)
-    assert done.pictures == 3
-    assert done.notes == ("3 images encoded as JPEG of quality 100.",)
 
 
 def test_cameras_of_other_names(tmp_path: Path) -> None:

@@ -31,7 +31,6 @@ from shapechanger.errors import (
     translate_errors,
 )
 from shapechanger.files import read_file, writing
-from shapechanger.layout import Layout
 
 MAX_UNPACKED: Final = 64 << 20
 """Bytes in memory at once, and allowed for any file. An image of `MAX_PIXELS` has 48 MiB."""
@@ -165,13 +164,8 @@ def own_header(fields: Any, where: object) -> tuple[EpisodeHeader, str]:
     if not isinstance(fields, dict):
         raise DemosError(f"{where} has a header that is not a JSON object.")
     plain = cast("dict[str, Any]", fields)
-    try:
-        header = EpisodeHeader.from_json(plain)
-        for layout in filter(None, (header.action_layout, header.state_layout)):
-            Layout.from_json(layout)
-    except (DemosError, LayoutError) as error:
-        raise DemosError(f"{where}: {error}") from error
-    return header, str(plain.get("outcome", ""))
+    with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
+        return EpisodeHeader.from_json(plain), str(plain.get("outcome", ""))
 
 
 def own_episodes(section: Any, where: object, count: int) -> list[Any]:

@@ -12,13 +12,12 @@ What contradicts is left out: one of them is wrong, and nothing says which.
 
 from __future__ import annotations
 
-import glob
 import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, islice, repeat
+from itertools import chain, islice, product, repeat
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, cast
 
@@ -105,14 +104,16 @@ class _Info(msgspec.Struct, kw_only=True):
 
 
 class _Entry(msgspec.Struct, kw_only=True):
-    """A row of `meta/episodes`; the last four columns are of the video, if there is one."""
+    """A row of `meta/episodes`: two columns of the data, and four of the video, if there is one."""
 
     episode_index: Annotated[int, msgspec.Meta(ge=0, lt=_MOST)]
     length: Annotated[int, msgspec.Meta(ge=1, lt=_MOST)]
     tasks: list[Annotated[str, msgspec.Meta(max_length=4096)]]
     dataset_from_index: int
-    chunk_index: int = 0
-    file_index: int = 0
+    data_chunk: int = msgspec.field(name="data/chunk_index")
+    data_file: int = msgspec.field(name="data/file_index")
+    video_chunk: int = msgspec.field(name="chunk_index", default=0)
+    video_file: int = msgspec.field(name="file_index", default=0)
     from_timestamp: _Seconds = 0.0
     to_timestamp: _Seconds = 0.0
 
@@ -140,8 +141,7 @@ class _Dataset:
         self._video = f"videos/{camera.key}/" if camera and camera.kind == "video" else ""
         self._entries = self._read_entries()
         self._most_bytes = files.MAX_UNPACKED  # Of images in the tables, which can share one.
-        self._groups: dict[float, dict[Path, set[int]]] = {}
-        self._find_rows()
+        self._groups: dict[Path, dict[float, set[int]]] = {}
         self._filmed: dict[str, list[_Entry]] = defaultdict(list)
         self._videos: dict[str, VideoTimes | str] = {}
         for entry in self._entries.values():
@@ -169,12 +169,10 @@ class _Dataset:
             if ours:
                 about, outcome, drivers = _own(ours[number], about, f"{own}, episode {number}")
             pictures = self._pictures(entry) if self._video else repeat(None, entry.length)
-            if len(places := self._groups.get(number, {})) != 1:
-                pictures = f"with rows in {len(places)} files"
             if isinstance(pictures, str):
                 self._context.leave_out("episode", pictures, number)
                 continue
-            records = self._records(entry, *places.popitem(), pictures, drivers)
+            records = self._records(entry, pictures, drivers)
             rest = [f"{frame} of episode {number}" for frame in range(entry.length)]
             rows = imports.rows_of(records, self._size, self._context, "step", rest)
             name = f"{self._folder}, episode {number}"
@@ -208,8 +206,8 @@ class _Dataset:
 
     def _read_entries(self) -> dict[int, _Entry]:
         """Return the rows of `meta/episodes` by their number, in order."""
-        fields = _Entry.__struct_fields__ if self._video else _Entry.__struct_fields__[:4]
-        names = [name if n < 4 else self._video + name for n, name in enumerate(fields)]
+        fields = _Entry.__struct_encode_fields__[: None if self._video else 6]
+        names = [name if n < 6 else self._video + name for n, name in enumerate(fields)]
         entries: list[_Entry] = []
         for path in sorted((self._folder / EPISODES).glob("*/*.parquet")):
             files.inside(self._folder, str(path.relative_to(self._folder)), path)
@@ -225,39 +223,31 @@ class _Dataset:
             self._context.warn(about.format(INFO, *totals, EPISODES, *count))
         return dict(sorted(found.items()))
 
-    def _find_rows(self) -> None:
-        """Find the rows of the episodes in all files that fit the template of `info.json`."""
-        pattern = _PLACE.sub("*", glob.escape(self._info.data_path))
-        if not files.is_inside(self._folder, pattern):
-            raise DemosError(f"{self._path}: the name {pattern!r} leaves the folder.")
-        if not (names := sorted(glob.glob(pattern, root_dir=self._folder))):
-            raise DemosError(f"There is no {self._folder / pattern}: restore it.")
-        unknown = set[str]()
-        for name in names:
-            try:
-                path, groups = files.inside(self._folder, name, INFO), dict[float, set[int]]()
-                for group, batch in _batches(path, _KEYS[:1]):
-                    for number in np.unique(_vectors(batch, _KEYS[0], 1, path)).tolist():
-                        groups.setdefault(number, set()).add(group)
-            except DemosError as error:
-                self._context.leave_out("file", imports.unreadable(error), name)
-                continue
+    def _groups_of(self, path: Path) -> dict[float, set[int]]:
+        """Return the row groups of a Parquet file that have rows of each episode."""
+        if path not in self._groups:
+            found = defaultdict[float, set[int]](set)
+            for group, batch in _batches(path, _KEYS[:1]):
+                for number in np.unique(_vectors(batch, _KEYS[0], 1, path)).tolist():
+                    found[number].add(group)
+            self._groups[path] = found
             self._most_bytes += _MAX_PACKED * path.stat().st_size
-            unknown |= set(files.library("pyarrow.parquet", "lerobot").read_schema(path).names)
-            for number, found in groups.items():
-                self._groups.setdefault(number, {})[path] = found
-        for column in sorted(unknown - self._info.features.keys()):
-            if not column.startswith("__index_level_"):  # Of pandas.
-                self._context.leave_out("column", f"that {INFO} does not describe", column)
-        for number in sorted(self._groups.keys() - self._entries.keys()):
-            self._context.leave_out("episode", f"that {EPISODES} does not have", f"{number:g}")
+            names = files.library("pyarrow.parquet", "lerobot").read_schema(path).names
+            for column in sorted(set(names) - self._info.features.keys()):
+                if not column.startswith("__index_level_"):  # Of pandas.
+                    self._context.leave_out("column", f"that {INFO} does not describe", column)
+            for number in sorted(found.keys() - self._entries.keys()):
+                self._context.leave_out("episode", f"that {EPISODES} does not have", f"{number:g}")
+        return self._groups[path]
+
+    def _named(self, template: str, chunk: int, file: int) -> str:
+        """Fill in a template of `info.json`, without Python's own formats."""
+        about = {"chunk_index": str(chunk), "file_index": str(file)}
+        about["video_key"] = self._video.removeprefix("videos/").rstrip("/")
+        return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
 
     def _video_name(self, entry: _Entry) -> str:
-        """Fill in the template of `info.json`, without Python's own formats."""
-        about = {"chunk_index": str(entry.chunk_index), "file_index": str(entry.file_index)}
-        about["video_key"] = self._video.removeprefix("videos/").rstrip("/")
-        template = self._info.video_path or ""
-        return _PLACE.sub(lambda at: about[at[1]].rjust(int(at[2] or 0), "0"), template)
+        return self._named(self._info.video_path or "", entry.video_chunk, entry.video_file)
 
     def _read_video(self, name: str) -> VideoTimes | str:
         """Return the times of a video, or why its episodes are left out."""
@@ -271,16 +261,17 @@ class _Dataset:
         spans_s = np.array(sorted((entry.from_timestamp, entry.to_timestamp) for entry in entries))
         steps_s = np.diff(times.seconds)
         half_s = 0.5 * float(np.median(steps_s)) if len(steps_s) else 0.5 / self._info.fps
-        late_s = times.seconds[0] - spans_s[0, 0]
-        early_s = spans_s[-1, 1] - times.seconds[-1] - 2.0 * half_s
+        shown_s = times.seconds[[0, -1]] + [0.0, 2.0 * half_s]
+        told_s = spans_s[[0, -1], [0, 1]]
+        lost_s = (shown_s - told_s) * [1.0, -1.0]  # At the begin and at the end.
+        about = "{}, which shows {:.4g} to {:.4g} s where {} says {:.4g} to {:.4g} s".format(
+            name, *shown_s, EPISODES, *told_s
+        )
         # If an image is lost, the ones after it moved up, and nothing says which one is lost.
-        if late_s > half_s:
-            return f"of {name}, which begins {late_s:.4g} s later than {EPISODES} says"
-        if early_s > half_s:
-            return f"of {name}, which ends {early_s:.4g} s earlier than {EPISODES} says"
-        if min(late_s, early_s) < -half_s:
-            more_s = -min(late_s, early_s)
-            self._context.warn(f"{name} has {more_s:.4g} s more of images than {EPISODES} says.")
+        if lost_s.max() > half_s:
+            return f"of {about}"
+        if lost_s.min() < -half_s:
+            self._context.warn(f"There are more images in {about}.")
         if (np.diff(spans_s.ravel()) < -half_s).any():
             return f"whose parts of {name} overlap, or end before they begin"
         return times
@@ -303,8 +294,6 @@ class _Dataset:
     def _records(
         self,
         entry: _Entry,
-        path: Path,
-        groups: Iterable[int],
         pictures: Iterable[NDArray[np.uint8] | None],
         drivers: Sequence[Driver],
     ) -> Iterator[SourceRecord]:
@@ -315,7 +304,9 @@ class _Dataset:
         steps = enumerate(pictures)
         done, read = 0, b""
         stored = [self._stored] if self._stored else []
-        for _, batch in _batches(path, [*sizes, *stored], groups):
+        name = self._named(self._info.data_path, entry.data_chunk, entry.data_file)
+        path = files.inside(self._folder, name, f"{self._folder / EPISODES} with {INFO}")
+        for _, batch in _batches(path, [*sizes, *stored], self._groups_of(path)[number]):
             columns = {key: _vectors(batch, key, size, path) for key, size in sizes.items()}
             ours = np.flatnonzero(columns[_KEYS[0]] == number)
             if not len(ours):
@@ -424,20 +415,19 @@ def _batches(
         # Otherwise a whole row group is in memory, which may be an episode of images.
         with parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:
             about, size = file.metadata, path.stat().st_size
-            parts = [
-                about.row_group(group).column(n)
-                for group in range(about.num_row_groups)
-                for n in range(about.num_columns)
-            ]
-            claims = [max(part.total_uncompressed_size, 8 * part.num_values) for part in parts]
-            if (most := sum(claims)) > files.MAX_UNPACKED + _MAX_PACKED * size:
+            every = product(range(about.num_row_groups), range(about.num_columns))
+            parts = [about.row_group(group).column(n) for group, n in every]
+            sizes = [max(part.total_uncompressed_size, 8 * part.num_values) for part in parts]
+            claims = [(n, part.path_in_schema) for n, part in zip(sizes, parts, strict=True)]
+            if (most := sum(sizes)) > files.MAX_UNPACKED + _MAX_PACKED * size:
                 raise DemosError(f"{path} has {size} bytes, but claims to unpack to {most}.")
             if about.num_rows > size:
                 raise DemosError(f"{path} has {size} bytes, but claims {about.num_rows} rows.")
             if missing := [key for key in columns if key not in file.schema_arrow.names]:
                 raise DemosError(f"{path} has no column {missing[0]!r}.")
             # Many rows may share one large value, which is in memory once for each.
-            rows = max(1, min(_ROWS, files.MAX_UNPACKED // max([1, *claims])))
+            largest = max((n for n, name in claims if name.startswith(tuple(columns))), default=1)
+            rows = max(1, min(_ROWS, files.MAX_UNPACKED // max(1, largest)))
             for group in range(about.num_row_groups) if groups is None else sorted(groups):
                 for batch in file.iter_batches(rows, row_groups=[group], columns=columns):
                     yield group, batch

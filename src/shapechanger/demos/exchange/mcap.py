@@ -64,9 +64,8 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
 def _write_messages(episode: ExchangeEpisode, writer: Any) -> int:
     header, steps = episode.header, 0
-    actions = Layout.from_json(header.action_layout)
-    layouts = {"state": Layout.from_json(header.state_layout)} if header.state_layout else {}
-    layouts |= {"action": actions, "applied": actions, "wanted": actions}
+    layouts = {"state": header.states} if header.state_layout else {}
+    layouts |= dict.fromkeys(("action", "applied", "wanted"), header.actions)
     schemas = {topic: _properties(layout) for topic, layout in layouts.items()}
     schemas |= {"reward": _REWARD, "step": _STEP}
     if header.image_size is not None:

@@ -47,7 +47,7 @@ from shapechanger.demos.exchange.format import (
 from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
 from shapechanger.errors import DemosError, translate_errors
-from shapechanger.layout import Feature, Layout
+from shapechanger.layout import Feature
 
 _DATA: Final = "data"
 _METADATA: Final = "metadata.json"
@@ -368,7 +368,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     storage = library(_STORAGE).MinariStorage.new(
         (folder / _DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=space,
-        action_space=_box(header.action_layout),
+        action_space=spaces.Box(header.actions.low, header.actions.high, dtype=np.float64),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
@@ -406,12 +406,6 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
     return total
 
 
-def _box(layout: str) -> spaces.Box:
-    """Return the space of the values of a layout, in 64 bits, so that nothing is rounded."""
-    named = Layout.from_json(layout)
-    return spaces.Box(named.low, named.high, dtype=np.float64)
-
-
 def _space_of(episode: ExchangeEpisode, jpeg: bytes | None) -> tuple[Any, spaces.Box | None]:
     """Return the space of all observations by the first image, and its part of the images."""
     header, found, picture = episode.header, dict[str, spaces.Space[Any]](), None
@@ -422,7 +416,7 @@ def _space_of(episode: ExchangeEpisode, jpeg: bytes | None) -> tuple[Any, spaces
         shape = (height, width) if grey else (height, width, 3)
         found["image"] = picture = spaces.Box(0, 255, shape, np.uint8)
     if header.state_layout:
-        found["state"] = _box(header.state_layout)
+        found["state"] = spaces.Box(header.states.low, header.states.high, dtype=np.float64)
     if not found:
         raise DemosError(f"{episode.name} has neither images nor a state: export it to csv.")
     return spaces.Dict(found) if len(found) > 1 else next(iter(found.values())), picture

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES
 from shapechanger.demos.exchange.files import MAX_UNPACKED, library
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
-from shapechanger.errors import DemosError, OutputError, translate_errors
+from shapechanger.errors import DemosError, MissingExtra, OutputError, translate_errors
 from shapechanger.files import read_file
 
 _JPEG: Final = b"\xff\xd8"
@@ -55,23 +55,21 @@ def load_jpeg(
     if isinstance(picture, np.ndarray):
         pixels = picture
     else:
-        try:
+        reason = "with an image that cannot be read ({})"
+        with translate_errors(
+            OSError, to=lambda error: PictureError(reason.format(error.strerror or error))
+        ):
             read = isinstance(picture, Path)
             data = read_file(picture, MAX_PICTURE_BYTES) if read else picture or b""
-        except FileNotFoundError as error:
-            raise PictureError("with an image that is missing") from error
-        except OSError as error:
-            reason = f"with an image that cannot be read ({error.strerror or error})"
-            raise PictureError(reason) from error
         if not data.strip(b"\0"):
             raise PictureError("with an empty image")
         if len(data) > MAX_PICTURE_BYTES:
             raise PictureError(f"with an image of more than {MAX_PICTURE_BYTES} bytes")
         try:
             pixels = decode_picture(data, "") if data.startswith(_JPEG) else _pixels(data)
-        except PictureError:
+        except (PictureError, MissingExtra):
             raise
-        except DemosError as error:
+        except Exception as error:  # Pillow's errors have no common base.
             raise PictureError("with a damaged image") from error
     found, is_jpeg = (pixels.shape[1], pixels.shape[0]), data.startswith(_JPEG)
     if size is not None and found != size:
@@ -90,19 +88,13 @@ def _pixels(data: bytes) -> NDArray[np.uint8]:
         raise PictureError("with an image that is not JPEG, PNG or BMP")
     if data.startswith(_PNG) and data[_PNG_DEPTH] == b"\x10":
         raise PictureError("with an image of more than 8 bits a value, like that of a depth camera")
-    image = library("PIL.Image")
-    try:
-        with image.open(io.BytesIO(data), formats=["PNG", "BMP"]) as opened:
-            if opened.width * opened.height > MAX_PIXELS:
-                raise PictureError(f"with an image of more than {MAX_PIXELS} pixels")
-            alpha = opened.convert("RGBA") if opened.has_transparency_data else None
-            if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
-                raise PictureError("with an image that is partly transparent")
-            return np.asarray(opened.convert("RGB"))
-    except PictureError:
-        raise
-    except Exception as error:  # Pillow's errors have no common base.
-        raise PictureError("with a damaged image") from error
+    with library("PIL.Image").open(io.BytesIO(data), formats=["PNG", "BMP"]) as opened:
+        if opened.width * opened.height > MAX_PIXELS:
+            raise PictureError(f"with an image of more than {MAX_PIXELS} pixels")
+        alpha = opened.convert("RGBA") if opened.has_transparency_data else None
+        if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
+            raise PictureError("with an image that is partly transparent")
+        return np.asarray(opened.convert("RGB"))
 
 
 class VideoWriter:

@@ -346,15 +346,13 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) 
 
 
 def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
-    header = episode.header
-    action = Layout.from_json(header.action_layout)
-    state = Layout.from_json(header.state_layout) if header.state_layout else None
-    if action.names != _ACTIONS.names or (state and state.size != len(state)):
+    action, state = episode.header.actions, episode.header.states
+    if action.names != _ACTIONS.names or state.size != len(state):
         raise DemosError(
             f"{episode.name} has the action {', '.join(action.names)}, or a state with arrays, but "
             f"a tub {', '.join(_ACTIONS.names)} and single numbers: export it to minari or csv."
         )
-    return state.names if state else ()
+    return state.names
 
 
 def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
