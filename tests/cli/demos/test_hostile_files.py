@@ -337,7 +337,7 @@ LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "metadata of 8 GiB": (lambda f: sparse(f / PLACES, 8 * GIB), "not an intact Parquet file"),
     "metadata nested deeply": (
         lambda f: (f / "meta/info.json").write_text("[" * 100_000),
-        "is not valid JSON",
+        "not valid JSON",
     ),
 }
 

@@ -195,7 +195,7 @@ def _with_rest(text: str) -> Callable[[Path], None]:
         ("keys", _edit("steps.csv", lambda t: t.splitlines(True)[0]), "There is nothing to import"),
         ("keys", _edit("steps.csv", lambda t: t + b'"open'), "is not valid CSV"),
         ("keys", _table(b"backward", b"forward"), "two columns of one name"),
-        ("csv", _edit("header.json", lambda t: t[:40]), "is not valid JSON"),
+        ("csv", _edit("header.json", lambda t: t[:40]), "not valid JSON"),
         ("csv", _swap("header.json", b'"format": 1', b'"format": 9'), "format 9"),
         ("csv", _swap("header.json", b'"unit"', b'"u"'), "not a layout"),
         (
@@ -212,7 +212,7 @@ def _with_rest(text: str) -> Callable[[Path], None]:
         ),
         ("minari", lambda f: (f / "data/main_data.hdf5").unlink(), "names: restore it"),
         ("minari", _edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
-        ("minari", _edit("data/metadata.json", lambda b: b[:3000]), "is not valid JSON"),
+        ("minari", _edit("data/metadata.json", lambda b: b[:3000]), "not valid JSON"),
         ("minari", _swap("data/metadata.json", b'"hdf5"', b'"arrow"'), "'arrow'"),
         ("minari", _in_file(lambda f: f.__delitem__("episode_0/rewards")), "has no 'rewards'"),
         ("minari", _in_file(_frameless), "infos/step of step 0 of episode_0 is damaged: "),

@@ -187,9 +187,9 @@ def test_refused_exports(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"format": 1, "episodes": []}', "does not describe the 1 episodes"),
-        ('{"format": 2}', "in format 1"),
-        ('{"format": 1, "episodes": [7]}', "not a JSON object"),
+        ('{"format": 1, "episodes": []}', "describes 0 episodes, and the dataset has 1"),
+        ('{"format": 2}', "Invalid enum value 2"),
+        ('{"format": 1, "episodes": [7]}', "Expected `object`, got `int`"),
     ],
 )
 def test_our_own_file_must_fit(tmp_path: Path, text: str, message: str) -> None:

@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext
-from shapechanger.demos.exchange.format import kept_steps
-from shapechanger.demos.exchange.imports import (
-    SourceRecord,
-    rows_of,
-    stretches,
-    with_pictures,
-)
-from shapechanger.demos.exchange.pictures import PictureError, load_jpeg
+from shapechanger.demos.exchange.format import SourceRecord, kept_steps, stretches
+from shapechanger.demos.exchange.pictures import PictureError, load_jpeg, rows_of, with_pictures
 from shapechanger.demos.jpeg import decode_picture
 from tests.demos.exchange.small import header, huge, image_file, picture
 

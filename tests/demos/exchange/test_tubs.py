@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.exchange import Converted, import_recording
-from shapechanger.demos.exchange.imports import measured_hz
+from shapechanger.demos.exchange.format import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from tests.demos.exchange.small import all_of, picture, tub_folder
 

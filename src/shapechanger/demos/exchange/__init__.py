@@ -2,9 +2,9 @@
 
 A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
 `Format` (`format`); `formats` finds our own and those of the entry points `shapechanger.formats`.
-`format.COLUMNS` names each column of a step. `files` and `pictures` load what strangers made,
-within one budget; `imports` checks records and measures rates. Sources are never changed, and
-targets appear atomically.
+`format.COLUMNS` names each column of a step, and rates are measured there. `files` and `pictures`
+load and check what strangers made, within one budget. Sources are never changed, and targets appear
+atomically.
 """
 
 from __future__ import annotations

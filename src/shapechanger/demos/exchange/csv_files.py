@@ -22,7 +22,7 @@ from typing import Any, Final
 import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, imports
+from shapechanger.demos.exchange import files, pictures
 from shapechanger.demos.exchange.format import (
     COLUMNS,
     COMMANDS,
@@ -31,9 +31,12 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     Format,
     ImportContext,
+    SourceRecord,
+    as_json,
+    features_of,
+    stretches,
     value_names,
 )
-from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.errors import DemosError, translate_errors
 
 _TABLE: Final = "steps.csv"
@@ -120,7 +123,7 @@ def _own(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     if context.hz is not None:
         raise DemosError("The format csv states the rate itself: leave out --hz.")
     path, where = folder / _HEADER, folder / _TABLE
-    header, outcome = files.own_header(files.read_json_object(path), path)
+    header, outcome = files.own_header(files.read_json(path), path)
     columns = _columns(header)
     expected = list(chain.from_iterable(columns.values()))
     table = files.read_table(where, len(expected))
@@ -131,7 +134,7 @@ def _own(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     records = _records(folder / _FRAMES, where, table, columns, None, context)
     if header.image_size is None and any(record.frame for record in records):
         raise DemosError(f"{where} has images, but {path} has no image_size.")
-    rows = imports.rows_of(records, header.image_size, context, "line")
+    rows = pictures.rows_of(records, header.image_size, context, "line")
     yield ExchangeEpisode(header=header, rows=rows, name=str(folder), outcome=outcome)
 
 
@@ -157,13 +160,13 @@ def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         context.note(f"Columns that are not imported: {', '.join(sorted(others))}.")
     table[1][0] = (1, names)
     found = _records(folder, path, table, columns, dict(known), context)
-    records, size = imports.with_pictures(found, "line", context)
+    records, size = pictures.with_pictures(found, "line", context)
     layouts: list[str] = []
     for field in ("action", "state"):
         values = [name.removeprefix(_NAMES[field]) for name in columns[field]]
-        features = [COMMANDS.get(name) or imports.features_of(name, 1)[0] for name in values]
-        layouts.append(imports.as_json(features))
-    for part, hz, timed in imports.stretches([records] if records else [], "line", context):
+        features = [COMMANDS.get(name) or features_of(name, 1)[0] for name in values]
+        layouts.append(as_json(features))
+    for part, hz, timed in stretches([records] if records else [], "line", context):
         header = EpisodeHeader(
             action_layout=layouts[0],
             state_layout=layouts[1],
@@ -172,7 +175,7 @@ def _others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             clock="real" if timed else "none",
             source="csv",
         )
-        rows = imports.rows_of(part, size, context, "line")
+        rows = pictures.rows_of(part, size, context, "line")
         yield ExchangeEpisode(header=header, rows=rows, name=f"{folder}, from {part[0].name}")
 
 

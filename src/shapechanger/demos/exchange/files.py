@@ -18,7 +18,9 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, Literal
+
+import msgspec
 
 from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.demos.episodes.records import MAX_TEXT_BYTES
@@ -138,20 +140,33 @@ def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[
     return separator, lines[1:] if stated else lines
 
 
-def parse_json(text: str, where: str) -> Any:
-    """Parse JSON."""
+class _OwnEpisodes(msgspec.Struct):
+    """Our own part of a dataset: the header of each episode, with its outcome."""
+
+    format: Literal[1]
+    episodes: list[dict[str, Any]]
+
+
+def converted(plain: Any, kind: Any, where: object, *, strict: bool = True) -> Any:
+    """Return what a file holds as a type that msgspec knows."""
     try:
-        return json.loads(text)
+        return msgspec.convert(plain, kind, strict=strict)
+    except msgspec.ValidationError as error:
+        raise DemosError(f"{where} is damaged: {error}.") from error
+
+
+def parse_json(text: str | bytes, where: object, kind: Any) -> Any:
+    """Parse JSON of a type that msgspec knows."""
+    try:
+        plain = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise DemosError(f"{where} is not valid JSON ({error}).") from error
+        raise DemosError(f"{where} is damaged: not valid JSON ({error}).") from error
+    return converted(plain, kind, where)
 
 
-def read_json_object(path: Path) -> dict[str, Any]:
-    """Read a file that holds a JSON object."""
-    value = parse_json(read_text(path), str(path))
-    if not isinstance(value, dict):
-        raise DemosError(f"{path} is not a JSON object.")
-    return cast("dict[str, Any]", value)
+def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
+    """Read a file of JSON."""
+    return parse_json(read_text(path), path, kind)
 
 
 def own_fields(episode: ExchangeEpisode) -> dict[str, Any]:
@@ -159,25 +174,21 @@ def own_fields(episode: ExchangeEpisode) -> dict[str, Any]:
     return episode.header.to_json() | {"outcome": episode.outcome}
 
 
-def own_header(fields: Any, where: object) -> tuple[EpisodeHeader, str]:
+def own_header(fields: dict[str, Any], where: object) -> tuple[EpisodeHeader, str]:
     """Return the header and the outcome of an episode that Shapechanger exported."""
-    if not isinstance(fields, dict):
-        raise DemosError(f"{where} has a header that is not a JSON object.")
-    plain = cast("dict[str, Any]", fields)
     with translate_errors(DemosError, LayoutError, to=lambda e: DemosError(f"{where}: {e}")):
-        return EpisodeHeader.from_json(plain), str(plain.get("outcome", ""))
+        return EpisodeHeader.from_json(fields), str(fields.get("outcome", ""))
 
 
-def own_episodes(section: Any, where: object, count: int) -> list[Any]:
+def own_episodes(section: Any, where: object, count: int) -> list[dict[str, Any]]:
     """Return the `own_fields` of the `count` episodes of a dataset that Shapechanger exported."""
-    fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
-    episodes = cast("list[Any]", fields.get("episodes"))
-    if fields.get("format") != 1 or type(episodes) is not list or len(episodes) != count:
+    own: _OwnEpisodes = converted(section, _OwnEpisodes, where)
+    if len(own.episodes) != count:
         raise DemosError(
-            f"{where} does not describe the {count} episodes of the dataset in format 1: remove "
+            f"{where} describes {len(own.episodes)} episodes, and the dataset has {count}: remove "
             "it if the dataset was edited."
         )
-    return episodes
+    return own.episodes
 
 
 def cannot_read(path: Path, error: OSError) -> DemosError:

@@ -26,11 +26,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Driver, EpisodeHeader, Step
-from shapechanger.demos.exchange import files, imports
-from shapechanger.demos.exchange.format import COLUMNS, ExchangeEpisode, Format, ImportContext
-from shapechanger.demos.exchange.imports import SourceRecord
+from shapechanger.demos.exchange import files
+from shapechanger.demos.exchange.format import (
+    COLUMNS,
+    ExchangeEpisode,
+    Format,
+    ImportContext,
+    SourceRecord,
+    as_json,
+    choose_camera,
+    features_of,
+)
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, write
-from shapechanger.demos.exchange.pictures import VideoTimes, read_pictures, read_times
+from shapechanger.demos.exchange.pictures import VideoTimes, read_pictures, read_times, rows_of
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature
@@ -125,7 +133,7 @@ class _Dataset:
         self._folder = folder
         self._context = context
         self._path = folder / INFO
-        self._info: _Info = _converted(files.read_json_object(self._path), _Info, self._path)
+        self._info: _Info = files.read_json(self._path, _Info)
         if not (version := self._info.codebase_version).startswith("v3."):
             raise DemosError(
                 f"{folder} has version {version} of LeRobot's format, and only 3 can be imported: "
@@ -161,7 +169,7 @@ class _Dataset:
         )
         own, ours = self._folder / OURS, list[Any]()
         if own.is_file():
-            ours = files.own_episodes(files.read_json_object(own), own, max(self._entries) + 1)
+            ours = files.own_episodes(files.read_json(own), own, max(self._entries) + 1)
         for number, entry in self._entries.items():
             drivers, outcome = list[Driver](), ""
             task = {"task": ", ".join(entry.tasks)} if entry.tasks else {}
@@ -174,7 +182,7 @@ class _Dataset:
                 continue
             records = self._records(entry, pictures, drivers)
             rest = [f"{frame} of episode {number}" for frame in range(entry.length)]
-            rows = imports.rows_of(records, self._size, self._context, "step", rest)
+            rows = rows_of(records, self._size, self._context, "step", rest)
             name = f"{self._folder}, episode {number}"
             yield ExchangeEpisode(header=about, rows=rows, name=name, outcome=outcome)
             if self._most_bytes < 0:
@@ -193,7 +201,7 @@ class _Dataset:
         self._columns = {_REWARD, DONE, _TERMINATED} & single
         cameras = {f.key.removeprefix(_CAMERAS): f for f in features if f.role == "picture"}
         context.camera = context.camera.removeprefix(_CAMERAS)
-        self._camera = cameras.get(imports.choose_camera(self._folder, list(cameras), context))
+        self._camera = cameras.get(choose_camera(self._folder, list(cameras), context))
         taken = {_ACTION, *(f.key for f in self._states), *self._columns, *_KEYS, "task_index"}
         for feature in features:
             if feature.key not in taken and feature is not self._camera:
@@ -213,7 +221,7 @@ class _Dataset:
             files.inside(self._folder, str(path.relative_to(self._folder)), path)
             for _, batch in _batches(path, names):
                 rows = batch.rename_columns(list(fields)).to_pylist()
-                entries += _converted(rows, list[_Entry], path, strict=False)
+                entries += files.converted(rows, list[_Entry], path, strict=False)
         found = {entry.episode_index: entry for entry in entries}
         if not found or len(found) < len(entries):
             raise DemosError(f"{self._folder / EPISODES} does not have each episode once.")
@@ -356,13 +364,6 @@ def _bytes(image: Any) -> bytes:
     return data if isinstance(data, bytes) else b""
 
 
-def _converted(plain: object, kind: Any, path: Path, *, strict: bool = True) -> Any:
-    try:
-        return msgspec.convert(plain, kind, strict=strict)
-    except msgspec.ValidationError as error:
-        raise DemosError(f"{path} does not have what LeRobot writes: {error}.") from error
-
-
 def _flat_names(plain: Any) -> tuple[str, ...]:
     """Return names that are a list, lists in a dictionary, or a dictionary of their positions.
 
@@ -386,14 +387,14 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
         if names and (len(set(names)) != size or not all(names)):
             context.note(f"The names of {feature.key} do not fit its {size} values: numbers do.")
             names = []
-        found += imports.features_of(key, size, names=names, units=_flat_names(feature.units))
-    return imports.as_json(found)
+        found += features_of(key, size, names=names, units=_flat_names(feature.units))
+    return as_json(found)
 
 
 def _own(plain: Any, found: EpisodeHeader, where: str) -> tuple[EpisodeHeader, str, list[Driver]]:
     """Return the header and the outcome of an own episode, and the driver of each step."""
     header, outcome = files.own_header(plain, where)
-    runs = _converted(plain.get("drivers", []), list[tuple[Driver, int]], Path(where))
+    runs = files.converted(plain.get("drivers", []), list[tuple[Driver, int]], where)
     drivers = islice(chain.from_iterable(repeat(*run) for run in runs), _MOST)
     ours, theirs = ((one.actions.size, one.states.size, one.image_size) for one in (header, found))
     if ours != theirs:

@@ -32,7 +32,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, imports
+from shapechanger.demos.exchange import files, pictures
 from shapechanger.demos.exchange.files import MAX_UNPACKED, MAX_VALUES, library
 from shapechanger.demos.exchange.format import (
     COLUMNS,
@@ -41,10 +41,12 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     Format,
     ImportContext,
+    SourceRecord,
+    as_json,
     decoded_steps,
+    features_of,
     few,
 )
-from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.demos.jpeg import MAX_PIXELS, is_grey, picture_size
 from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Feature
@@ -156,7 +158,7 @@ def _columns(file: Any, number: int, parts: _Parts) -> dict[str, Any]:
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     place = _data_folder(folder) or folder
     path = place / _METADATA
-    metadata = files.read_json_object(path)
+    metadata = files.read_json(path)
     if metadata.get("data_format", "hdf5") != "hdf5":
         raise DemosError(f"{folder} is stored as {metadata['data_format']!r}: only 'hdf5' is read.")
     main = files.inside(place, _MAIN, path)
@@ -179,7 +181,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
                 columns = _columns(file, number, parts)
                 steps = len(columns[_TERMINATED])
         except DemosError as error:
-            context.leave_out("episode", imports.unreadable(error), number)
+            context.leave_out("episode", pictures.unreadable(error), number)
             continue
         others |= set() if ours else infos
         if _REWARD not in columns:
@@ -189,7 +191,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             raise DemosError(f"{main} claims at least {claimed} values, but has {most} bytes.")
         rest = [f"{n} of episode_{number}" for n in range(steps)]
         records, size = _records(main, number, parts), parts.header.image_size
-        rows = imports.rows_of(records, size, context, "step", rest)
+        rows = pictures.rows_of(records, size, context, "step", rest)
         name = f"{main}, episode_{number}"
         yield ExchangeEpisode(header=parts.header, rows=rows, name=name, outcome=outcome)
     with _opened(main) as file:
@@ -216,8 +218,8 @@ def _parts(metadata: Mapping[str, Any], path: Path, context: ImportContext) -> _
     if not known:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
     header = EpisodeHeader(
-        action_layout=imports.as_json(list(chain(*actions.values()))),
-        state_layout=imports.as_json(list(chain(*states.values()))),
+        action_layout=as_json(list(chain(*actions.values()))),
+        state_layout=as_json(list(chain(*states.values()))),
         image_size=next(iter(pictures.values()), None),
         control_hz=float(hz) if known else DEFAULT_HZ,
         clock="none",
@@ -291,7 +293,7 @@ def _features(
             low, high = (
                 np.broadcast_to(np.ravel(end).astype(float), size).tolist() for end in ends
             )
-            found[part + at] = imports.features_of(name, size, low=low, high=high)
+            found[part + at] = features_of(name, size, low=low, high=high)
     return found
 
 

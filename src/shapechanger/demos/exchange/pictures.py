@@ -9,20 +9,31 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Generator, Sequence
+from collections import Counter
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.demos.episodes import DRIVERS, Step
 from shapechanger.demos.episodes.records import MAX_PICTURE_BYTES
 from shapechanger.demos.exchange.files import MAX_UNPACKED, library
+from shapechanger.demos.exchange.format import ExchangeStep, ImportContext, SourceRecord, counted
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture
-from shapechanger.errors import DemosError, MissingExtra, OutputError, translate_errors
+from shapechanger.errors import (
+    DemosError,
+    MissingExtra,
+    OutputError,
+    ShapechangerError,
+    UnknownName,
+    translate_errors,
+)
 from shapechanger.files import read_file
 
 _JPEG: Final = b"\xff\xd8"
@@ -95,6 +106,85 @@ def _pixels(data: bytes) -> NDArray[np.uint8]:
         if alpha is not None and np.asarray(alpha)[..., 3].min() < _OPAQUE:
             raise PictureError("with an image that is partly transparent")
         return np.asarray(opened.convert("RGB"))
+
+
+def rows_of(
+    records: Iterable[SourceRecord],
+    size: tuple[int, int] | None,
+    context: ImportContext,
+    what: str,
+    rest: Sequence[str] = (),
+) -> Iterator[ExchangeStep]:
+    """Yield the steps of the records that are whole; the others are reported.
+
+    Args:
+        records: The records of an episode in order.
+        size: Width and height of the images, pixels; None to leave out images.
+        context: Collects what is left out.
+        what: A record, as a noun for reports.
+        rest: Names of all records, of which those are reported that a damaged file does not have.
+    """
+    shown: object = None
+    done = 0
+    try:
+        for done, record in enumerate(records, 1):  # noqa: B007
+            frame = record.picture if record.frame is None else record.frame
+            jpeg, fault = None, record.fault or _fault(record.step)
+            if size is not None and record.picture is not None and frame != shown and not fault:
+                try:
+                    jpeg, *_ = load_jpeg(record.picture, size)
+                except PictureError as error:
+                    fault = str(error)
+            if fault:
+                context.leave_out(what, fault, record.name)
+                continue
+            shown = shown if jpeg is None else frame
+            yield ExchangeStep(
+                step=record.step, jpeg=jpeg, marks=record.marks, dropped=record.dropped
+            )
+    except DemosError as error:
+        for name in rest[done:]:
+            context.leave_out(what, unreadable(error), name)
+
+
+def unreadable(error: ShapechangerError) -> str:
+    """Return a reason to leave a part out, after a noun."""
+    return f"that cannot be read ({str(error).removesuffix('.')})"
+
+
+def _fault(step: Step) -> str:
+    if not all(map(isfinite, step.action)):
+        return "with an action that is not finite"
+    if step.driver not in DRIVERS:
+        return unreadable(UnknownName("driver", step.driver, DRIVERS))
+    return ""
+
+
+def with_pictures(
+    records: Sequence[SourceRecord], what: str, context: ImportContext
+) -> tuple[list[SourceRecord], tuple[int, int] | None]:
+    """Return the records with a whole image, or with none, and the most frequent size.
+
+    All images are decoded, so that rates and jumps follow from the records that remain.
+    """
+    sizes: dict[int, tuple[int, int]] = {}
+    encoded = 0
+    for place, record in enumerate(records):
+        if record.picture is not None and not record.fault:
+            try:
+                _, sizes[place], is_new = load_jpeg(record.picture)
+                encoded += is_new
+            except PictureError as error:
+                record.fault = str(error)
+    common = Counter(sizes.values()).most_common(1)[0][0] if sizes else None
+    for place, record in enumerate(records):
+        if common is not None and (size := sizes.get(place, common)) != common:
+            record.fault = other_size(size, common)
+        if record.fault:
+            context.leave_out(what, record.fault, record.name)
+    if encoded:
+        context.note(f"{counted(encoded, 'image')} encoded as JPEG of quality 100.")
+    return [record for record in records if not record.fault], common
 
 
 class VideoWriter:

@@ -32,7 +32,7 @@ from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange import files, imports
+from shapechanger.demos.exchange import files, pictures
 from shapechanger.demos.exchange.format import (
     COLUMNS,
     COMMANDS,
@@ -40,11 +40,15 @@ from shapechanger.demos.exchange.format import (
     ExportContext,
     Format,
     ImportContext,
+    SourceRecord,
+    as_json,
+    choose_camera,
     counted,
+    features_of,
     few,
     kept_steps,
+    stretches,
 )
-from shapechanger.demos.exchange.imports import SourceRecord
 from shapechanger.errors import DemosError, translate_errors
 from shapechanger.layout import Layout
 
@@ -112,18 +116,11 @@ def _numbered(folder: Path) -> list[tuple[int, str]]:
     return sorted((int(m[1]), m[0]) for m in map(_RECORD_NAME.fullmatch, names) if m)
 
 
-def _decoded(text: bytes, kind: Any, where: object) -> Any:
-    try:
-        return msgspec.convert(json.loads(text), kind)
-    except (ValueError, RecursionError, msgspec.ValidationError) as error:
-        raise DemosError(f"{where} is damaged: {error}.") from error
-
-
 def _read_v2(folder: Path, context: ImportContext) -> _Tub:
     path = folder / _MANIFEST
     lines = [*files.read_bytes(path).split(b"\n"), *[b""] * 5][:5]
     kinds = (list[str], list[str], Fields | list[tuple[str, Any]], Any, _Catalogs)
-    decoded = [_decoded(line, kind, path) for line, kind in zip(lines, kinds, strict=True)]
+    decoded = [files.parse_json(line, path, kind) for line, kind in zip(lines, kinds, strict=True)]
     catalogs: _Catalogs = decoded[4]
     if len(set(catalogs.paths)) < len(catalogs.paths):
         context.warn(f"{path} names a catalog twice in its paths: it is read once.")
@@ -132,12 +129,12 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
         try:
             lines = files.read_bytes(files.inside(folder, name, path)).split(b"\n")
         except DemosError as error:
-            context.leave_out("catalog", imports.unreadable(error), name)
+            context.leave_out("catalog", pictures.unreadable(error), name)
             continue
         for number, line in enumerate(lines, 1):
             try:
                 if line.strip():
-                    fields: Fields = _decoded(line, Fields, name)
+                    fields: Fields = files.parse_json(line, name, Fields)
                     found.setdefault(msgspec.convert(fields["_index"], int), []).append(fields)
             except (DemosError, LookupError, msgspec.ValidationError):
                 reason = "with damaged JSON or without a valid _index"
@@ -165,16 +162,16 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
 def _read_v1(folder: Path, context: ImportContext) -> _Tub:
     """Read a file for each record; without Unix times, each start of the car is a session."""
     path, exclude = folder / "meta.json", folder / "exclude.json"
-    tub = _decoded(files.read_bytes(path), _Tub, path) if path.is_file() else _Tub()
+    tub = files.parse_json(files.read_bytes(path), path, _Tub) if path.is_file() else _Tub()
     gone: list[int] = []
     if exclude.is_file():
-        gone = _decoded(files.read_bytes(exclude), list[int], exclude)
+        gone = files.parse_json(files.read_bytes(exclude), exclude, list[int])
     tub.deleted, tub.records, tub.is_unix = gone, [], tub.start is not None
     starts, before_ms = 1, 0.0
     for number, name in _numbered(folder):
         text = files.read_bytes(files.inside(folder, name, folder))
         try:
-            fields: Fields = _decoded(text, Fields, name)
+            fields: Fields = files.parse_json(text, name, Fields)
         except DemosError:
             if number not in tub.deleted:
                 context.leave_out("record", "with damaged JSON", number)
@@ -201,7 +198,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     there = list(dict.fromkeys(name for fields in kept for name in fields))
     cameras = [name for name in there if types.get(name) in _PICTURES or name == _IMAGE]
     camera = _IMAGE if _IMAGE in cameras and not context.camera else ""
-    camera = camera or imports.choose_camera(folder, cameras, context)
+    camera = camera or choose_camera(folder, cameras, context)
     if not camera and _DEPTH in map(types.get, there):
         context.warn("The steps have no images, because those of 16 bits are not imported.")
     numeric = [name for name, kind in types.items() if name and kind in _NUMBERS]
@@ -212,13 +209,13 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     records = [_record(fields, sensed, camera) for fields in kept]
     if camera:
         _find_pictures(records, folder / _IMAGES if _is_v2(folder) else folder, context)
-    records, size = imports.with_pictures(records, "record", context)
+    records, size = pictures.with_pictures(records, "record", context)
     sessions = {fields["_index"]: str(fields.get("_session_id", "")) for fields in kept}
     parts = [list(part) for _, part in groupby(records, lambda record: sessions[record.number])]
-    states = [feature for name in sensed for feature in imports.features_of(name, 1)]
+    states = [feature for name in sensed for feature in features_of(name, 1)]
     rate = _float(tub.rate)
     stated_hz = rate if 0.0 < rate < math.inf else None
-    for part, hz, timed in imports.stretches(parts, "record", context, stated_hz):
+    for part, hz, timed in stretches(parts, "record", context, stated_hz):
         created = ""
         if tub.is_unix and timed:
             for record in part:
@@ -228,7 +225,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         session = sessions[part[0].number]
         header = EpisodeHeader(
             action_layout=_ACTIONS.to_json(),
-            state_layout=imports.as_json(states),
+            state_layout=as_json(states),
             image_size=size,
             control_hz=hz,
             body="car",
@@ -238,7 +235,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             created=created,
         )
         name = f"{folder}, from record {part[0].name}"
-        rows = imports.rows_of(part, size, context, "record")
+        rows = pictures.rows_of(part, size, context, "record")
         yield ExchangeEpisode(header=header, rows=rows, name=name)
 
 
