@@ -33,7 +33,6 @@ from typing import TYPE_CHECKING, Any, Final
 from shapechanger.envs.catalogue import register_all
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.registry import LEARNERS, MAKERS, METHODS, MODELS, POLICIES, ROBOTS
 
 if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
@@ -128,69 +127,27 @@ __all__ = [
 
 __version__: Final = version("shapechanger")
 
+# Modules of the public names; the others are of `morphology`.
 _MODULES: Final = {
-    "contract.testing": ("examine",),
-    "demos.dataset": ("Dataset", "load_dataset"),
-    "envs.own": ("from_mjcf",),
-    "envs.make_vec": ("make_vec",),
-    "finger.identify": ("load_log",),
-    "morphology": (
-        *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),
-        *("JointRange", "Lock", "Mass", "Radius", "Remove", "Split", "StartHeight", "Stiffness"),
-        *("Stretch", "compile_body", "interpolate", "reshape"),
-        *("PlaceBody", "PlaceGeom", "TotalMass", "AddMotor", "AddFreeJoint", "AddFloor"),
-    ),
-    "morphology.certificate": ("Certificate", "certify"),
-    "policy": ("load_policy", "save_policy"),
-    "robot.client.client": ("RobotClient",),
-    "transfer": ("BodyMap", "TransferTask"),
-    "transfer.study": ("make_plan", "run_study"),
-    "transfer.transplant": ("transplant",),
+    "BodyMap": "transfer",
+    "Certificate": "morphology.certificate",
+    "Dataset": "demos.dataset",
+    "RobotClient": "robot.client.client",
+    "TransferTask": "transfer",
+    "certify": "morphology.certificate",
+    "examine": "contract.testing",
+    "from_mjcf": "envs.own",
+    "load_dataset": "demos.dataset",
+    "load_log": "finger.identify",
+    "load_policy": "policy",
+    "make_plan": "transfer.study",
+    "make_vec": "envs.make_vec",
+    "run_study": "transfer.study",
+    "save_policy": "policy",
+    "transplant": "transfer.transplant",
 }
-_LAZY: Final = {name: module for module, names in _MODULES.items() for name in names}
 
 register_all()
-_BASIC: Final = "transfer.methods.basic"
-METHODS.ship(
-    {
-        "scratch": f"{_BASIC}:Scratch",
-        "zero-shot": f"{_BASIC}:ZeroShot",
-        "fine-tune": f"{_BASIC}:FineTune",
-        "frozen-trunk": "transfer.methods.frozen_trunk:FrozenTrunk",
-        "rehearsal": "transfer.methods.rehearsal:Rehearsal",
-        "kickstart": "transfer.methods.kickstart:Kickstart",
-        "evolution": "transfer.methods.evolution:Evolution",
-        "prefilled-replay": "transfer.methods.replay:PrefilledReplay",
-        "off-dynamics": "transfer.methods.replay:OffDynamics",
-        "shuffled-map": "transfer.methods.shuffled_map:ShuffledMap",
-        "randomised": "transfer.methods.adapted_source:Randomised",
-        "identified": "transfer.methods.adapted_source:Identified",
-        "generalist": "transfer.methods.generalist:Generalist",
-    }
-)
-_SETTINGS: Final = "transfer.learners.settings"
-LEARNERS.ship(
-    {
-        "ppo": f"{_SETTINGS}:PpoSettings",
-        "ppo-limbs": f"{_SETTINGS}:LimbSettings",
-        "rsl-ppo": f"{_SETTINGS}:RslPpoSettings",
-        "rsl-limbs": f"{_SETTINGS}:RslLimbSettings",
-        "off-policy": f"{_SETTINGS}:OffPolicySettings",
-        "imported": f"{_SETTINGS}:ImportedSettings",
-        "cloning": "vehicles.cloning:CloningSettings",
-    }
-)
-MAKERS.ship({"make_vec": "envs.make_vec:make_vec"})
-MODELS.ship({"mujoco": "morphology.certificate.changes:ModelNumbers"})
-POLICIES.ship(
-    {
-        "trained": "transfer.learners.policy_file:TrainedPolicy.of_file",
-        "trained-onnx": "policy:OnnxPolicy",
-        "clone": "demos.cloning.network:CameraPolicy.of_file",
-        "clone-onnx": "demos.cloning.clone:OnnxClone",
-    }
-)
-ROBOTS.ship({"profile": "vehicles.twin:read_robot"})
 
 
 def __getattr__(name: str) -> Any:
@@ -200,13 +157,12 @@ def __getattr__(name: str) -> Any:
         AttributeError: If the package has no such name.
         MissingExtra: If the name needs an extra that is not installed.
     """
-    if name not in _LAZY:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"{__name__}.{_LAZY[name]}"), name)
-    globals()[name] = value
-    return value
+    module = importlib.import_module(f"{__name__}.{_MODULES.get(name, 'morphology')}")
+    return globals().setdefault(name, getattr(module, name))
 
 
 def __dir__() -> list[str]:
     """Return the names of the package, including those not imported yet."""
-    return sorted({*globals(), *_LAZY})
+    return sorted({*globals(), *__all__})

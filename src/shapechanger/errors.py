@@ -48,7 +48,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-# A humanoid has some forty names; a longer list would hide the sentence.
 _MOST_NAMES_LISTED: Final = 40
 
 LARGEST_SEED: Final = 2**32 - 1
@@ -79,7 +78,11 @@ class UnknownName(ShapechangerError, ValueError):
         self.instead = instead
         close = difflib.get_close_matches(name, self.known, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        message = f"No {kind} matches {name!r}.{hint} There are: {_listed(self.known)}."
+        # A humanoid has some forty names; a longer list would hide the sentence.
+        listed = ", ".join(self.known[:_MOST_NAMES_LISTED]) or "none"
+        more = len(self.known) - _MOST_NAMES_LISTED
+        listed += f" and {more} more" if more > 0 else ""
+        message = f"No {kind} matches {name!r}.{hint} There are: {listed}."
         super().__init__(" ".join(filter(None, (message, instead))))
 
     def __reduce__(self) -> tuple[type[UnknownName], tuple[str, str, tuple[str, ...], str]]:
@@ -231,16 +234,12 @@ _Error = TypeVar("_Error", bound=Exception)
 def translate_errors(
     *kinds: type[_Error], to: Callable[[_Error], BaseException]
 ) -> Generator[None]:
-    """Raise another error, with its own sentence, for each error of these kinds.
+    """Raise another error for each error of these kinds, which becomes its cause.
 
     ```python
     with translate_errors(OSError, to=lambda error: RobotError(f"Cannot read {file}: {error}.")):
         text = file.read_text()
     ```
-
-    Args:
-        *kinds: Kinds of errors of the block to translate.
-        to: Function that makes the error to raise; the original one becomes its cause.
     """
     try:
         yield
@@ -286,12 +285,3 @@ def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") ->
     siblings = (str(each) for each in path.parent.glob(f"*{glob.escape(path.suffix)}"))
     close = difflib.get_close_matches(str(path), [*words, *sorted(siblings)], n=1)
     return f"There is no policy {what} {path}" + (f"; did you mean {close[0]}?" if close else ".")
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    """List names in one line, at most forty of them."""
-    if not names:
-        return "none"
-    shown = ", ".join(names[:_MOST_NAMES_LISTED])
-    more = len(names) - _MOST_NAMES_LISTED
-    return f"{shown} and {more} more" if more > 0 else shown

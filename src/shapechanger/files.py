@@ -20,14 +20,9 @@ _T = TypeVar("_T")
 
 
 def place_of(text: str, error: Exception) -> str:
-    """Return where a TOML file has the name or the setting that an error is about.
+    """Return where a TOML text has what an error is about, as `, line 3`; empty if nowhere.
 
-    Args:
-        text: The file's content.
-        error: An unknown name, or an error whose message holds the path of msgspec, `$.gamma`.
-
-    Returns:
-        `, line 3`, or an empty string if the file does not hold it.
+    The error is an unknown name, or its message holds a path of msgspec, such as `$.gamma`.
     """
     setting = re.search(r"\$\.(\w+)", str(error))
     name = error.name if isinstance(error, UnknownName) else setting and setting[1]
@@ -38,10 +33,7 @@ def place_of(text: str, error: Exception) -> str:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file of a user, whose editor may have put a byte-order mark in front of it.
-
-    Args:
-        path: The file, in UTF-8.
+    """Read a text file of a user, in UTF-8 with or without a byte-order mark.
 
     Raises:
         OSError: If it cannot be read.
@@ -85,13 +77,11 @@ def make_folder(folder: Path) -> None:
     Raises:
         OutputError: If it cannot be made or written to.
     """
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".writable"
         probe.touch()
         probe.unlink()
-    except OSError as error:
-        raise OutputError(f"Cannot write to {folder}: {error.strerror or error}.") from error
 
 
 def require_file(path: Path) -> None:
@@ -114,7 +104,7 @@ def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
         mode: Its permissions from the start; None for those of the old one.
 
     Raises:
-        OutputError: If it cannot be written, for instance because the disk is full.
+        OutputError: If it cannot be written.
     """
     with writing(path):
         if mode is None and path.exists():
@@ -131,8 +121,7 @@ def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
         mode: Its permissions from the start; None for the default of the process.
 
     Raises:
-        FileExistsError: If the file exists.
-        OSError: If it cannot be written; no partial file is left.
+        OSError: If the file exists or cannot be written.
     """
     if os.path.lexists(path):
         raise FileExistsError(path)
@@ -166,28 +155,12 @@ def _write(path: Path, content: bytes, mode: int | None) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as indented JSON, atomically.
-
-    Args:
-        path: The file.
-        value: What msgspec can encode.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Write a value as indented JSON, atomically; raise OutputError if that fails."""
     write_atomic(path, msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n")
 
 
 def append_line(path: Path, value: Any) -> None:
-    """Append a line of JSON to a file.
-
-    Args:
-        path: The file.
-        value: What msgspec can encode.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Append a line of JSON to a file; raise OutputError if that fails."""
     with writing(path), path.open("ab") as file:
         file.write(msgspec.json.encode(value) + b"\n")
 
@@ -210,22 +183,13 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
 
 
 def from_builtins(kind: Any, value: Any) -> Any:
-    """Read a value whose class says how, by `from_builtins`: a `dec_hook` of msgspec.
-
-    Args:
-        kind: The class.
-        value: What JSON holds.
-    """
+    """Read a value whose class says how, by `from_builtins`: a `dec_hook` of msgspec."""
     return kind.from_builtins(value)
 
 
 @contextmanager
 def writing(path: Path) -> Generator[None]:
-    """Raise the OSErrors of a block as OutputErrors that name a file or folder.
-
-    Args:
-        path: The file or folder that the block writes.
-    """
+    """Raise OSErrors of a block as OutputErrors that name the file or folder that it writes."""
     try:
         yield
     except OutputError:  # A sentence already, and a subclass of OSError.
@@ -235,10 +199,5 @@ def writing(path: Path) -> Generator[None]:
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:
-    """Return the error to raise when a file cannot be written.
-
-    Args:
-        path: The file.
-        error: What the system said.
-    """
+    """Return the error to raise when a file cannot be written."""
     return OutputError(f"Cannot write {path}: {error.strerror or error}.")

@@ -66,7 +66,7 @@ def sha256_of(path: Path) -> str:
 
 
 def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False) -> str:
-    """Upload a folder, replacing an earlier push.
+    """Upload a folder, replacing an earlier push, and return the address of the commit.
 
     Args:
         folder: The files, by their names in the repository; card and list are added to it.
@@ -74,9 +74,6 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
         repo: Name of the repository, such as "ada/ant"; it is made if it does not exist.
         kind: Kind of the files.
         public: Whether a new repository can be read by everybody.
-
-    Returns:
-        Address of the commit.
 
     Raises:
         HubError: If the Hub refuses, or the repository holds something else.
@@ -112,7 +109,7 @@ def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False
 
 
 def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: int) -> str:
-    """Download the files of a push, and check their sizes and hashes.
+    """Download the files of a push, check them, and return the commit that was pulled.
 
     Args:
         repo: Name of the repository, such as "ada/ant".
@@ -120,9 +117,6 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         folder: An existing folder to write to; it may hold parts of files after an error.
         revision: Commit, branch or tag; "" for the newest commit.
         max_bytes: Largest size of all files together.
-
-    Returns:
-        The commit that was pulled.
 
     Raises:
         HubError: If the Hub refuses, or the files are not those that the repository lists, are of

@@ -3,26 +3,27 @@
 A study, a policy and a robot are known by names: an id, a path, `module:Name`. Those stay the same
 when a file is edited. Identities tell such versions apart, so that runs of two of them are never
 averaged and a policy is never taken for one of another robot.
+
+A module counts as the user's own if it lies neither in the standard library nor in a folder of
+installed packages, and is not of Shapechanger. What it imports counts with it.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
+import re
+import sys
+import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
+from importlib.machinery import PathFinder
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import msgspec
 
-from shapechanger.own_modules import (
-    HASH_DIGITS,
-    modules_of,
-    modules_of_env,
-    named_modules,
-    own_modules,
-    texts_in,
-)
 from shapechanger.registry import MODELS
 
 if TYPE_CHECKING:
@@ -31,6 +32,15 @@ if TYPE_CHECKING:
 # Files that a compiled model holds the meaning of, comments left out.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 _MOST_CHANGES: Final = 4  # Named in a message.
+_NAMED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
+_INSTALLED: Final = frozenset(("site-packages", "dist-packages"))
+_NOT_OWN: Final = (
+    *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")),
+    Path(__file__).resolve().parent,
+)
+# A worker process knows the script of its parent by the second name.
+_SCRIPTS: Final = ("__main__", "__mp_main__")
+_GUARD: Final = "__name__ == '__main__'"
 
 
 class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -84,7 +94,7 @@ class IdentifiedEnv(NamedTuple):
 
     Attributes:
         identity: The identity.
-        numbers: The numbers of its model as MessagePack, for `model_changes`; empty without one.
+        numbers: The numbers of its model as MessagePack, to compare models; empty without one.
     """
 
     identity: Identity
@@ -101,12 +111,13 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
     arguments: dict[str, Any] = {} if env.spec is None else dict(env.spec.kwargs)
     names = modules_of_env(env, env_id)
     model = getattr(env.unwrapped, "model", None)
+    moved, sensed, numbers = "", "", b""
     # No import of MuJoCo for an env that does without.
-    if type(model).__module__.partition(".")[0] != "mujoco" or type(model).__name__ != "MjModel":
-        files = own_modules(names) | dict(_files(arguments, ()))
-        return IdentifiedEnv(Identity(files=files), b"")
-    moved, sensed, numbers = MODELS.load("mujoco").read(model, drawn=_sees(env.observation_space))
-    files = own_modules(names) | dict(_files(arguments, _MODEL_FILES))
+    compiled = (type(model).__module__.partition(".")[0], type(model).__name__)
+    if is_mujoco := compiled == ("mujoco", "MjModel"):
+        sees = _sees(env.observation_space)
+        moved, sensed, numbers = MODELS.load("mujoco").read(model, drawn=sees)
+    files = own_modules(names) | dict(_files(arguments, _MODEL_FILES if is_mujoco else ()))
     return IdentifiedEnv(Identity(moved, sensed, files), numbers)
 
 
@@ -120,19 +131,6 @@ def identify_code(names: Iterable[str], *objects: Any) -> Identity:
     return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 
 
-def model_changes(old: bytes, new: bytes) -> tuple[str, ...]:
-    """Return the differences of two models in words.
-
-    Args:
-        old: Numbers of the old model, see `IdentifiedEnv`.
-        new: Numbers of the new one.
-
-    Raises:
-        msgspec.MsgspecError: If they are not such numbers.
-    """
-    return MODELS.load("mujoco").changes(old, new)
-
-
 def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     """Yield name and hash of each file that an argument names, such as a robot's profile."""
     for text in filter(None, texts_in(arguments)):
@@ -141,7 +139,11 @@ def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[t
             # the JSON of a body.
             if os.path.isfile(place) and not place.endswith(without):
                 content = b"\n".join(Path(place).read_bytes().splitlines())
-                yield Path(place).name, hashlib.sha256(content).hexdigest()[:HASH_DIGITS]
+                yield Path(place).name, _hash_of(content)
+
+
+def _hash_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def _sees(space: gym.Space[Any]) -> bool:
@@ -150,3 +152,138 @@ def _sees(space: gym.Space[Any]) -> bool:
     if inner is not None:
         return any(map(_sees, getattr(inner, "values", lambda: inner)()))
     return len(space.shape or ()) >= 2 and str(space.dtype) == "uint8"
+
+
+def own_modules(names: Iterable[str]) -> dict[str, str]:
+    """Return the hash of each own module among some modules, and of those that they import.
+
+    Comments count, line ends and the block `if __name__ == "__main__":` do not.
+
+    Args:
+        names: Dotted names of modules; those that are not the user's own are skipped.
+
+    Returns:
+        The first 16 hex digits of the SHA-256 of each source, by the place of the file below the
+        folder that it is imported from, such as `tasks/jump.py`.
+    """
+    found: dict[str, str] = {}
+    waiting, seen = list(names), {""}
+    while waiting:
+        name = waiting.pop()
+        if name in seen or name.partition(".")[0] == "shapechanger":
+            continue
+        seen.add(name)
+        waiting.append(name.rpartition(".")[0])
+        file = _file_of(name)
+        if file is None or not _is_own(file):
+            continue
+        # A script that was run with `python -m` has the name of its module.
+        spec = getattr(sys.modules.get(name), "__spec__", None)
+        dotted = str(getattr(spec, "name", "")) if name in _SCRIPTS else name
+        package = dotted if file.stem == "__init__" else dotted.rpartition(".")[0]
+        source = file.read_bytes()
+        if file.suffix == ".py":
+            source, imported = _read(source, package)
+            waiting += imported
+        waiting += _used_by(sys.modules.get(name))
+        depth = len(package.split(".")) if package else 0
+        key = Path(*file.parts[-1 - depth :]).as_posix()
+        found[key] = _hash_of(source)
+    return dict(sorted(found.items()))
+
+
+def modules_of(*objects: Any) -> set[str]:
+    """Return the names of the modules that define some objects, or their classes with all bases."""
+    found: set[str] = set()
+    for each in objects:
+        if isinstance(each, ModuleType):
+            found.add(each.__name__)
+            continue
+        kind: Any = each if isinstance(each, type) else type(each)
+        modules = [getattr(one, "__module__", None) for one in (each, *kind.__mro__)]
+        found.update(module for module in modules if isinstance(module, str))
+    return found
+
+
+def modules_of_env(env: Any, env_id: str = "") -> set[str]:
+    """Return the names of the modules that define an env: wrappers, body, task and measures.
+
+    Args:
+        env: The env.
+        env_id: Its id, which may name a module, as `module:id`.
+    """
+    spec: Any = getattr(env, "spec", None)
+    arguments: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
+    entry: Any = None if spec is None else spec.entry_point
+    parts: list[Any] = [env, entry]
+    while env is not (inner := getattr(env, "unwrapped", env)):
+        env = env.env
+        parts.append(env)
+    rig = getattr(getattr(inner, "family", None), "rig", ())
+    parts += [getattr(inner, "task", None), *getattr(inner, "measures", ())]
+    parts += [*getattr(inner, "body", ()), *rig, *arguments.values()]
+    return modules_of(*parts) | {*named_modules([env_id, *texts_in([entry, arguments])])}
+
+
+def _is_own(path: Path) -> bool:
+    return not _INSTALLED & {*path.parts} and not any(map(path.is_relative_to, _NOT_OWN))
+
+
+def _file_of(name: str) -> Path | None:
+    """Return the file of a module, which need not have been imported; None without a file."""
+    file = getattr(sys.modules.get(name), "__file__", None)
+    if name not in sys.modules:
+        # Unlike `importlib.util.find_spec`, this imports no package on the way.
+        folders, parts = [place for place in sys.path if _is_own(Path(place).resolve())], name
+        for end in [*(m.start() for m in re.finditer(r"\.", name)), len(name)]:
+            spec = PathFinder.find_spec(parts[:end], folders)
+            if spec is None:
+                return None
+            folders, file = list(spec.submodule_search_locations or ()), spec.origin
+    return None if file is None else Path(file).resolve()
+
+
+def _read(source: bytes, package: str) -> tuple[bytes, list[str]]:
+    """Return the part of a source that an import runs, and the names that it may import."""
+    lines = source.removeprefix(b"\xef\xbb\xbf").splitlines()
+    try:
+        tree = ast.parse(b"\n".join(lines))
+    except (SyntaxError, ValueError):
+        return b"\n".join(lines), []
+    imported: list[str] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imported += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            parents = package.split(".") if node.level and package else []
+            parents = parents[: len(parents) + 1 - node.level]
+            base = ".".join([*parents, *([node.module] if node.module else [])])
+            imported += [base, *(f"{base}.{alias.name}".lstrip(".") for alias in node.names)]
+    for node in reversed(tree.body):
+        if isinstance(node, ast.If) and not node.orelse and ast.unparse(node.test) == _GUARD:
+            del lines[node.lineno - 1 : node.end_lineno]
+    return b"\n".join(lines), imported
+
+
+def _used_by(module: ModuleType | None) -> set[str]:
+    """Return the modules of the names of a module, some of which it may import by other means."""
+    values = () if module is None else tuple(vars(module).values())
+    named = [each for each in values if isinstance(each, ModuleType | type) or callable(each)]
+    return modules_of(*named) - {*_SCRIPTS}
+
+
+def texts_in(value: Any) -> Iterator[str]:
+    """Yield all texts in arguments, at any depth."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | list | tuple):
+        inner = cast("Any", value)
+        for each in inner.values() if isinstance(value, Mapping) else inner:
+            yield from texts_in(each)
+
+
+def named_modules(texts: Iterable[str]) -> Iterator[str]:
+    """Yield the modules that texts such as `module:Name` name."""
+    for text in texts:
+        if found := _NAMED.fullmatch(text):
+            yield found[1]

@@ -22,17 +22,14 @@ class Registry(Generic[_Part]):
     Args:
         kind: What a part is, for messages, such as "method".
         group: Group of the entry points, such as "shapechanger.methods".
+        shipped: Places of the parts that ship, `module:attribute` below `shapechanger`, by name.
     """
 
-    def __init__(self, kind: str, group: str) -> None:
+    def __init__(self, kind: str, group: str, shipped: dict[str, str]) -> None:
         self._kind = kind
         self._group = group
-        self._places: dict[str, str] = {}
+        self._places = shipped
         self._registered: dict[str, _Part] = {}
-
-    def ship(self, places: dict[str, str]) -> None:
-        """State where shipped parts are, `module:attribute` below `shapechanger`, by name."""
-        self._places |= places
 
     def register(self, name: str, part: _Part) -> None:
         """Register a part, a class.
@@ -86,20 +83,67 @@ class Registry(Generic[_Part]):
         raise UnknownName(self._kind, name, self.names())
 
 
-LEARNERS: Final[Registry[Any]] = Registry("learner", "shapechanger.learners")
+LEARNERS: Final[Registry[Any]] = Registry(
+    "learner",
+    "shapechanger.learners",
+    {
+        "ppo": "transfer.learners.settings:PpoSettings",
+        "ppo-limbs": "transfer.learners.settings:LimbSettings",
+        "rsl-ppo": "transfer.learners.settings:RslPpoSettings",
+        "rsl-limbs": "transfer.learners.settings:RslLimbSettings",
+        "off-policy": "transfer.learners.settings:OffPolicySettings",
+        "imported": "transfer.learners.settings:ImportedSettings",
+        "cloning": "vehicles.cloning:CloningSettings",
+    },
+)
 """Classes of settings, subclasses of `shapechanger.transfer.learners.LearnerSettings`."""
 
-METHODS: Final[Registry[Any]] = Registry("method", "shapechanger.methods")
+METHODS: Final[Registry[Any]] = Registry(
+    "method",
+    "shapechanger.methods",
+    {
+        "scratch": "transfer.methods.basic:Scratch",
+        "zero-shot": "transfer.methods.basic:ZeroShot",
+        "fine-tune": "transfer.methods.basic:FineTune",
+        "frozen-trunk": "transfer.methods.frozen_trunk:FrozenTrunk",
+        "rehearsal": "transfer.methods.rehearsal:Rehearsal",
+        "kickstart": "transfer.methods.kickstart:Kickstart",
+        "evolution": "transfer.methods.evolution:Evolution",
+        "prefilled-replay": "transfer.methods.replay:PrefilledReplay",
+        "off-dynamics": "transfer.methods.replay:OffDynamics",
+        "shuffled-map": "transfer.methods.shuffled_map:ShuffledMap",
+        "randomised": "transfer.methods.adapted_source:Randomised",
+        "identified": "transfer.methods.adapted_source:Identified",
+        "generalist": "transfer.methods.generalist:Generalist",
+    },
+)
 """Subclasses of `shapechanger.transfer.methods.Method`."""
 
-POLICIES: Final[Registry[Any]] = Registry("kind of policy", "shapechanger.policies")
+POLICIES: Final[Registry[Any]] = Registry(
+    "kind of policy",
+    "shapechanger.policies",
+    {
+        "trained": "transfer.learners.policy_file:TrainedPolicy.of_file",
+        "trained-onnx": "policy:OnnxPolicy",
+        "clone": "demos.cloning.network:CameraPolicy.of_file",
+        "clone-onnx": "demos.cloning.clone:OnnxClone",
+    },
+)
 """Functions that read a file, by the kind of policy that its header names."""
 
-ROBOTS: Final[Registry[Any]] = Registry("reader of robots", "shapechanger.robots")
+ROBOTS: Final[Registry[Any]] = Registry(
+    "reader of robots", "shapechanger.robots", {"profile": "vehicles.twin:read_robot"}
+)
 """Readers of the numbers of a robot for its simulation, which imports no robot."""
 
-MODELS: Final[Registry[Any]] = Registry("kind of model", "shapechanger.models")
+MODELS: Final[Registry[Any]] = Registry(
+    "kind of model",
+    "shapechanger.models",
+    {"mujoco": "morphology.certificate.changes:ModelNumbers"},
+)
 """Readers of the numbers of a compiled model, keyed by the library that compiled it."""
 
-MAKERS: Final[Registry[Any]] = Registry("maker of vector envs", "shapechanger.makers")
+MAKERS: Final[Registry[Any]] = Registry(
+    "maker of vector envs", "shapechanger.makers", {"make_vec": "envs.make_vec:make_vec"}
+)
 """Functions like `shapechanger.make_vec`, so that learners import no env."""

@@ -84,9 +84,9 @@ from tests.cli.running import Cli
             "transfer Ant BigAnt --arms scratch generalist",
             "generalist needs a policy that fits many bodies: give --learner limbs",
         ),
-        ("train Ant --tensorboard file", "Cannot write to file"),
-        ("train Ant --out file/policy.safetensors", "Cannot write to file"),
-        ("play Ant --out file/film.mp4", "Cannot write to file"),
+        ("train Ant --tensorboard file", "Cannot write file"),
+        ("train Ant --out file/policy.safetensors", "Cannot write file"),
+        ("play Ant --out file/film.mp4", "Cannot write file"),
         (
             "train Ant --set gamma=0.9 --set n_epochs=5",
             "--set is given twice: give it once, with all its values after it.",

@@ -22,8 +22,7 @@ from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.envs.naming import allow_own_modules, driven, env_ref
 from shapechanger.errors import HubError, PolicyError, ShapechangerError, StudyError
 from shapechanger.files import require_file, write_atomic
-from shapechanger.identity import identify_env
-from shapechanger.own_modules import texts_in
+from shapechanger.identity import identify_env, texts_in
 from shapechanger.policy import MAX_BYTES, STEERING, CloneNetwork, PolicyCard, load_policy
 from shapechanger.transfer.identities import ENV, known, single_body
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate

@@ -11,8 +11,7 @@ import msgspec
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import ForeignStudy
-from shapechanger.identity import IdentifiedEnv, Identity, identify_code, identify_env
-from shapechanger.own_modules import texts_in
+from shapechanger.identity import IdentifiedEnv, Identity, identify_code, identify_env, texts_in
 
 Identities = dict[str, Identity]
 """Identities by part."""

@@ -16,7 +16,8 @@ import msgspec
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import ForeignStudy, ShapechangerError
 from shapechanger.files import make_folder, write_atomic
-from shapechanger.identity import IdentifiedEnv, Identity, identify_code, model_changes
+from shapechanger.identity import IdentifiedEnv, Identity, identify_code
+from shapechanger.registry import MODELS
 from shapechanger.transfer.identities import (
     LEARNER,
     NOTHING,
@@ -84,7 +85,7 @@ def _numbers(
             if not present and (found := identify(ref)).identity.model == after.model:
                 present = found.numbers
     with suppress(msgspec.MsgspecError):  # Only words of a message are lost.
-        return model_changes(old, present) if old and present else ()
+        return MODELS.load("mujoco").changes(old, present) if old and present else ()
     return ()
 
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import EmptyShift, MorphologyError
+from shapechanger.identity import modules_of_env, own_modules
 from shapechanger.morphology.certificate.changes import Change, compare, fingerprint, grouped
 from shapechanger.morphology.certificate.fields import TABLE
 from shapechanger.morphology.certificate.numbers import names_of
-from shapechanger.own_modules import modules_of_env, own_modules
 
 if TYPE_CHECKING:
     from shapechanger.layout import Layout

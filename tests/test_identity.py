@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.own_modules import modules_of, modules_of_env, named_modules, own_modules
+from shapechanger.identity import modules_of, modules_of_env, named_modules, own_modules
 
 
 @pytest.fixture
