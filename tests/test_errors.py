@@ -53,12 +53,8 @@ def test_the_docstring_shows_the_hierarchy() -> None:
     for name, (parent, builtin) in tree.items():
         bases = [base.__name__ for base in getattr(errors, name).__bases__]
         assert bases == [parent, *([builtin] if builtin else [])]
+        assert issubclass(getattr(errors, name), ShapechangerError)
         assert builtin is None or hasattr(builtins, builtin)
-
-
-def test_all_errors_share_a_base() -> None:
-    """All errors derive from ShapechangerError."""
-    assert all(issubclass(getattr(errors, name), ShapechangerError) for name in _CLASSES)
 
 
 @pytest.mark.parametrize(
@@ -122,6 +118,7 @@ def test_whole_numbers_are_seeds(seed: int, kind: type[int]) -> None:
     """Python's and NumPy's integers from 0 to 2^32 - 1 are seeds, as the integers that they are."""
     found = check_seed(kind(seed), StudyError)
     assert (type(found), found) == (int, seed)
+    assert check_seed(2**80 + seed, StudyError, largest=None) == 2**80 + seed
 
 
 @given(
@@ -142,13 +139,6 @@ def test_nothing_else_is_a_seed(seed: object) -> None:
         check_seed(seed, StudyError)
 
 
-def test_a_generator_may_take_any_whole_number() -> None:
-    """Without a largest seed, seeds of any length are accepted, and others are still refused."""
-    assert check_seed(2**80, StudyError, largest=None) == 2**80
-    with pytest.raises(StudyError, match=r"It must be a whole number from 0, got -1\."):
-        check_seed(-1, StudyError, "It must be", largest=None)
-
-
 def test_translated_error_keeps_its_cause() -> None:
     translated = errors.translate_errors(
         KeyError, OSError, to=lambda error: errors.RobotError(f"The pin is gone: {error}")
@@ -159,9 +149,3 @@ def test_translated_error_keeps_its_cause() -> None:
     ):
         raise OSError("no such pin")
     assert isinstance(caught.value.__cause__, OSError)
-
-
-def test_other_errors_are_not_translated() -> None:
-    translated = errors.translate_errors(OSError, to=lambda error: errors.RobotError(str(error)))
-    with pytest.raises(ZeroDivisionError), translated:
-        raise ZeroDivisionError

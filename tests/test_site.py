@@ -66,6 +66,9 @@ def pins_of(profile: Profile) -> set[int]:
 
 def test_diagrams_show_every_pin_of_a_profile(profile: Profile) -> None:
     picture = draw_wiring(profile, "it")
+    root = ET.fromstring(picture)
+    assert root.get("role") == "img"
+    assert "Wiring of it" in str(root.findtext("{http://www.w3.org/2000/svg}title"))
     shown = {int(pin) for pin in re.findall(r"GPIO(\d+) ", picture)}
     assert shown == pins_of(profile)
     table = pin_table(profile)
@@ -73,12 +76,6 @@ def test_diagrams_show_every_pin_of_a_profile(profile: Profile) -> None:
     for pin in shown:
         assert f"GPIO{pin} ({POSITIONS[pin]})" in picture
         assert f"| GPIO{pin} | {POSITIONS[pin]} |" in table
-
-
-def test_diagrams_are_pictures_with_names(profile: Profile) -> None:
-    root = ET.fromstring(draw_wiring(profile, "it"))
-    assert root.get("role") == "img"
-    assert "Wiring of it" in str(root.findtext("{http://www.w3.org/2000/svg}title"))
 
 
 def test_pulled_pins_are_those_that_move_something(profile: Profile) -> None:
@@ -126,15 +123,6 @@ def test_links_that_leave_docs_lead_to_copies() -> None:
         assert origin_of(in_site(path)) == path
 
 
-def test_examples_of_docstrings_are_fenced() -> None:
-    """Examples become blocks, with their output and without what follows them."""
-    _require("griffe")
-    from scripts.site_docstrings import fenced
-
-    text = "Sum.\n\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n\nMore."
-    assert fenced(text) == "Sum.\n\n```pycon\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n```\n\nMore."
-
-
 @pytest.mark.sources
 def test_every_exported_name_is_in_the_reference() -> None:
     """The page of a package describes each name that it exports, or links to its description."""
@@ -171,15 +159,6 @@ def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None
         environment_page("shapechanger/BigAnt-v1")
 
 
-def test_numbers_that_a_docstring_lacks_are_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    _require("griffe")
-    monkeypatch.setattr("scripts.site_pages._picture", lambda _: b"")
-    page = environment_page("shapechanger/Finger-v1").content
-    for row in ("| 8     | `FDP/tension`         | 0        | 25     | N     |", "`PI/command`"):
-        assert row in page
-    assert environment_page("shapechanger/Ant-v1").content.count("| Num ") == 2
-
-
 @contextmanager
 def _served(folder: Path) -> Iterator[str]:
     """Serve a folder, and yield its address."""
@@ -203,10 +182,8 @@ LOOKED_AT: Final = (
     # Page, scheme and width of the window, pixels.
     ("index.html", "light", 1280),
     ("index.html", "dark", 390),
-    ("studies.html", "light", 390),
     ("environments/ExtendedAnt.html", "light", 390),
     ("wiring/lab-car.html", "dark", 1280),
-    ("wiring/lab-car.html", "light", 390),
     ("api/shapechanger.morphology.html", "dark", 1280),
 )
 

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.vehicles.envs.demonstrators import CLONES
-
 pytestmark = pytest.mark.system
 
 _ROOT = Path(__file__).resolve().parents[1]
@@ -43,17 +41,6 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
     }
     assert "shapechanger/py.typed" in on_disk
     assert on_disk - set(zipfile.ZipFile(wheel).namelist()) == set()
-
-
-def test_wheel_holds_the_clones_and_the_profiles_of_the_vehicles(wheel: Path) -> None:
-    """Each vehicle has a policy and a profile; the policies have a model card."""
-    inside = set(zipfile.ZipFile(wheel).namelist())
-    for vehicle in ("boat", "car", "tank", "truck"):
-        assert CLONES[vehicle].relative_to(_SRC).as_posix() in inside
-        profile = f"shapechanger/robot/profile/shipped/lab-{vehicle}.toml"
-        assert profile in inside
-    assert "shapechanger/vehicles/envs/clones/README.md" in inside
-    assert set(CLONES) == {"boat", "car", "tank", "truck"}
 
 
 def test_wheel_works_away_from_the_source(wheel: Path, tmp_path: Path) -> None:

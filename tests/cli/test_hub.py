@@ -165,7 +165,6 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     assert "no model ada/none on the Hub, or it is private" in refused(run(*pull))
     assert "hf auth login" in refused(run(*pull, token=""))
     assert "wants to know who asks" in refused(run(*push, token=""))
-    assert "wants to know who asks" in refused(run(*push, token="hf_wrong"))
     assert "forbids this for ada/new" in refused(run(*push, token=READER))
     # A token that no header can carry must not be part of the error.
     answer = run(*push, token="hf_söcret")
@@ -221,9 +220,7 @@ ZERO = "0" * 64
     ("content", "listed", "message"),
     [
         (b"abc", listing({NAME: (2, ZERO)}), "does not have the SHA-256"),
-        (b"abc", listing({NAME: (3, ZERO)}), "does not have the SHA-256"),
         (b"abc", listing({"model.pkl": (3, ZERO)}), "names 'model.pkl', which is no policy file"),
-        (b"abc", listing({NAME: ("3", ZERO)}), "does not list files of policy"),
         (b"abc", listing({NAME: (3, ZERO)}, "demonstrations"), "does not list files of policy"),
         (b"abc", b'{"format": 2}', "does not list files of policy in format 1"),
         (b"abc", b"[" * 10**6, "does not list files of policy"),
@@ -251,7 +248,6 @@ def test_files_that_are_refused(
     ("files", "listed", "message"),
     [
         (["../../evil"], ["../../evil"], "'episodes/../../evil', which is no demonstrations file"),
-        (["one/lost/steps.jsonl"], ["one/lost/steps.jsonl"], "which is no demonstrations file"),
         (["one/steps.jsonl", "one/evil.pkl"], ["one/steps.jsonl"], "'episodes/one/evil.pkl'"),
         (["one/steps.jsonl"], ["one/steps.jsonl"], "is not an episode"),
         ([], ["one/steps.jsonl"], "has other files than its shapechanger.json names"),

@@ -80,36 +80,3 @@ def test_names_of_ours_leave_the_path_alone(folder: Path, cli: Cli) -> None:
     """A module next to a policy cannot be imported by naming one of our learners."""
     cli.refused("train", "Ant", "--learner", "ppo-run", "--steps", "10")
     assert str(folder) not in sys.path
-
-
-WALL = """
-import gymnasium as gym
-import numpy as np
-
-
-class Wall(gym.Env):
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
-    observation_space = gym.spaces.Box(0.0, 1.0, (1,))
-    action_space = gym.spaces.Box(0.0, 1.0, (1,))
-
-    def __init__(self, render_mode=None):
-        self.render_mode = render_mode
-
-    def reset(self, seed=None, options=None):
-        return np.zeros(1, np.float32), {}
-
-    def step(self, action):
-        return np.zeros(1, np.float32), 1.0, True, False, {"stop_reason": "A wall was touched."}
-
-    def render(self):
-        return np.zeros((32, 32, 3), np.uint8)
-
-
-gym.register("Wall-v0", Wall)
-"""
-
-
-def test_playing_says_why_an_episode_ended(folder: Path, cli: Cli) -> None:
-    (folder / "wall.py").write_text(WALL)
-    output = cli.output("play", "wall:Wall-v0", "--episodes", "2", "--out", "film.mp4")
-    assert "episode 1: return 1.0 in 1 steps: A wall was touched." in output

@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 from tests.cli.running import Cli
-from tests.transfer.own_robot import (
-    METHOD,
-    TASK,
-    XML,
-    forget,
-    plan_of,
-    study_of,
-    task_of,
-    write_project,
-)
-from tests.transfer.studies import files_of
+from tests.transfer.own_robot import XML, forget, plan_of, study_of, task_of, write_project
 
 
 @pytest.fixture(scope="module")
@@ -82,44 +70,3 @@ def test_a_suite_is_watched_with_own_methods(
     told = " ".join(cli.refused("suite", "watch", folder / "suite").split())
     assert "go to the folder that the study was started in" in told
     assert "delete" not in told
-
-
-@pytest.mark.system
-def test_a_study_of_edited_files_is_refused_end_to_end(tmp_path: Path) -> None:
-    """Robot, task and method are edited between two runs; an unchanged study grows bit for bit."""
-    write_project(tmp_path, "ended")
-    settings = ["n_envs=1", "n_steps=8", "batch_size=8", "n_epochs=1", "net_arch=[4]"]
-    settings += ["eval_every=8", "eval_episodes=1"]
-    given = '{"max_episode_steps": 5}'
-
-    def run(seeds: int, out: str) -> subprocess.CompletedProcess[str]:
-        command = [str(Path(sys.executable).with_name("shapechanger")), "transfer"]
-        command += ["a.xml@ended_task:Hold", "b.xml@ended_task:Hold", "--learner", "ppo-balance"]
-        command += ["--set", *settings, "--steps", "8", "--source-steps", "8", "--out", out]
-        command += ["--source-options", given, "--target-options", given, "--workers", "1"]
-        command += ["--arms", "scratch", "ended_method:ended-warm", "--seeds", str(seeds)]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-
-    first = run(2, "study")
-    assert first.returncode == 0, first.stderr
-    before = files_of(tmp_path / "study")
-    for file, content, words in (
-        ("b.xml", XML.format(0.5), "mass 2.5 kg -> 0.5 kg"),
-        ("ended_task.py", TASK.format(name="ended") + "\nMORE = 1\n", "ended_task.py has changed"),
-        ("ended_method.py", METHOD.format(name="ended") + "\nMORE = 1\n", "ended_method.py has"),
-    ):
-        was = (tmp_path / file).read_text()
-        (tmp_path / file).write_text(content)
-        refused = run(3, "study")
-        assert refused.returncode != 0
-        told = " ".join(refused.stderr.split())
-        assert words in told
-        assert "give another --out" in told
-        assert files_of(tmp_path / "study") == before
-        (tmp_path / file).write_text(was)
-    assert run(3, "study").returncode == 0
-    assert run(3, "other").returncode == 0
-    grown, at_once = (
-        json.loads((tmp_path / out / "study.json").read_text()) for out in ("study", "other")
-    )
-    assert [each["curve"] for each in grown["runs"]] == [each["curve"] for each in at_once["runs"]]

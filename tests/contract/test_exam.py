@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Container
 from functools import partial
 from pathlib import Path
@@ -121,22 +119,6 @@ def test_stable_baselines3_accepts_the_env(env_id: str) -> None:
         check_env(env)
 
 
-@pytest.mark.parametrize("env_id", CATALOGUE)
-def test_envs_can_be_vectorized(env_id: str) -> None:
-    """Two envs of one kind step together, from different starts."""
-    envs = gym.make_vec(env_id, num_envs=2)
-    try:
-        observations, _ = envs.reset(seed=0)
-        assert observations.shape == (2, *envs.single_observation_space.shape)
-        assert not np.array_equal(*observations)
-        envs.action_space.seed(0)
-        observations, rewards, *_ = envs.step(envs.action_space.sample())
-        assert np.isfinite(observations).all()
-        assert rewards.shape == (2,)
-    finally:
-        envs.close()
-
-
 @pytest.mark.parametrize(
     ("env_id", "mode"), [("shapechanger/Car-v1", "async"), ("shapechanger/Boat-v1", "sync")]
 )
@@ -174,16 +156,3 @@ def _play(envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
         assert rewards.shape == (2,)
     finally:
         envs.close()
-
-
-def test_an_id_names_the_module_that_registers_it() -> None:
-    """`module:id` works without importing the package."""
-    script = (
-        "import gymnasium as gym\n"
-        "with gym.make('shapechanger:shapechanger/BigAnt-v1') as env:\n"
-        "    print(env.reset(seed=0)[0].shape)"
-    )
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script], check=True, capture_output=True, text=True
-    )
-    assert run.stdout == "(105,)\n"

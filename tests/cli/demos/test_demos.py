@@ -12,7 +12,7 @@ import pytest
 from shapechanger.demos.episodes import EpisodeWriter, read_episode
 from tests.cli.demos.pictures import grey
 from tests.cli.running import Cli
-from tests.demos.episodes.making import header, recorded, step
+from tests.demos.episodes.making import header, step
 
 
 @pytest.fixture
@@ -50,11 +50,6 @@ def test_list(data: Path, demos: Cli) -> None:
     assert "2 episodes: 30 of 30 steps count" in printed
 
 
-def test_an_episode_that_is_not_closed_is_marked(tmp_path: Path, demos: Cli) -> None:
-    recorded(tmp_path / "data", close=False)
-    assert "not closed" in demos.output("list", tmp_path / "data")
-
-
 def test_show_as_text(data: Path, demos: Cli) -> None:
     printed = demos.output("show", data)
     assert "driven by policy 50 %, expert 50 %" in printed
@@ -82,7 +77,7 @@ def test_show_as_a_page(data: Path, tmp_path: Path, demos: Cli) -> None:
     assert "20 of 30" in text
 
 
-def test_cut_bad_good(data: Path, demos: Cli) -> None:
+def test_cut_bad_good_mark(data: Path, demos: Cli) -> None:
     first, _ = episodes(data)
     assert "11 of 30 steps" in demos.output("cut", first, "--from", 5, "--to", 15)
     assert [s.index for s in read_episode(first).kept] == list(range(5, 16))
@@ -90,13 +85,8 @@ def test_cut_bad_good(data: Path, demos: Cli) -> None:
     assert "10 of 30 steps" in demos.output("good", first, "--from", 8, "--to", 9)
     assert "0 of 30 steps" in demos.output("bad", first)
     assert "30 of 30 steps" in demos.output("good", first)
-
-
-def test_mark(data: Path, demos: Cli) -> None:
-    first, _ = episodes(data)
     demos.output("mark", first, 4, "a stone")
-    demos.output("mark", first, 6)
-    assert [(m.step, m.text) for m in read_episode(first).marks][1:] == [(4, "a stone"), (6, "")]
+    assert [(mark.step, mark.text) for mark in read_episode(first).marks][1:] == [(4, "a stone")]
 
 
 def test_merge(data: Path, tmp_path: Path, demos: Cli) -> None:
@@ -123,12 +113,6 @@ def test_repair(data: Path, demos: Cli) -> None:
     assert demos.output("repair", data).count("was complete") == 2
 
 
-def test_repair_skips_a_running_recording(data: Path, demos: Cli) -> None:
-    """The exit code reports that one episode was not repaired."""
-    with EpisodeWriter.create(data, header(), spare_bytes=0):
-        assert "being recorded" in demos.refused("repair", data)
-
-
 def test_one_episode_must_be_named(data: Path, demos: Cli) -> None:
     first, second = episodes(data)
     assert f"has 2 episodes: name one of them, such as {first}" in demos.refused("bad", data)
@@ -149,13 +133,6 @@ def test_replay_needs_one_target(data: Path, demos: Cli) -> None:
     assert "one of --film, --env and --robot" in demos.refused("replay", first)
     demos.output("bad", first)
     assert "demos good" in demos.refused("replay", first, "--film", "a.mp4")
-
-
-def test_an_unknown_robot_is_refused(
-    data: Path, demos: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(data))
-    assert "nobody" in demos.refused("replay", episodes(data)[0], "--robot", "nobody")
 
 
 def test_a_film(data: Path, tmp_path: Path, demos: Cli) -> None:

@@ -37,9 +37,7 @@ def test_a_finger_is_recorded(tmp_path: Path, finger: Cli) -> None:
 def test_invalid_recordings_are_refused(tmp_path: Path, finger: Cli) -> None:
     out = ("--out", tmp_path / "log.npz")
     assert "is not a finger env" in finger.refused("record", "Ant", *out)
-    assert "Did you mean" in finger.refused("record", "Fingr", *out)
     assert "--seconds is more than 0" in finger.refused("record", "Finger", *out, "--seconds", "0")
-    assert "--options must be JSON" in finger.refused("record", "Finger", *out, "--options", "a")
     assert "omit `goal`" in finger.refused("record", "Finger", *out, "--options", '{"goal": true}')
     assert "real-like" in finger.refused("record", "Finger", *out, "--gap", "real-lik")
 
@@ -117,6 +115,5 @@ def test_a_finger_is_exported(tmp_path: Path, finger: Cli) -> None:
     assert "cannot be read" in finger.refused("export", *to, "--parameters", tmp_path / "no.json")
     os.mkfifo(pipe := tmp_path / "pipe.json")  # Without a writer, which would be waited for.
     assert "not a regular file" in finger.refused("export", *to, "--parameters", pipe)
-    assert "an-1983" in finger.refused("export", *to, "--parameters", "an-1984")
     file.write_text("{}]")
     assert "Invalid finger parameters" in finger.refused("export", *to, "--parameters", file)
