@@ -160,7 +160,6 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
 
 
 def _listed(content: bytes, repo: str, kind: Kind) -> dict[str, _File]:
-    """Return the size and the SHA-256 of each file that a repository lists."""
     try:
         listed = msgspec.json.decode(content, type=_Listed)
     except (msgspec.MsgspecError, ValueError, RecursionError):

@@ -121,7 +121,7 @@ class Layout(msgspec.Struct, frozen=True):
             raise LayoutError(f"Two features have the name {twice!r}.")
 
     def __len__(self) -> int:
-        """Return the number of features; it equals `size` if no feature is a block."""
+        """Return the number of features."""
         return len(self.features)
 
     def __iter__(self) -> Iterator[Feature]:
@@ -130,10 +130,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     def __contains__(self, name: object) -> bool:
         """Return whether a feature has this name."""
-        for feature in self.features:  # Faster than building the names or a generator.  # noqa: SIM110
-            if feature.name == name:
-                return True
-        return False
+        return any(feature.name == name for feature in self.features)
 
     def __getitem__(self, name: str | int) -> Feature:
         """Return the feature of a name, or of a place in the order.

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
 
 import msgspec
 
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, translate_errors
 from shapechanger.files import make_folder, write_atomic
 from shapechanger.policy import ONNX_CARD, PolicyCard
 
@@ -34,13 +35,9 @@ def export_network(
         MissingExtra: If onnx or onnxscript is not installed.
         OutputError: If the file cannot be written.
     """
-    try:
-        from onnxscript import opset18
-    except ImportError as error:
-        raise MissingExtra("onnxscript", "onnx") from error
+    with translate_errors(ImportError, to=lambda _: MissingExtra("onnxscript", "onnx")):
+        operators: Any = import_module("onnxscript").opset18
     import torch
-
-    operators: Any = opset18
 
     def hypot(x: Any, y: Any) -> Any:
         """Translate the length of an edge, which ONNX lacks."""

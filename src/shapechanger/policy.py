@@ -11,8 +11,7 @@ import copy
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -230,7 +229,6 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def _words(layout: Layout) -> tuple[str, ...]:
-    """Return the names with units, and the shapes of array features."""
     return tuple(f"{f}{f' x {f.shape}' if f.shape else ''}" for f in layout)
 
 
@@ -280,14 +278,7 @@ class Policy(ABC):
         return other
 
     def save(self, path: Path) -> None:
-        """Write the policy to one file of safetensors; a missing folder is made.
-
-        Args:
-            path: The file, such as `Ant-v1.safetensors`.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Write the policy to one file of safetensors; a missing folder is made."""
         content = tensor_bytes(self.tensors(), msgspec.json.encode(self.card))
         make_folder(path.parent)
         write_atomic(path, content)
@@ -337,33 +328,13 @@ def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
     """
     file = Path(path)
     exported = file.suffix == ".onnx"
-    with refusing(file):
+    try:
         card, content = read_network(file) if exported else read_tensors(file)
         kind = ("trained" if card.clone is None else "clone") + ("-onnx" if exported else "")
         read = POLICIES.load(kind)
         return read(card, content, algorithm) if kind == "trained" else read(card, content)
-
-
-def save_policy(policy: Policy, path: str | PathLike[str]) -> None:
-    """Write a policy of any kind to a file, from which `load_policy` reads it.
-
-    Args:
-        policy: The policy.
-        path: The file, such as `Ant-v1.safetensors`.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
-    policy.save(Path(path))
-
-
-@contextmanager
-def refusing(path: Path) -> Generator[None]:
-    """Raise a PolicyError that says why a file is no policy, whatever reading it raises."""
-    try:
-        yield
     except FileNotFoundError as missing:
-        raise PolicyError(no_policy_file(path)) from missing
+        raise PolicyError(no_policy_file(file)) from missing
     except (PolicyError, MissingExtra):
         raise
     except Exception as cause:  # The errors of libraries have no common base.
@@ -372,17 +343,21 @@ def refusing(path: Path) -> Generator[None]:
         if isinstance(cause, KeyError):
             text = f"it lacks {text}"
         raise PolicyError(
-            f"{path} is not a policy that Shapechanger has written ({text})."
+            f"{file} is not a policy that Shapechanger has written ({text})."
         ) from cause
 
 
-def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes) -> bytes:
-    """Return the content of a file; equal arrays and cards give equal bytes.
+def save_policy(policy: Policy, path: str | PathLike[str]) -> None:
+    """Write a policy of any kind to a file, such as `Ant-v1.safetensors`.
 
-    Args:
-        tensors: The arrays by name.
-        card: The card in JSON.
+    Raises:
+        OutputError: If it cannot be written.
     """
+    policy.save(Path(path))
+
+
+def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes) -> bytes:
+    """Return the content of a file, with its card in JSON; equal ones give equal bytes."""
     safetensors = _safetensors()
     # Safetensors keeps the bytes of an array as they lie in memory.
     arrays = {name: np.asarray(value, order="C") for name, value in tensors.items()}
@@ -400,7 +375,6 @@ def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
     """Read a file of safetensors: its card, and the arrays keyed by name.
 
     Raises:
-        FileNotFoundError: If the file does not exist.
         OSError, LookupError, ValueError, msgspec.MsgspecError: If it cannot be read, or has been
             changed.
     """
@@ -423,7 +397,6 @@ def read_tensors(path: Path) -> tuple[PolicyCard, dict[str, NDArray[Any]]]:
 
 
 def _safetensors() -> Any:
-    """Import safetensors, which robots that run ONNX files lack."""
     try:
         from safetensors import numpy
     except ImportError as error:
@@ -458,9 +431,7 @@ def read_network(path: Path) -> tuple[PolicyCard, Network]:
     """Read an ONNX file: its card, and its network, which runs on the CPU without PyTorch.
 
     Raises:
-        FileNotFoundError: If the file does not exist.
-        MissingExtra: If onnxruntime is not installed.
-        Exception: Any other if the file cannot be used; those of onnxruntime have no common base.
+        Exception: If the file cannot be used; the errors of onnxruntime have no common base.
     """
     content = _read_limited(path)
     try:

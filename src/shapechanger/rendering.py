@@ -135,7 +135,6 @@ def _require_glfw() -> None:
 
 
 def _first_line(error: Exception) -> str:
-    """Return the message of an error on one line."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
 
 

@@ -56,31 +56,27 @@ class StudyProgress:
         self._done = dict.fromkeys(steps, 0)
         self._ended: set[str] = set()
         self._console = console or plain_console(stderr=True)
-        self._began = time.monotonic()
-        self._last_line = self._began
-        self._bar: Progress | None = None
-        if self._console.is_terminal:
-            self._bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn("{task.percentage:>3.0f} %"),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TextColumn("left:"),
-                TimeRemainingColumn(),
-                console=self._console,
-            )
-            self._task = self._bar.add_task("env steps", total=sum(steps.values()))
+        self._began = self._last_line = time.monotonic()
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left:"),
+            TimeRemainingColumn(),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+        self._task = self._bar.add_task("env steps", total=sum(steps.values()))
 
     def __enter__(self) -> Self:
-        if self._bar is not None:
-            self._bar.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         """Restore the terminal."""
-        if self._bar is not None:
-            self._bar.stop()
+        self._bar.stop()
 
     def __call__(self, run: str, steps: int, ended: bool) -> None:
         """Report that `run` has done `steps` steps; one that has ended does no more."""
@@ -89,27 +85,21 @@ class StudyProgress:
         self._done[run] = self._steps[run] if ended else min(steps, self._steps[run])
         if ended:
             self._ended.add(run)
-        if self._bar is not None:
-            named = f"{len(self._ended)}/{len(self._steps)} runs"
-            self._bar.update(self._task, completed=sum(self._done.values()), description=named)
-            return
-        now = time.monotonic()
-        if ended or now - self._last_line >= _LINE_EVERY_S:
-            self._last_line = now
-            self._console.print(self._line(run, ended, now - self._began), soft_wrap=True)
-
-    def _line(self, run: str, ended: bool, elapsed: float) -> str:
-        """Format the progress and the estimated time left."""
         done, total = sum(self._done.values()), sum(self._steps.values())
-        state = "ended" if ended else "at work"
+        runs = f"{len(self._ended)}/{len(self._steps)} runs"
+        self._bar.update(self._task, completed=done, description=runs)
+        now = time.monotonic()
+        if self._console.is_terminal or not (ended or now - self._last_line >= _LINE_EVERY_S):
+            return
+        self._last_line = now
         line = (
-            f"{run} {state}; {len(self._ended)} of {len(self._steps)} runs, "
-            f"{100 * done // total} % of the steps"
+            f"{run} {'ended' if ended else 'at work'}; {len(self._ended)} of {len(self._steps)} "
+            f"runs, {100 * done // total} % of the steps"
         )
         # The first steps include loading, so they do not predict the rest.
-        if done < _ENOUGH_TO_TELL * total:
-            return line
-        return f"{line}, about {elapsed * (total - done) / done:.0f} s left"
+        if done >= _ENOUGH_TO_TELL * total:
+            line += f", about {(now - self._began) * (total - done) / done:.0f} s left"
+        self._console.print(line, soft_wrap=True)
 
 
 class Interrupted(KeyboardInterrupt):

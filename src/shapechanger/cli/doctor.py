@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -45,7 +46,6 @@ class Doctor:
     """
 
     def run(self) -> None:
-        """Print the findings, and exit with 1 if something that is installed does not work."""
         if not write_report([("machine", examine_machine())], say):
             sys.exit(1)
 
@@ -63,23 +63,23 @@ def examine_machine(
     except ImportError:
         raise MissingExtra("packaging", "cli") from None
     parsed = [Requirement(text) for text in requirements]
-    extras = sorted({extra for one in parsed for extra in _extras_of(one)} - {*_NOT_LISTED})
+    named = re.findall(r"""extra == ["'](.+?)["']""", " ".join(requirements))
+    extras = sorted({*named} - {*_NOT_LISTED})
 
-    def is_here(package: str) -> bool:
+    def installed(package: str) -> str:
         try:
-            version_of(package)
+            return version_of(package)
         except importlib.metadata.PackageNotFoundError:
-            return False
-        return True
+            return ""
 
     checks = [
         ("machine", _machine()),
         *(
-            (f"extra {extra}" if extra else "core", _extra(parsed, extra, version_of))
+            (f"extra {extra}" if extra else "core", _extra(parsed, extra, installed))
             for extra in ("", *extras)
         ),
         # An extra says that a package is not installed.
-        *((name, check()) for name, package, check in _PACKAGES if is_here(package)),
+        *((name, check()) for name, package, check in _PACKAGES if installed(package)),
         ("pins", _gpio(dev)),
     ]
     return run_checks(checks)
@@ -94,7 +94,7 @@ def _machine() -> Results:
     )
 
 
-def _extra(parsed: Sequence[Requirement], extra: str, version_of: Callable[[str], str]) -> Results:
+def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str], str]) -> Results:
     """Yield whether the core or an extra is installed, in the versions that it needs."""
     absent: list[str] = []
     wrong: list[str] = []
@@ -103,12 +103,9 @@ def _extra(parsed: Sequence[Requirement], extra: str, version_of: Callable[[str]
             continue
         if bool(extra) != ("extra" in str(one.marker)):
             continue
-        try:
-            version = version_of(one.name)
-        except importlib.metadata.PackageNotFoundError:
+        if not (version := installed(one.name)):
             absent.append(one.name)
-            continue
-        if not one.specifier.contains(version, prereleases=True):
+        elif not one.specifier.contains(version, prereleases=True):
             wrong.append(f"{one.name} is {version} and not {one.specifier}")
     wanted = f"'{_PACKAGE}[{extra}]'" if extra else _PACKAGE
     remedy = f"run `pip install --upgrade {wanted}`"
@@ -118,12 +115,6 @@ def _extra(parsed: Sequence[Requirement], extra: str, version_of: Callable[[str]
         yield "unknown", f"Without {', '.join(absent)}; {remedy} to use it."
     else:
         yield "good", "Installed."
-
-
-def _extras_of(requirement: Requirement) -> list[str]:
-    """Return the extra that a requirement belongs to, as a list of at most one."""
-    quoted = str(requirement.marker or "").replace("'", '"').split('extra == "')
-    return [part.partition('"')[0] for part in quoted[1:]]
 
 
 def _drawing() -> Results:

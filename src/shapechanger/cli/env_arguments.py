@@ -20,9 +20,7 @@ from shapechanger.errors import MorphologyError, StudyError, no_policy_file
 from shapechanger.transfer.references import reference_policy
 
 EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
-"""Argument: the id of an env."""
 Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, or edits as JSON.")]
-"""Option: the body of an env."""
 OwnLearner = Annotated[
     str,
     tyro.conf.arg(
@@ -30,7 +28,6 @@ OwnLearner = Annotated[
         "alone may not import it."
     ),
 ]
-"""Option: the algorithm that a policy's file names."""
 Learner = Annotated[
     str,
     tyro.conf.arg(
@@ -38,14 +35,12 @@ Learner = Annotated[
         "module:name; by default the settings tuned for the env, or for the target."
     ),
 ]
-"""Option: what learns."""
 Settings = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         help="Settings of the learner that replace its own, as NAME=VALUE: learning_rate=3e-4."
     ),
 ]
-"""Option: settings of what learns."""
 _REFERENCE: Final = "reference"
 
 
@@ -137,7 +132,6 @@ def policy_file(given: Path, env: EnvRef) -> Path:
         return given
     if str(given) == _REFERENCE:
         return reference_policy(env.id)
-
     raise StudyError(no_policy_file(given, [_REFERENCE]))
 
 

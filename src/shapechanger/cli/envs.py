@@ -115,7 +115,6 @@ class EnvsRender(OneEnv):
 
 
 def _layout_table(side: str, layout: Layout) -> Table:
-    """Format a layout as a table, one row per feature."""
     title = f"{side}: {layout.size} numbers"
     table = Table(
         "#", "name", "unit", "low", "high", "belongs to", title=title, title_justify="left"

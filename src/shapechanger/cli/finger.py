@@ -83,7 +83,6 @@ class FingerIdentify:
 
 
 def _arms_table(found: IdentifiedFinger) -> Table:
-    """Moment arms, tendon by joint."""
     cells = {e.name: arm_cell(e) for e in found.arms}
     table = Table("moment arm [mm]", *JOINTS, box=None, pad_edge=False)
     for tendon in TENDONS:
@@ -93,7 +92,6 @@ def _arms_table(found: IdentifiedFinger) -> Table:
 
 
 def _table(found: IdentifiedFinger) -> Table:
-    """Parameters other than the moment arms."""
     table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
     for e in found.estimates:
         if e not in found.arms:
@@ -184,7 +182,6 @@ class FingerExport:
 
 
 def _parameters(given: str) -> FingerParameters:
-    """Return a named set of parameters, or one from a file."""
     path = Path(given)
     if given in PARAMETER_SETS or not (path.suffix or path.exists()):
         return named_set(given)

@@ -28,7 +28,7 @@ try:
     try:
         import tyro
 
-        from shapechanger.cli.console import Interrupted, plain_console
+        from shapechanger.cli.console import plain_console
     except ImportError:  # pragma: no cover  # Tested in a subprocess.
         sys.exit(f"error: {MissingExtra('tyro and rich', 'cli')}")
 except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
@@ -135,13 +135,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _stop(f"error: {error}", _WRONG_USAGE)
     except gym.error.Error as error:
         # From third-party envs, such as one whose renderer is not installed.
-        _stop(
-            f"error: {(str(error).strip().splitlines() or [type(error).__name__])[0]}", _WRONG_USAGE
-        )
-    except Interrupted as stop:
-        _stop(str(stop), _INTERRUPTED)
-    except KeyboardInterrupt:
-        _stop("Stopped.", _INTERRUPTED)
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        _stop(f"error: {lines[0]}", _WRONG_USAGE)
+    except KeyboardInterrupt as stop:  # `Interrupted` says how to go on.
+        _stop(str(stop) or "Stopped.", _INTERRUPTED)
     except OSError as error:
         # With a file name it should have been translated before: a defect.
         if error.errno not in {errno.ENOSPC, errno.EPIPE} or error.filename is not None:

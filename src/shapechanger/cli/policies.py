@@ -61,11 +61,9 @@ class _InEnv(_OfPolicy):
         trained_in = single_body(env)
         # The env of a policy may be of the user's own, or have a task that is.
         allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
-        if self.body and "path" not in trained_in.kwargs:
-            trained_in = env_ref(trained_in.id, self.body)
-        elif self.body:
-            trained_in = trained_in.having({"body": self.body})
-        return driven(trained_in)
+        if self.body and "path" in trained_in.kwargs:
+            return driven(trained_in.having({"body": self.body}))
+        return driven(env_ref(trained_in.id, self.body) if self.body else trained_in)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +115,6 @@ class PoliciesList:
     """List the policies that ship instead, one for each env."""
 
     def run(self) -> None:
-        """Print a line for each policy; a file that is not a policy gets its reason."""
         if self.references:
             self._print_references()
             return
@@ -139,7 +136,6 @@ class PoliciesList:
         print_table(table, _FILE_WIDTH)
 
     def _print_references(self) -> None:
-        """Print a line for each env, with its floor and what each seed reached."""
         table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
         for env, reference in load_references().items():
             measure = next(iter(reference.ends))
@@ -311,7 +307,6 @@ class PoliciesPull:
 
 
 def _policy_card(file: Path, repo: str) -> str:
-    """Return the README of a policy, after checking its hash."""
     card = load_policy(file).card
     rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
     seen = "" if card.clone is None else f"picture ({card.clone.eyes})"

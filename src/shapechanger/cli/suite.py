@@ -144,7 +144,6 @@ class SuiteWatch:
     """Seconds between updates of a terminal; other outputs get the table once."""
 
     def run(self) -> None:
-        """Show a table until every study is complete."""
         if self.every <= 0.0:
             raise StudyError(f"--every is a number of seconds above 0, got {self.every:g}.")
         table, complete = _progress_table(self.folder)
@@ -245,7 +244,6 @@ class _Page:
     def __init__(
         self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]
     ) -> None:
-        self.path = out / "index.html"
         self._suite, self._name, self._out, self._tasks = suite, name, out, tasks
         self._strips: dict[str, list[FilmStrip]] = {}
         self._studies = {
@@ -265,28 +263,25 @@ class _Page:
                     self._strips[one] = film_study(
                         self._studies[one], self._out / one, self._out / one / _FILM
                     )
-        ordered = self._ordered()
-        swept = self._suite.sweep
+        ordered, swept, sweep = self._ordered(), self._suite.sweep, None
+        if swept and len(self._suite.sources) == 1 and not self._suite.targets:
+            values = dict(zip(self._tasks, swept.values, strict=True))
+            sweep = Sweep(
+                f"{swept.field} of {swept.edit.get('edit', 'the edit')}",
+                {one: values[one] for one in ordered},
+            )
         page = suite_html(
             self._name,
             ordered,
             seeds=self._suite.seeds,
             strips=self._strips,
             films={one: f"{one}/{_FILM}" for one, strips in self._strips.items() if strips},
-            sweep=Sweep(
-                f"{swept.field} of {swept.edit.get('edit', 'the edit')}",
-                {
-                    one: value
-                    for one, value in zip(self._tasks, swept.values, strict=True)
-                    if one in ordered
-                },
-            )
-            if swept and len(self._suite.sources) == 1 and not self._suite.targets
-            else None,
+            sweep=sweep,
         )
-        write_atomic(self.path, page.encode())
+        path = self._out / "index.html"
+        write_atomic(path, page.encode())
         write_json(self._out / _SUMMARY, self.outcomes())
-        say(f"wrote {self._out / name / 'report.html'} and {self.path}")
+        say(f"wrote {self._out / name / 'report.html'} and {path}")
 
     def outcomes(self) -> list[StudyOutcome]:
         """Return the outcome of each study, in the order of the suite."""
@@ -297,7 +292,6 @@ class _Page:
 
 
 def _print_outcomes(found: list[StudyOutcome]) -> None:
-    """Print a table of values and steps, then of gains with intervals."""
     table = Table(
         *("study", "measure", "scratch", "zero-shot", "arm", "at its end", "scratch, steps"),
         *("arm, steps", "jumpstart", "total reward gain", "gain at the end"),

@@ -91,7 +91,6 @@ class DemosRecord(OneEnv):
         )
 
     def _ref(self) -> EnvRef:
-        """Return the env with the requested options."""
         ref = env_ref(self.env, self.body)
         more: dict[str, Any] = {}
         if ref.id in VEHICLE_ENVS:
@@ -109,7 +108,6 @@ class DemosRecord(OneEnv):
         return EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
 
     def _about(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
-        """Return further fields of the header."""
         world = getattr(env.unwrapped, "world", None)
         who, notes = Path(self.driver).name, {"driver": self.driver}
         if self.corrected_by:

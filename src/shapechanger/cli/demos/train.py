@@ -180,7 +180,6 @@ class DemosTrain(_Waypoints):
 
 
 def _print_evaluation(evaluation: EvaluationResult) -> None:
-    """Print an evaluation; the last line is the accuracy."""
     always = f"always the same: {evaluation.majority_baseline:.3f}"
     say(f"{evaluation.steps} steps; {always}")
     if evaluation.head == "class":

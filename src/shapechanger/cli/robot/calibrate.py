@@ -54,7 +54,6 @@ class RobotCalibrate:
     """Without --twin: the wheels are off the ground, so do not ask."""
 
     def run(self) -> None:
-        """Calibrate interactively and write the result, or the partial result after an error."""
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
         path = own_profile(self.profile)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import change_profile, own_profile
-from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture
-from shapechanger.errors import DemosError, OutputError, RobotError
-from shapechanger.files import read_file
+from shapechanger.demos.jpeg import decode_picture
+from shapechanger.errors import RobotError, translate_errors
+from shapechanger.files import read_file, write_atomic
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.vehicles.cameras.rectify import (
@@ -31,7 +32,6 @@ from shapechanger.vehicles.cameras.rectify import (
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0
 _MOST_BYTES: Final = 2**25
-_JPEG: Final = b"\xff\xd8\xff"  # Begins each JPEG.
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,7 @@ class RobotCamera:
                 "with --board or --horizon."
             )
         drawing = _drawing(picture, CameraGeometry(camera.pitch_deg, camera.fovy_deg))
-        try:
-            self.out.write_bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(drawing), 92))
-        except OSError as error:
-            raise OutputError(f"Cannot write {self.out}: {error.strerror or error}.") from error
+        write_atomic(self.out, simplejpeg.encode_jpeg(np.ascontiguousarray(drawing), 92))
         say(f"wrote {self.out}")
 
     def _measured(
@@ -126,30 +123,13 @@ class RobotCamera:
 def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
     """Read an image from a file, or take one, shape (height, width, 3)."""
     if path is None:
-        camera = open_camera(plan)
-        try:
-            jpeg = camera.read().jpeg
-        finally:
-            camera.close()
-        return _decoded(jpeg, "The robot's camera sent")
-    try:
+        with closing(open_camera(plan)) as camera:
+            return decode_picture(camera.read().jpeg, "of the robot's camera")
+    with translate_errors(
+        OSError, to=lambda error: RobotError(f"Cannot read {path}: {error.strerror or error}.")
+    ):
         jpeg = read_file(path, _MOST_BYTES)
-    except OSError as error:
-        raise RobotError(f"Cannot read {path}: {error.strerror or error}.") from error
-    if not jpeg.startswith(_JPEG):
-        raise RobotError(f"{path} is not a JPEG: save the image as one, such as picture.jpg.")
-    return _decoded(jpeg, f"{path} is")
-
-
-def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
-    """Decode a JPEG, shape (height, width, 3); the codec's own message would not help."""
-    try:
-        return decode_picture(jpeg, "")
-    except DemosError as error:
-        raise RobotError(
-            f"{subject} a damaged JPEG, or one of more than {MAX_PIXELS >> 20} million pixels: "
-            "take or save the image again."
-        ) from error
+    return decode_picture(jpeg, str(path))
 
 
 def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:

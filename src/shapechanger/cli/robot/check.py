@@ -75,7 +75,6 @@ class RobotCheck:
     """File of the report; leds-report.txt with --leds, and none otherwise."""
 
     def run(self) -> None:
-        """Run the checks, report them, and exit with 1 if one is bad."""
         profile = load_profile(find_profile(self.profile))
         level = self._level()
         on_twin = self.twin or self.faults

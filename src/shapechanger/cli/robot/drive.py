@@ -8,7 +8,7 @@ import time
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from rich.live import Live
 from rich.text import Text
@@ -19,14 +19,11 @@ from shapechanger.demos.cloning.clone import load_clone
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.client.known_robots import KnownRobot, can_open, open_console, recall
+from shapechanger.robot.client.known_robots import can_open, open_console, recall
 from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
 from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 from shapechanger.robot.link.messages import Observation
 from shapechanger.vehicles.remote.pilot import PolicyDriver, require_fit
-
-if TYPE_CHECKING:
-    pass
 
 _LOOK_EVERY_S: Final = 0.2
 
@@ -50,11 +47,15 @@ class RobotDrive:
     """Record on the robot, and download the recording to this folder at the end."""
 
     def run(self) -> None:
-        """Drive until Q, or until Ctrl-C if the console is used."""
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
         known = recall(self.robot)
-        pilot = None if self.policy is None else _load_pilot(self.policy, known)
+        pilot = None
+        if self.policy is not None:
+            policy = load_clone(self.policy)
+            with RobotClient.connect(known, frames=False) as there:
+                require_fit(policy.card, there.welcome, measures=True)
+            pilot = PolicyDriver(policy, self.policy.stem, known)
         uses_keys = self.terminal or not can_open()
         with contextlib.ExitStack() as stack:
             terminal = stack.enter_context(Terminal()) if uses_keys else None
@@ -276,11 +277,17 @@ class Driving:
             for feature, value in zip(self._state, seen.state, strict=True)
             if not feature.name.endswith("/applied")
         )
+        recorder, recording = self._robot.recorder, ""
+        if recorder is not None:
+            recording = recorder.text
+            if recorder.recording:
+                steps = recorder.steps - recorder.dropped
+                recording = f"recording {recorder.seconds:.0f} s, {steps} steps"
         pilot_note = "" if self._pilot is None else self._pilot.note
         parts = [
             state,
             f"cap {self._cap:.1f}",
-            self._recording(),
+            recording,
             self._values(seen.action_applied),
             f"{seen.suggested_by} wants {self._values(seen.suggested)}" if seen.suggested else "",
             senses,
@@ -291,19 +298,3 @@ class Driving:
     def _values(self, values: tuple[float, ...]) -> str:
         named = zip(self._actions.names, values, strict=False)
         return " ".join(f"{name} {value:+.2f}" for name, value in named)
-
-    def _recording(self) -> str:
-        state = self._robot.recorder
-        if state is None or not (state.recording or state.text):
-            return ""
-        if not state.recording:
-            return state.text
-        return f"recording {state.seconds:.0f} s, {state.steps - state.dropped} steps"
-
-
-def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
-    """Load a policy and check that it can drive the robot."""
-    policy = load_clone(path)
-    with RobotClient.connect(robot, frames=False) as there:
-        require_fit(policy.card, there.welcome, measures=True)
-    return PolicyDriver(policy, path.stem, robot)

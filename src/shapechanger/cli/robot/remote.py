@@ -93,7 +93,6 @@ class RobotForget:
 
 
 def _asked_key(name: str) -> str:
-    """Read the key from a hidden prompt or a pipe."""
     if sys.stdin.isatty():
         return getpass.getpass(f"key of {name}: ")
     key = sys.stdin.readline()
@@ -118,7 +117,6 @@ class RobotStop:
     """Why, for people to read."""
 
     def run(self) -> None:
-        """Stop the robot; exit with 1 if it does not confirm."""
         known = recall(self.robot)
         try:
             with RobotClient.connect(known, role="person", frames=False) as robot:
@@ -150,7 +148,6 @@ class RobotFetch:
     """Ids of the episodes to fetch; all if not given."""
 
     def run(self) -> None:
-        """Download; exit with 1 if an episode failed."""
         failed = 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
             there = episodes_there(robot, self.episodes)

@@ -106,20 +106,15 @@ class RobotServe(Service):
         """Refuse a policy that does not fit the robot, before anything moves."""
         if self.policy is None:
             return
-        files = [self.policy]
+        if not self.policy.exists():
+            raise PolicyError(no_policy_file(self.policy, what="file or folder"))
+        files = [self.policy] if self.policy.suffix == ENDING else []
         if self.policy.is_dir():
             files = [self.policy / f"{name}{ENDING}" for name in policies_in(self.policy)]
-            if not files:
-                raise PolicyError(
-                    f"There is no policy NAME{ENDING} in {self.policy}: "
-                    "`shapechanger policies export` writes one."
-                )
-        elif not self.policy.exists():
-            raise PolicyError(no_policy_file(self.policy, what="file or folder"))
-        elif self.policy.suffix != ENDING:
+        if not files:
             raise PolicyError(
-                f"A policy on board is a file NAME{ENDING}, got {self.policy.name}: "
-                "`shapechanger policies export` writes one."
+                f"There is no policy NAME{ENDING} at {self.policy}: `shapechanger policies export` "
+                "writes one."
             )
         for file in files:
             policy = load_clone(file)

@@ -98,18 +98,15 @@ class RobotInit:
 
         name = _answer("Its name", kind, free)
         has = "none" if stated.camera is None else "ribbon"
-        camera = _answer(
-            "Camera (ribbon: the Pi's own cable, usb: a webcam, none)",
-            has,
-            _one_of(("ribbon", "usb", "none"), "camera"),
-        )
-        arming = _answer(
-            "Who may arm it, so that it can move (person; anyone: programs, too)",
-            stated.arming,
-            _one_of(("person", "anyone"), "answer"),
-        )
-        installs = "no"
-        if _is_pi():
+        question = "Camera (ribbon: the Pi's own cable, usb: a webcam, none)"
+        camera = _answer(question, has, _one_of(("ribbon", "usb", "none"), "camera"))
+        question = "Who may arm it, so that it can move (person; anyone: programs, too)"
+        arming = _answer(question, stated.arming, _one_of(("person", "anyone"), "answer"))
+        try:
+            Machine("").require_pi()
+        except RobotError:
+            installs = "no"
+        else:
             question = "Install it now, with sudo, to start with the computer (yes, no)"
             installs = _answer(question, "yes", _one_of(("yes", "no"), "answer"))
         chosen: Any = {
@@ -130,7 +127,6 @@ class RobotInit:
         return name, out
 
     def _write(self, *, installs: bool = False) -> Path:
-        """Write the files, print the next steps, and return the profile."""
         name, out = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
         # Lets this machine drive it, especially on a twin.
@@ -213,15 +209,6 @@ def how_to_remember(name: str, credentials: Credentials) -> str:
     )
 
 
-def _is_pi() -> bool:
-    """Return whether a robot can be installed on this machine."""
-    try:
-        Machine("").require_pi()
-    except RobotError:
-        return False
-    return True
-
-
 def _first_sentence(profile: Path) -> str:
     """Return the first sentence of the comment at the head of a shipped profile."""
     lines = takewhile(lambda line: line.startswith("#"), profile_text(profile).splitlines())
@@ -242,7 +229,6 @@ def _one_of(options: Iterable[str], kind: str) -> Callable[[str], str]:
 
 
 def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
-    """Ask until an answer passes a check, and return the checked value."""
     while True:
         try:
             answer = input(f"{question} [{default}]: ").strip() or default
@@ -322,7 +308,6 @@ class RobotInstall:
     """Folder of its key and certificate, if not the one that `init` made."""
 
     def run(self) -> None:
-        """Make each change that is not made yet, and exit with 1 if one could not be made."""
         path = own_profile(self.profile)
         self.install(load_profile(path), Machine(getpass.getuser()))
 
@@ -371,13 +356,11 @@ class RobotInstall:
             raise RobotError(f"There is no {unit}: it is written without --dry-run.")
         unit, _ = write_unit(profile.name, path, self.credentials, user)
         text = unit.read_text(errors="replace")
-        lacks = ""
-        if unit_word(str(path)) not in text:
-            lacks = f"name {path}"
-        elif f"\nUser={user}\n" not in text:
-            lacks = f"run the robot as {user}, who installs it"
-        if lacks:
-            raise RobotError(f"{unit} does not {lacks}: remove it, and install again.")
+        if unit_word(str(path)) not in text or f"\nUser={user}\n" not in text:
+            raise RobotError(
+                f"{unit} does not run {path} as {user}, who installs it: remove it, and install "
+                "again."
+            )
         return unit
 
 
