@@ -11,15 +11,11 @@ import numpy as np
 import pytest
 
 from benchmarks import run
-from benchmarks.finger_gap import rows_of
 from benchmarks.finger_reach import Statics
 from benchmarks.row import Row, asked
 from shapechanger.finger.anatomy import JOINT_REST
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.task import fingertip
-from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.plan import Run
-from shapechanger.transfer.runs import RunResult
 
 
 def test_rows_that_only_leaves_out_are_kept(
@@ -85,27 +81,3 @@ def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
     assert rubbing.distance(hook) < 1e-4
     assert rubbing.distance_coming_from_rest(hook) > 4e-3
     assert rubbing.distance_coming_from_rest(fingertip(JOINT_REST)) < 1e-4
-
-
-def test_rows_of_a_study_that_has_not_ended_name_their_fingers() -> None:
-    """A mean over some fingers says over which, and the end of a run counts, not its start."""
-
-    def run(arm: str, index: int, *successes: float) -> RunResult:
-        curve = tuple(Evaluation(i, 0.0, 1.0, success=each) for i, each in enumerate(successes))
-        return RunResult(Run(arm, index), 0, curve, 0.0)
-
-    runs = {
-        "fine-tune": [run("fine-tune", 0, 0.0, 0.8), run("fine-tune", 1, 0.0, 0.6)],
-        "identified": [run("identified", 0, 0.9), run("identified", 6, 0.8)],
-    }
-    least = {"fine-tune": 0.7, "identified": 0.9}
-    tuned, identified = rows_of(runs, "fingers", least, simulated=1000)
-    assert (tuned.value, tuned.target, tuned.met) == ("70%", ">= 70%", True)
-    assert (identified.value, identified.met) == ("85%", False)
-    assert "over 2 fingers: 80%, 60%" in tuned.spread
-    assert identified.spread.endswith(
-        "over 2 fingers: 90%, 80%; at least 80% on 2 of 2 fingers; after 1,000 simulated steps"
-    )
-    assert tuned.spread.endswith("at least 80% on 1 of 2 fingers, not on seeds 1")
-    assert tuned.name.endswith("within 5 mm")
-    assert identified.name.endswith("within 5 mm, seeds 0, 6")

@@ -10,11 +10,9 @@ from typing import Any, cast
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from imageio_ffmpeg import count_frames_and_secs
 
-from scripts.draw_pictures import CLIPS, PICTURES, STILLS, film_bodies, main
+from scripts.draw_pictures import CLIPS, PICTURES, STILLS, main
 from scripts.site_hooks import on_page_markdown
-from shapechanger.reports.films import require_film
 
 GALLERY = PICTURES.parent / "gallery.md"
 
@@ -35,18 +33,6 @@ def test_the_command_draws_one_picture(tmp_path: Path, monkeypatch: pytest.Monke
     assert not seen[[0, -1]].any()
     heights = np.ptp([np.flatnonzero(seen[:, i].any(axis=1))[[0, -1]] for i in range(3)], axis=1)
     assert heights[0] < heights[1] < heights[2]
-
-
-@pytest.mark.gl
-@pytest.mark.usefixtures("gl")
-def test_bodies_are_filmed(tmp_path: Path) -> None:
-    """A clip has a frame for each twentieth of a second, and an image that stands for it."""
-    require_film(tmp_path / "one.webm")  # The check of commands that take a film's name.
-    film_bodies((("InvertedPendulum",),), 0.5, rows=160)(tmp_path / "one")
-    assert count_frames_and_secs(str(tmp_path / "one.webm")) == (10, 0.5)
-    picture = np.asarray(iio.imread(tmp_path / "one.jpg"))
-    assert picture.shape == (160, 300, 3)
-    assert picture.std() > 10.0
 
 
 def test_the_gallery_shows_what_the_command_draws() -> None:

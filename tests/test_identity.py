@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.identity import modules_of, modules_of_env, named_modules, own_modules
+from shapechanger.identity import modules_of, named_modules, own_modules
 
 
 @pytest.fixture
@@ -93,12 +93,3 @@ def test_names_in_arguments_name_modules() -> None:
     """`module:Name` does, and texts that only have a colon do not."""
     texts = ["om_a:B", "om.c:d-e", "note: text", '{"edit": 1}', "C:\\x", ":x"]
     assert list(named_modules(texts)) == ["om_a", "om.c"]
-
-
-def test_an_env_without_a_spec_has_modules() -> None:
-    """Such as an object that only looks like one."""
-    assert __name__ in modules_of_env(_Bare())
-
-
-class _Bare:
-    """Nearly an env."""

@@ -20,11 +20,10 @@ import gymnasium as gym
 import pytest
 
 from scripts.site_hooks import in_site, links_of, origin_of, rewritten
-from scripts.site_pages import api_pages, environment_page, public_names, reference_path
+from scripts.site_pages import api_pages, public_names, reference_path
 from scripts.wiring_diagrams import devices_of, draw_wiring, part_list, pin_table
 from shapechanger.contract.plan import driven_pins
 from shapechanger.envs.catalogue import ODRL_ENVS
-from shapechanger.errors import RenderError
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD
 from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
 from tests.drawing import missing
@@ -136,27 +135,6 @@ def test_every_exported_name_is_in_the_reference() -> None:
         linked |= set(re.findall(r"\]\[(.+?)\]", page))
         assert [one for one in exported if one not in members and f"[`{one}`][" not in page] == []
     assert linked <= described
-
-
-def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nothing renders, the page comes without image, with a note; on CI it fails."""
-    _require("griffe")
-
-    def fail(*_: object) -> bytes:
-        raise RenderError("Nothing renders here.")
-
-    monkeypatch.setattr("scripts.site_pages._picture", fail)
-    monkeypatch.setenv("CI", "false")
-    page = environment_page("shapechanger/BigAnt-v1")
-    assert page.notes == (
-        "The page of shapechanger/BigAnt-v1 has no picture: Nothing renders here.",
-    )
-    assert page.pictures == {}
-    for part in ("all shanks twice as long", "| `hip_4/motor` ", "length 0.5657 m -> 1.131 m"):
-        assert part in page.content
-    monkeypatch.setenv("CI", "true")
-    with pytest.raises(RenderError):
-        environment_page("shapechanger/BigAnt-v1")
 
 
 @contextmanager

@@ -5,11 +5,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from contextlib import suppress
 
 import pytest
 
-from shapechanger.cli import main
 from tests.drawing import run_python
 
 COMMAND = "from shapechanger.cli import main; main({arguments!r})"
@@ -90,25 +88,6 @@ def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None
     assert done.returncode == 2
     assert done.stderr.startswith("error: pygame is not installed")
     assert done.stderr.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["robot", "serve", "car", "--no-announce", "--help"],
-        ["suite", "list"],
-        ["methods"],
-        ["train", "--help"],
-    ],
-)
-def test_flags_and_help_are_options(
-    capsys: pytest.CaptureFixture[str], arguments: list[str]
-) -> None:
-    with suppress(SystemExit):  # Help exits.
-        main(arguments)
-    said = capsys.readouterr()
-    assert said.out
-    assert not said.err
 
 
 @pytest.mark.system

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -114,24 +113,6 @@ def test_a_killed_study_resumes_to_the_same_numbers(
     assert done.returncode == 0, done.stderr
     assert "had ended before" in done.stdout
     assert curves(out) == curves(quick[0])
-
-
-@pytest.mark.slow
-def test_a_full_disk_gives_one_sentence(tmp_path: Path) -> None:
-    """With files limited to 20 kB, the error lists the kept files."""
-    done = run(
-        *QUICK,
-        "--out",
-        str(tmp_path / "study"),
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-    )
-    assert done.returncode == 2
-    assert "Cannot write" in done.stderr
-    assert "policy.safetensors" in done.stderr
-    ended = list((tmp_path / "study" / "runs").glob("*/run.json"))
-    way_on = "are kept" if ended else "No run had ended; begin again with: shapechanger transfer"
-    assert way_on in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 @pytest.fixture(scope="module")

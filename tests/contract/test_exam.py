@@ -119,14 +119,6 @@ def test_stable_baselines3_accepts_the_env(env_id: str) -> None:
         check_env(env)
 
 
-@pytest.mark.parametrize(
-    ("env_id", "mode"), [("shapechanger/Car-v1", "async"), ("shapechanger/Boat-v1", "sync")]
-)
-def test_vehicles_can_be_vectorized(env_id: str, mode: str) -> None:
-    """In the same process, and in subprocesses."""
-    _play(gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, image=False))
-
-
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize(

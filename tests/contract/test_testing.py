@@ -117,18 +117,14 @@ def _restored(**changes: Any) -> Any:
 _count = itertools.count()
 _low = Layout((Feature("point/x", "m", -0.1, 0.1), Feature("point/vx", "m/s")))
 _line = Layout((Feature("point/x", "m", -1.0, 1.0),))
-_strong = Layout((Feature("point/motor", "1", -2.0, 2.0),))
 Unseeded = _env("Unseeded", start=lambda self: 1e-3 * next(_count))
 Moody = _env("Moody", reward=lambda self, info: sum(info.values()) + next(_count))
 Shared = _env("Shared", seen=lambda self: self.state)
 Nameless = _env("Nameless", observation_layout=None)
 Short = _env("Short", observation_layout=_line)
-Strong = _env("Strong", action_layout=_strong)
 Chooser = _env("Chooser", action_space=gym.spaces.Discrete(3))
 Holding = _env("Holding", __getstate__=lambda self: (number for number in range(3)))
 Changed = _env("Changed", __setstate__=_restored(power=2.0))
-Richer = _env("Richer", __setstate__=_restored(pay=2.0))
-Brief = _env("Brief", __setstate__=_restored(limit=-1.0))
 Vague = _env("Vague", info=lambda self: {})
 Generous = _env("Generous", reward=lambda self, info: sum(info.values()) + 1e-3)
 Still = _env("Still", start=lambda self: 0.0)
@@ -152,12 +148,9 @@ _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
     (Shared, shares_no_memory, "share memory"),
     (Nameless, names_every_number, "Nameless publishes no observation_layout"),
     (Short, names_every_number, "observation layout has 1 numbers, its space Box"),
-    (Strong, names_every_number, "bounds of the action layout"),
     (Chooser, names_every_number, "action layout has 1 numbers, its space Discrete"),
     (Holding, pickles, "cannot be copied: cannot pickle 'generator' object"),
     (Changed, pickles, "copy of the env behaves differently"),
-    (Richer, pickles, "copy of the env behaves differently"),
-    (Brief, pickles, "copy of the env behaves differently"),
     (Vague, reward_is_the_sum_of_its_terms, "reports no reward terms"),
     (Wild, reward_is_the_sum_of_its_terms, "diverges at step 3 of random actions: give the act"),
     (Generous, reward_is_the_sum_of_its_terms, "its terms add up to"),

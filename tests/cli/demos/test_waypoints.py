@@ -182,13 +182,6 @@ def test_unsuitable_recordings_are_refused(
     assert not out.exists()
 
 
-def test_several_bodies_are_refused(tmp_path: Path) -> None:
-    _record(tmp_path)
-    _record(tmp_path, body="truck")
-    with pytest.raises(DemosError, match="several bodies, car, truck"):
-        _loaded(tmp_path)
-
-
 def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     """Options of waypoints need `--waypoints`, and their kind of policy is given."""
     data, out = tmp_path / "drive", tmp_path / "policy.safetensors"

@@ -53,14 +53,14 @@ def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["log.npz"]
 
 
-@pytest.mark.parametrize("says", [False, True])
 def test_motors_are_taken_for_geared_where_the_log_says_nothing(
-    tmp_path: Path, finger: Cli, monkeypatch: pytest.MonkeyPatch, says: bool
+    tmp_path: Path, finger: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`--geared` gives a log the shipped rig's motors, and leaves those that a log has."""
     log, _ = recorded(2.4)
     own = NOMINAL.replace(motor_kg=0.5)
-    save_log(dataclasses.replace(log, motors=own if says else None), tmp_path / "log.npz")
+    save_log(dataclasses.replace(log, motors=None), tmp_path / "log.npz")
+    save_log(dataclasses.replace(log, motors=own), tmp_path / "own.npz")
     taken: list[FingerParameters | None] = []
 
     def identify(log: FingerLog, _: object) -> None:
@@ -68,9 +68,9 @@ def test_motors_are_taken_for_geared_where_the_log_says_nothing(
         raise FingerError("That is enough.")
 
     monkeypatch.setattr("shapechanger.cli.finger.identify", identify)
-    for option in ((), ("--geared",)):
-        assert "That is enough." in finger.refused("identify", tmp_path / "log.npz", *option)
-    assert taken == ([own, own] if says else [None, shipped_rig()])
+    for words in (("log.npz",), ("log.npz", "--geared"), ("own.npz", "--geared")):
+        assert "That is enough." in finger.refused("identify", tmp_path / words[0], *words[1:])
+    assert taken == [None, shipped_rig(), own]
 
 
 @pytest.mark.slow
