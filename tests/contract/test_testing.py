@@ -122,6 +122,8 @@ Moody = _env("Moody", reward=lambda self, info: sum(info.values()) + next(_count
 Shared = _env("Shared", seen=lambda self: self.state)
 Nameless = _env("Nameless", observation_layout=None)
 Short = _env("Short", observation_layout=_line)
+_strong = Layout((Feature("point/motor", "1", -2.0, 2.0),))
+Strong = _env("Strong", action_layout=_strong)
 Chooser = _env("Chooser", action_space=gym.spaces.Discrete(3))
 Holding = _env("Holding", __getstate__=lambda self: (number for number in range(3)))
 Changed = _env("Changed", __setstate__=_restored(power=2.0))
@@ -148,6 +150,7 @@ _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
     (Shared, shares_no_memory, "share memory"),
     (Nameless, names_every_number, "Nameless publishes no observation_layout"),
     (Short, names_every_number, "observation layout has 1 numbers, its space Box"),
+    (Strong, names_every_number, "bounds of the action layout"),
     (Chooser, names_every_number, "action layout has 1 numbers, its space Discrete"),
     (Holding, pickles, "cannot be copied: cannot pickle 'generator' object"),
     (Changed, pickles, "copy of the env behaves differently"),

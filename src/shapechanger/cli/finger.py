@@ -6,7 +6,7 @@ import dataclasses
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import tyro
 from rich.table import Table
@@ -20,7 +20,7 @@ from shapechanger.files import read_file, require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.export import finger_mjcf
 from shapechanger.finger.gap import resolve_gap, shipped_rig
-from shapechanger.finger.identify import identify, load_log, save_log
+from shapechanger.finger.identify import IdentifiedFinger, identify, load_log, save_log
 from shapechanger.finger.identify.log import record_babble
 from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters, named_set
 from shapechanger.finger.report import (
@@ -33,9 +33,6 @@ from shapechanger.finger.report import (
     unknown,
 )
 from shapechanger.finger.tensions import drive_of
-
-if TYPE_CHECKING:
-    from shapechanger.finger.identify import IdentifiedFinger
 
 # Largest file of parameters, which have some kilobytes.
 _MOST_BYTES: Final = 1 << 20

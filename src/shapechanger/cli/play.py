@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -21,10 +21,7 @@ from shapechanger.rendering import has_screen
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.identities import ENV, require_same_env
-from shapechanger.transfer.learners.evaluation import random_actions
-
-if TYPE_CHECKING:
-    from shapechanger.transfer.learners.evaluation import Act
+from shapechanger.transfer.learners.evaluation import Act, random_actions
 
 
 @dataclass(frozen=True, kw_only=True)

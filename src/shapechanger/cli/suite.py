@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import msgspec
 import tyro
@@ -39,11 +39,12 @@ from shapechanger.transfer.plan import (
     read_plan,
 )
 from shapechanger.transfer.report.study import write_study_report
-from shapechanger.transfer.report.suite import Sweep, suite_html
+from shapechanger.transfer.report.suite import FilmStrip, Sweep, suite_html
 from shapechanger.transfer.runs import last_evaluation, load_result
 from shapechanger.transfer.study import (
     STUDY_FILE,
     Study,
+    TaskTraits,
     default_arms,
     inspect_task,
     looks_in,
@@ -51,12 +52,7 @@ from shapechanger.transfer.study import (
     run_study,
     unfinished_runs,
 )
-from shapechanger.transfer.suite import merge_study, open_study_folder, study_outcome
-
-if TYPE_CHECKING:
-    from shapechanger.transfer.report.suite import FilmStrip
-    from shapechanger.transfer.study import TaskTraits
-    from shapechanger.transfer.suite import StudyOutcome
+from shapechanger.transfer.suite import StudyOutcome, merge_study, open_study_folder, study_outcome
 
 _SUMMARY: Final = "suite.json"
 _FILM: Final = "film.mp4"

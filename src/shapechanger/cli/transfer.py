@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 from rich.table import Table
 
@@ -24,7 +24,7 @@ from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.report.study import write_study_report
-from shapechanger.transfer.report.verdict import findings
+from shapechanger.transfer.report.verdict import Findings, findings
 from shapechanger.transfer.study import (
     Study,
     default_arms,
@@ -34,9 +34,6 @@ from shapechanger.transfer.study import (
     run_study,
     unfinished_runs,
 )
-
-if TYPE_CHECKING:
-    from shapechanger.transfer.report.verdict import Findings
 
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.demos.clone_report import outlook, write_report
 from shapechanger.demos.cloning.clone import ShrunkFrames, load_clone, settings_for
-from shapechanger.demos.cloning.evaluation import evaluate
+from shapechanger.demos.cloning.evaluation import EvaluationResult, evaluate
 from shapechanger.demos.dataset import Dataset, count_steps, load_dataset
 from shapechanger.errors import DemosError, OutputError, StudyError, check_seed
 from shapechanger.files import require_file, write_atomic
@@ -24,7 +24,6 @@ from shapechanger.vehicles.cameras.rectify import CameraGeometry, CanonicalView
 from shapechanger.vehicles.waypoints import SteeringResponse, as_waypoints
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.evaluation import EvaluationResult
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.network import CameraPolicy
     from shapechanger.vehicles.cloning import CloningSettings
