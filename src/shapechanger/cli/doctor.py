@@ -28,7 +28,7 @@ _NOT_LISTED: Final = ("all", "dev")
 _PATIENCE_S: Final = 120
 # Drawn in a separate process, because a broken driver ends the process.
 _DRAW: Final = """
-from shapechanger.rendering import choose_gl
+from shapechanger.envs.opengl import choose_gl
 choose_gl()
 import os, gymnasium, shapechanger
 with gymnasium.make("shapechanger/InvertedPendulum-v1", render_mode="rgb_array") as env:

@@ -14,10 +14,10 @@ from shapechanger.cli.console import say
 from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened, policy_file
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.naming import allow_own_modules, env_ref
+from shapechanger.envs.opengl import has_screen
 from shapechanger.errors import StudyError, check_seed
 from shapechanger.identity import identify_env
 from shapechanger.policy import PolicyCard, load_policy
-from shapechanger.rendering import has_screen
 from shapechanger.reports.films import require_film, write_film
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.identities import ENV, require_same_env

@@ -25,8 +25,8 @@ from shapechanger.envs.catalogue import (
     find,
     find_task,
 )
+from shapechanger.envs.opengl import require_known_gl
 from shapechanger.errors import MorphologyError, StudyError, UnknownName
-from shapechanger.rendering import require_known_gl
 
 _IN_MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^:]+")  # Such as `module:id`.
 

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.envs.opengl import choose_gl, open_context
 from shapechanger.errors import MissingExtra, RenderError
-from shapechanger.rendering import choose_gl, open_context
 
 try:
     from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer

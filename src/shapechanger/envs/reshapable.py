@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.errors import (
     EnvArgumentError,
     MissingExtra,
@@ -16,7 +17,6 @@ from shapechanger.errors import (
     UnknownName,
     check_seed,
 )
-from shapechanger.rendering import choose_gl, require_screen
 
 try:
     import mujoco

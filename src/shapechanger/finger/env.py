@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.measure import Measure
 from shapechanger.envs.checks import check_action
+from shapechanger.envs.opengl import choose_gl, require_screen
 from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
@@ -33,7 +34,6 @@ from shapechanger.finger.task import FingerSenses, FingertipReward
 from shapechanger.finger.tensions import drive_of
 from shapechanger.finger.visuals import tendon_legend
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.rendering import choose_gl, require_screen
 
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec

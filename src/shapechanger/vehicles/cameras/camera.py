@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.envs.opengl import choose_gl, open_context
 from shapechanger.errors import RenderError
-from shapechanger.rendering import choose_gl, open_context
 from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
 
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)

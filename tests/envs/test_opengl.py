@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(
 
 _CHOOSE = """
 import os
-from shapechanger.rendering import choose_gl
+from shapechanger.envs.opengl import choose_gl
 choose_gl()
 print(os.environ.get("MUJOCO_GL"))
 """
