@@ -16,9 +16,15 @@ import gymnasium as gym
 
 import shapechanger
 from scripts.wiring_diagrams import draw_wiring, part_list, pin_table
-from shapechanger.cli.envs import summaries
 from shapechanger.contract.env_ref import EnvRef, layouts_of
-from shapechanger.envs.catalogue import CATALOGUE, NAMESPACE, ODRL_ENVS, OWN_ROBOT, VEHICLE_ENVS
+from shapechanger.envs.catalogue import (
+    CATALOGUE,
+    NAMESPACE,
+    ODRL_ENVS,
+    OWN_ROBOT,
+    VEHICLE_ENVS,
+    summaries,
+)
 from shapechanger.errors import EmptyShift, RenderError
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.profile import load_profile, shipped_profiles

@@ -13,27 +13,9 @@ from shapechanger.cli.console import plain_console, print_table, say
 from shapechanger.cli.env_arguments import OneEnv, TwoEnvs, asked, opened
 from shapechanger.contract.env_ref import layouts_of
 from shapechanger.contract.testing import examine
-from shapechanger.envs.catalogue import (
-    CATALOGUE,
-    FINGER_ENVS,
-    ODRL_ENVS,
-    OWN_ROBOT,
-    RANGES_ENVS,
-    VEHICLE_ENVS,
-    WAYPOINT_ENVS,
-)
+from shapechanger.envs.catalogue import ODRL_ENVS, OWN_ROBOT, summaries
 from shapechanger.layout import Layout
 from shapechanger.reports.films import write_picture
-
-
-def summaries() -> dict[str, str]:
-    """Return a line on each env, keyed by id."""
-    vehicles = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
-    return {
-        **{entry.id: entry.summary for entry in CATALOGUE.values()},
-        **{env_id: f"{vehicle}: {summary}" for env_id, (vehicle, summary) in vehicles.items()},
-        **{env_id: task.summary for env_id, task in FINGER_ENVS.items()},
-    }
 
 
 @dataclass(frozen=True)

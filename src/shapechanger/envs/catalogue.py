@@ -169,6 +169,16 @@ _EPISODE_STEPS: Final = 1000
 _TUNED: Final = ("Ant", "InvertedPendulum")
 
 
+def summaries() -> dict[str, str]:
+    """Return a line on each env, keyed by id."""
+    vehicles = {**VEHICLE_ENVS, **RANGES_ENVS, **WAYPOINT_ENVS}
+    return {
+        **{entry.id: entry.summary for entry in CATALOGUE.values()},
+        **{env_id: f"{vehicle}: {summary}" for env_id, (vehicle, summary) in vehicles.items()},
+        **{env_id: task.summary for env_id, task in FINGER_ENVS.items()},
+    }
+
+
 def register_all() -> None:
     """Register every env of the catalogue with Gymnasium, once."""
     for entry in (*CATALOGUE.values(), *ODRL_ENVS.values()):

@@ -16,24 +16,19 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import require_port
-from shapechanger.demos.cloning.clone import load_clone
 from shapechanger.errors import (
     MissingExtra,
-    PolicyError,
     RobotError,
-    RobotRefused,
     check_seed,
-    no_policy_file,
 )
 from shapechanger.robot.check.pins import require_pins
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.policies import ENDING, policies_in
 from shapechanger.robot.guard.running import plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.serve import Service, require_free
 from shapechanger.robot.twin.start import Place
-from shapechanger.vehicles.remote.pilot import require_fit as require_policy
+from shapechanger.vehicles.remote.pilot import require_policies
 
 _ROOM: Final = "room"
 
@@ -68,7 +63,8 @@ class RobotServe(Service):
                 )
                 board = self.board(profile, place, undo)
             plan = self.plan(profile, board)
-            self._require_policy(msgspec.convert(plan.daemon, DaemonPlan))
+            if self.policy is not None:
+                require_policies(self.policy, msgspec.convert(plan.daemon, DaemonPlan).card)
             if board is None:
                 require_pins(profile.guard_plan())
             port = require_free(str(plan.daemon["host"]), self.port)
@@ -101,27 +97,6 @@ class RobotServe(Service):
         if self.gap and self.world:
             raise RobotError("A finger of a --gap has no --world: give only one of them.")
         require_port(self.port)
-
-    def _require_policy(self, plan: DaemonPlan) -> None:
-        """Refuse a policy that does not fit the robot, before anything moves."""
-        if self.policy is None:
-            return
-        if not self.policy.exists():
-            raise PolicyError(no_policy_file(self.policy, what="file or folder"))
-        files = [self.policy] if self.policy.suffix == ENDING else []
-        if self.policy.is_dir():
-            files = [self.policy / f"{name}{ENDING}" for name in policies_in(self.policy)]
-        if not files:
-            raise PolicyError(
-                f"There is no policy NAME{ENDING} at {self.policy}: `shapechanger policies export` "
-                "writes one."
-            )
-        for file in files:
-            policy = load_clone(file)
-            try:
-                require_policy(policy.card, plan.card, measures=False)
-            except (PolicyError, RobotRefused) as error:
-                raise PolicyError(f"{file} cannot drive {plan.card.robot}: {error}") from error
 
 
 def place_of(

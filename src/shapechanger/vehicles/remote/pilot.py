@@ -19,12 +19,13 @@ import numpy as np
 
 from shapechanger.demos.cloning.clone import Clone, clone_of, load_clone
 from shapechanger.demos.statistics import is_same_rate
-from shapechanger.errors import PolicyError, RobotRefused, ShapechangerError
+from shapechanger.errors import PolicyError, RobotRefused, ShapechangerError, no_policy_file
 from shapechanger.layout import Layout
 from shapechanger.policy import PolicyCard
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.client.known_robots import KnownRobot
+from shapechanger.robot.daemon.policies import ENDING, policies_in
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
@@ -78,6 +79,29 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
             f"The profile of {robot.robot} does not state turn_deg_per_m or turn_deg_per_s, which "
             "waypoints need on board: `shapechanger robot drive --policy` measures them."
         )
+
+
+def require_policies(path: Path, robot: RobotCard) -> None:
+    """Refuse a policy on board, or a folder of them, that does not fit a robot.
+
+    Raises:
+        PolicyError: If there is none, or one does not fit.
+    """
+    if not path.exists():
+        raise PolicyError(no_policy_file(path, what="file or folder"))
+    files = [path] if path.suffix == ENDING else []
+    if path.is_dir():
+        files = [path / f"{name}{ENDING}" for name in policies_in(path)]
+    if not files:
+        raise PolicyError(
+            f"There is no policy NAME{ENDING} at {path}: `shapechanger policies export` writes one."
+        )
+    for file in files:
+        card = load_clone(file).card
+        try:
+            require_fit(card, robot, measures=False)
+        except (PolicyError, RobotRefused) as error:
+            raise PolicyError(f"{file} cannot drive {robot.robot}: {error}") from error
 
 
 def _has_waypoints(card: PolicyCard) -> bool:
