@@ -85,7 +85,7 @@ def require_policies(path: Path, robot: RobotCard) -> None:
     """Refuse a policy on board, or a folder of them, that does not fit a robot.
 
     Raises:
-        PolicyError: If there is none, or one does not fit.
+        PolicyError: If there is no policy, or one does not fit.
     """
     if not path.exists():
         raise PolicyError(no_policy_file(path, what="file or folder"))
