@@ -10,7 +10,14 @@ from shapechanger.cli import main
 from shapechanger.cli.demos.recordings import DemosExport, DemosImport
 from shapechanger.demos.episodes import Drop, edit
 from tests.cli.running import Cli
-from tests.demos.exchange.small import drive, tub_folder
+from tests.demos.exchange.small import drive, keys_folder, tub_folder
+
+
+def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    DemosImport(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
+    assert capsys.readouterr().out == (
+        f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 images\nwrote {tmp_path / 'data'}\n"
+    )
 
 
 def test_a_partial_import_has_an_exit_code_of_its_own(
@@ -36,6 +43,10 @@ def test_a_partial_import_has_an_exit_code_of_its_own(
     assert "note: Columns that are not imported: lap.\n" in output.out
     assert "which is taken to be 20 Hz; --hz states another rate.\n" in output.out
     assert output.err == "left out 4 records with an empty image: 3, 5, 8, and 1 more\n"
+    with pytest.raises(SystemExit) as ended:
+        main(["demos", "import", str(tub), "--out", str(tmp_path / "b"), "--hz", "10"])
+    assert ended.value.code == 3
+    assert "these times are left out" in capsys.readouterr().out
 
 
 def test_export_prints_a_summary_and_how_to_load(
@@ -58,8 +69,6 @@ def test_export_prints_a_summary_and_how_to_load(
 def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """How to load a LeRobot dataset is printed, and what takes dropped steps."""
     edit(drive(tmp_path / "data"), Drop(0, 0, "bad"))
-    with pytest.raises(UnknownName, match="Did you mean 'minari'"):
-        DemosExport(tmp_path / "data", tmp_path / "out", "mniari").run()
     DemosExport(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
     output = capsys.readouterr().out
     assert "4 steps of 1 episode\nleft out 1 dropped step\n" in output
