@@ -11,12 +11,12 @@ from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.start import Place
-from shapechanger.vehicles.cameras.corruptions import find_corruption
 from shapechanger.vehicles.courses import WORLDS
 from shapechanger.vehicles.courses.course import HOME, require_element
 
 try:
     from shapechanger.vehicles.bodies import VEHICLES, require_fit
+    from shapechanger.vehicles.cameras.camera import find_corruption
     from shapechanger.vehicles.envs.drive import SimulatedRobot
     from shapechanger.vehicles.world import MujocoWorld
 except ModuleNotFoundError as error:

@@ -19,12 +19,11 @@ from shapechanger.vehicles.bodies.model import ContactTracker
 from shapechanger.vehicles.bodies.parts import CameraJitter, CameraMount, aim_camera, move_camera
 from shapechanger.vehicles.courses import lay_out, start_pose
 from shapechanger.vehicles.courses.course import HOME, Course, Look, require_element
-from shapechanger.vehicles.courses.scene import add_course
-from shapechanger.vehicles.expert.line import CourseProgress
+from shapechanger.vehicles.courses.geometry import CourseProgress
+from shapechanger.vehicles.courses.scene import SOLID_GROUP, add_course
 
 if TYPE_CHECKING:
-    from shapechanger.vehicles.cameras.camera import OnboardCamera, OutsideCamera
-    from shapechanger.vehicles.cameras.corruptions import Corruption
+    from shapechanger.vehicles.cameras.camera import Corruption, OnboardCamera, OutsideCamera
     from shapechanger.vehicles.expert.path import CoursePath
 
 PORTRAITS_RAD: Final = tuple(
@@ -38,7 +37,8 @@ _INNER_OHM: Final = 0.12  # Of the battery and its leads.
 _IDLE_A: Final = 0.6  # Current of the computer.
 _CONE: Final = np.radians((-7.0, 0.0, 7.0))  # An HC-SR04 hears 15 degrees.
 _HEARD_M: Final = 10.0  # More than twice as far as it hears; rays to walls beyond would cost time.
-_SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.vehicles.courses.scene`.
+
+_SOLID: Final = (np.arange(mujoco.mjNGROUP) == SOLID_GROUP).astype(np.uint8)
 _COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
 # Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
@@ -48,7 +48,7 @@ _KEPT_COURSES: Final = 64
 _ABOVE_RAD: Final = math.radians(-20.0)
 _LOOKED_AT_M: Final = 0.06
 _DISTANCE_PER_REACH: Final = 3.0
-# Farthest distance between two updates of the progress, m: well below `_WINDOW_M` of `expert.line`.
+# Farthest distance between two updates of the progress, m: well below that of `CourseProgress`.
 _PROGRESS_M: Final = 0.5
 
 
@@ -63,7 +63,7 @@ class MujocoWorld:
         pitch_deg: Angle of the camera's axis below the horizon, degrees; None for the vehicle's.
         fovy_deg: Vertical field of view of the camera, degrees; None for the vehicle's.
         look: Light and colours; None for the usual look of the world.
-        lenses: Names of camera faults; see `shapechanger.vehicles.cameras.corruptions`.
+        lenses: Names of camera faults; see `shapechanger.vehicles.cameras.camera`.
         coarse: Whether to take twice as long steps, but for a vehicle that turns on the spot, and
             to let wheels meet only the ground. The hull, which is wider, meets the walls.
 
@@ -105,17 +105,14 @@ class MujocoWorld:
         self._world = HOME[vehicle] if world is None else world
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera: OnboardCamera | None = None
-        if size is not None:
-            # Cameras are only loaded for images, and SciPy for their faults.
-            from shapechanger.vehicles.cameras.camera import OnboardCamera
-
-            self._camera = OnboardCamera(size, _CAMERA)
         self._outside: OutsideCamera | None = None
         self.lenses = tuple(lenses)
         self._distortions: list[Corruption] = []
-        if lenses:
-            from shapechanger.vehicles.cameras.corruptions import find_corruption  # SciPy.
+        if size is not None or lenses:
+            # Cameras are only loaded for images.
+            from shapechanger.vehicles.cameras.camera import OnboardCamera, find_corruption
 
+            self._camera = None if size is None else OnboardCamera(size, _CAMERA)
             self._distortions = [find_corruption(name) for name in lenses]
         self.resting_v = RESTING_V
         self.travelled_m = 0.0
@@ -155,7 +152,7 @@ class MujocoWorld:
     def lay_out(
         self, seed: int, look: Look | None = None, camera: CameraJitter | None = None
     ) -> None:
-        """Change the course and put the vehicle at a start; see `World.lay_out`.
+        """Change the course, light and colours, and put the vehicle at a start.
 
         Args:
             seed: Seed of the course and the start.
@@ -183,12 +180,10 @@ class MujocoWorld:
         self._contacts = ContactTracker(self.model)
         self._progress = CourseProgress(self.course)
         self._chassis = self.model.body(_CHASSIS).id
-        self._solid = np.zeros(mujoco.mjNGROUP, np.uint8)
-        self._solid[_SOLID_GROUP] = 1
         self.place(seed)
 
     def place(self, seed: int) -> None:
-        """Put the vehicle at a start, at rest; see `World.place`."""
+        """Put the vehicle at a start, at rest."""
         self.put(start_pose(self.course, seed))
 
     def put(self, pose: Pose) -> None:
@@ -221,7 +216,7 @@ class MujocoWorld:
         self.travelled_m = 0.0
 
     def truth(self) -> dict[str, float]:
-        """`progress_m` and `collisions`; see `World.truth`."""
+        """Ground truth for evaluation: `progress_m` and `collisions`."""
         return {"progress_m": self.progress_m, "collisions": float(self.collisions)}
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
@@ -233,15 +228,26 @@ class MujocoWorld:
         self._rest_s += dt_s
         steps = int((self._rest_s + _ROUNDING_S) / self._step_s)
         if steps:
-            self._rest_s -= steps * self._step_s
-            self._step(outputs, steps)
+            passed_s = steps * self._step_s
+            self._rest_s -= passed_s
+            bound, before = self._bound, self._motion
+            bound.drive(outputs, self.resting_v - _INNER_OHM * self._current_a)
+            mujoco.mj_step(self.model, self.data, nstep=steps)
+            self._motion = now = bound.motion()
+            self._contacts.follow(self.data, now, passed_s)
+            change = now.speed - before.speed
+            self._acceleration = (change / passed_s, now.speed * now.yaw_rate)
+            rolled_m = bound.travelled_m()
+            self.travelled_m += rolled_m - self._rolled_m
+            self._rolled_m = rolled_m
+            self._current_a = _IDLE_A + bound.current_a()
         here = self._motion[:2]
         if math.dist(here, self._updated_at) > _PROGRESS_M:
             self._updated_at = here
             self._progress.update(*here)
 
     def inputs(self) -> Readings:
-        """Quantities that sensors measure; see `World.inputs`."""
+        """Quantities that sensors measure."""
         x, y, heading, speed, _, yaw_rate = self._motion
         return Readings(
             pose=Pose(x, y, heading),
@@ -256,7 +262,7 @@ class MujocoWorld:
         )
 
     def distance_m(self) -> float:
-        """Distance by the shortest of three rays; see `World.distance_m`."""
+        """Distance from the nose to the nearest object ahead, by the shortest of three rays, m."""
         found = self._rays(0.0, _CONE, math.inf, _HEARD_M)
         return max(0.0, float(found.min()) - self.vehicle.nose_m)
 
@@ -288,14 +294,14 @@ class MujocoWorld:
         rays[:, 0], rays[:, 1] = np.cos(angles), np.sin(angles)
         hit, found = np.empty(count, np.int32), np.empty(count)
         mujoco.mj_multiRay(
-            self.model, self.data, start, rays.ravel(), self._solid, True, self._chassis, hit,
+            self.model, self.data, start, rays.ravel(), _SOLID, True, self._chassis, hit,
             found, None, count, farthest_m,
         )  # fmt: skip
         found[(hit < 0) | (found < 0.0)] = nothing_m
         return found
 
     def picture(self) -> NDArray[np.uint8]:
-        """Image of the front camera; see `World.picture`.
+        """Image of the front camera, RGB, shape (height, width, 3).
 
         Raises:
             WorldError: If the world was made without a camera.
@@ -337,17 +343,16 @@ class MujocoWorld:
         if self._outside is None or self._outside.size != (width, height):
             from shapechanger.vehicles.cameras.camera import OutsideCamera  # OpenGL.
 
-            camera = OutsideCamera((width, height))
-            if self._outside is not None:
-                self._outside.close()
+            camera, before = OutsideCamera((width, height)), self._outside
             self._outside = camera
+            if before is not None:
+                before.close()
         x, y, heading = self._motion[:3]
         ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
         middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
         centre = np.array((x, y, _LOOKED_AT_M)) + middle * ahead
         distance = _DISTANCE_PER_REACH * (reach or self.reach)
-        given = (azimuth_rad,) if isinstance(azimuth_rad, int | float) else azimuth_rad
-        views = [heading + azimuth for azimuth in given]
+        views = [heading + azimuth for azimuth in np.atleast_1d(azimuth_rad).tolist()]
         ends = centre + 0.5 * self.vehicle.length_m * np.stack([-ahead, ahead])
 
         def sees(view: float) -> bool:
@@ -357,7 +362,7 @@ class MujocoWorld:
             hit = np.zeros(1, np.int32)
             for end in ends:
                 met = mujoco.mj_ray(
-                    self.model, self.data, eye, end - eye, self._solid, True, self._chassis, hit
+                    self.model, self.data, eye, end - eye, _SOLID, True, self._chassis, hit
                 )
                 # In lengths of the ray.
                 if 0.0 <= met < 1.0 and self.model.geom_bodyid[hit[0]] == 0:
@@ -386,30 +391,10 @@ class MujocoWorld:
         self._rolled_m = self._bound.travelled_m()
         self._current_a = _IDLE_A
 
-    def _step(self, outputs: Mapping[str, float | None], steps: int) -> None:
-        """Take simulation steps with the same outputs and the same voltage of the battery."""
-        bound, dt_s = self._bound, steps * self._step_s
-        bound.drive(outputs, self.resting_v - _INNER_OHM * self._current_a)
-        mujoco.mj_step(self.model, self.data, nstep=steps)
-        before, now = self._motion, bound.motion()
-        self._motion = now
-        self._contacts.follow(self.data, now, dt_s)
-        self._acceleration = ((now.speed - before.speed) / dt_s, now.speed * now.yaw_rate)
-        rolled_m = bound.travelled_m()
-        self.travelled_m += rolled_m - self._rolled_m
-        self._rolled_m = rolled_m
-        self._current_a = _IDLE_A + bound.current_a()
-
 
 @lru_cache(maxsize=_KEPT_COURSES)
 def _compiled(
-    vehicle: str,
-    world: str,
-    seed: int,
-    look: Look,
-    coarse: bool,
-    step_s: float,
-    mount: CameraMount,
+    vehicle: str, world: str, seed: int, look: Look, coarse: bool, step_s: float, mount: CameraMount
 ) -> tuple[Course, mujoco.MjModel]:
     """Return a course, and the compiled model of a vehicle on it; neither may be changed."""
     course = lay_out(world, seed)
@@ -418,15 +403,9 @@ def _compiled(
     add_vehicle(spec, vehicle, look.tone())
     aim_camera(spec.camera(_CAMERA), mount)
     spec.option.timestep = step_s
-    if coarse:
-        _let_wheels_meet_only_the_ground(spec)
-    return course, spec.compile()
-
-
-def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
-    """Pair wheels with the ground, since searching for all they meet takes a third of a step."""
     ground = spec.geom("world/ground")
-    for geom in spec.geoms:
+    for geom in spec.geoms if coarse else ():
+        # Pair wheels with the ground: searching for all that they meet takes a third of a step.
         if geom.contype & ground.conaffinity and geom.name.startswith("vehicle/"):
             geom.contype = geom.conaffinity = 0
             # As MuJoCo combines the frictions of two geoms.
@@ -434,11 +413,9 @@ def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
             slide, spin, roll = (
                 geom.friction if wins else np.maximum(geom.friction, ground.friction)
             )
-            spec.add_pair(
-                geomname1=ground.name,
-                geomname2=geom.name,
-                friction=[slide, slide, spin, roll, roll],
-            )
+            friction = [slide, slide, spin, roll, roll]
+            spec.add_pair(geomname1=ground.name, geomname2=geom.name, friction=friction)
+    return course, spec.compile()
 
 
 @lru_cache(maxsize=_KEPT_COURSES)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import UnknownName
-from shapechanger.vehicles.cameras.corruptions import (
+from shapechanger.vehicles.cameras.camera import (
     CORRUPTIONS,
     Corruption,
     Picture,

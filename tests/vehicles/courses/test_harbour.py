@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +11,14 @@ from numpy.typing import NDArray
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Look, Obstacle
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
-from shapechanger.vehicles.courses.harbour import BANK_M, add_banks, fittings, moored
-from shapechanger.vehicles.courses.surfaces import QuadMesh, Surfaces, extent
+from shapechanger.vehicles.courses.surfaces import (
+    BANK_M,
+    QuadMesh,
+    Surfaces,
+    extent,
+    fittings,
+    moored,
+)
 
 _SEEDS = (0, 1, 2, 5, 1_000_000)
 # Tyres and ladders stand out of their wall.
@@ -48,8 +53,7 @@ def _points(mesh: QuadMesh) -> NDArray[np.float64]:
 def test_the_lane_stays_free(seed: int) -> None:
     """Fittings, moored boats and tops of quays are behind the walls, but for tyres and ladders."""
     course = lay_out("harbour", seed)
-    banks: dict[str, QuadMesh] = defaultdict(QuadMesh)
-    add_banks(course, banks, lambda flat: np.ones(len(flat)))
+    banks = Surfaces(course, Look.of("harbour")).walls()
     flat = np.concatenate([_points(p) for p in (*banks.values(), fittings(course))])[:, :2]
     assert _in_lane(course, course.route).all()  # The check itself works.
     wrong = _in_lane(course, flat) & (_from_walls(course, flat) > _PROUD_M)

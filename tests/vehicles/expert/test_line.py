@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.vehicles.expert.line import ClosedLine, CourseProgress
+from shapechanger.vehicles.courses.geometry import ClosedLine, CourseProgress
 from tests.vehicles.expert.courses import ring
 
 _SQUARE = ClosedLine(np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]))

@@ -11,9 +11,8 @@ import pytest
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Obstacle
-from shapechanger.vehicles.courses.geometry import FAR_M, ClearanceField
+from shapechanger.vehicles.courses.geometry import FAR_M, ClearanceField, ClosedLine
 from shapechanger.vehicles.expert.driver import TRAITS, plan_path_for
-from shapechanger.vehicles.expert.line import ClosedLine
 from shapechanger.vehicles.expert.path import CoursePath, plan_path
 from tests.vehicles.expert.courses import ring
 

@@ -1,1 +1,1 @@
-"""Cameras: images of the simulation, corruptions of them, and one view for all cameras."""
+"""Cameras: images of the simulation, faults of cameras, and one view for all cameras."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import zlib
-from collections.abc import Callable
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -38,21 +36,15 @@ def lay_out(world: str, seed: int) -> Course:
     if seed < 0:
         raise WorldError(f"Seeds of courses count from 0, got {seed}.")
     rng = np.random.default_rng([zlib.crc32(world.encode()), seed])
-    make: Callable[[np.random.Generator, int], Course | None] = corridor
-    if world != "corridor":
-        make = partial(open_course, world)
     for _ in range(_ATTEMPTS):
-        course = make(rng, seed)
+        is_open = world != "corridor"
+        course = open_course(world, rng, seed) if is_open else corridor(rng, seed)
         if course is not None:
             return course
-    raise WorldError(
-        f"No {world} with seed {seed} can be laid out: all {_ATTEMPTS} attempts were too tight."
-    )
+    raise WorldError(f"No {world} with seed {seed} can be laid out: use another seed.")
 
 
-_BEHIND_M: Final = 1.0
-_AHEAD_M: Final = 2.0
-_BESIDE_M: Final = 0.35
+_BEHIND_M, _AHEAD_M, _BESIDE_M = 1.0, 2.0, 0.35
 _STRAIGHT_RAD: Final = 0.35
 
 
@@ -80,7 +72,7 @@ def start_pose(course: Course, seed: int) -> Pose:
 def _sums(
     values: NDArray[np.float64] | NDArray[np.bool_], behind: int, before: int
 ) -> NDArray[np.float64]:
-    """Sums over windows along a closed line, from `behind` values behind to `before` ahead."""
+    """Sums along a closed line, from `behind` values behind to `before` ahead."""
     whole = np.concatenate([values[-behind:], values, values[:before]])
     sums = np.concatenate([[0.0], np.cumsum(whole)])
     window = behind + before + 1

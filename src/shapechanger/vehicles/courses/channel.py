@@ -37,8 +37,7 @@ from shapechanger.vehicles.courses.geometry import (
 )
 
 # Points of the route while it is shaped, and for pairwise distances.
-_FINE: Final = 1024
-_COARSE: Final = 128
+_FINE, _COARSE = 1024, 128
 _SPACING_M: Final = 0.1
 _WIND_RAD: Final = 0.4  # Smallest sum of the turns to either side.
 
@@ -130,10 +129,12 @@ def _dig_channel(
         blur *= 1.2
         if blur > world.blur[1]:
             return None
-    if not world.length[0] <= length(line) <= world.length[1] or not _winds(coarse):
+    turned = turn_angles(coarse)
+    winds = turned[turned > 0.0].sum() > _WIND_RAD < -turned[turned < 0.0].sum()
+    if not winds or not world.length[0] <= length(line) <= world.length[1]:
         return None
     # The route starts on a straight.
-    first = int(np.argmin(smooth(np.abs(turn_angles(coarse)), 2.0)))
+    first = int(np.argmin(smooth(np.abs(turned), 2.0)))
     line = np.roll(line, -first * (_FINE // _COARSE), axis=0)
     coarse, most = np.roll(coarse, -first, axis=0), np.roll(most, -first)
     low, high = world.dug
@@ -147,59 +148,34 @@ def _dig_channel(
     return route, interpolate(half[:, None], knots, s)[:, 0]
 
 
-def _winds(line: NDArray[np.float64]) -> bool:
-    """Return whether a line turns to both sides by at least `_WIND_RAD` in sum."""
-    turned = turn_angles(line)
-    return bool(turned[turned > 0.0].sum() > _WIND_RAD < -turned[turned < 0.0].sum())
-
-
-def build_banks(
-    rng: np.random.Generator,
-    route: NDArray[np.float64],
-    half_width: NDArray[np.float64],
-    kinds: tuple[BankKind, ...],
-) -> tuple[tuple[Wall, ...], tuple[Wall, ...]]:
-    """Walls on the left and on the right of a route, m, (n, 2), at a distance, m, (n,).
-
-    Each side is a closed line of randomly drawn kinds of bank.
-    """
-    aside = normals(route) * half_width[:, None]
-    left = _bank(rng, (route + aside)[::-1], kinds)
-    return left, _bank(rng, route - aside, kinds)
-
-
 def _bank(
     rng: np.random.Generator, line: NDArray[np.float64], kinds: tuple[BankKind, ...]
 ) -> tuple[Wall, ...]:
-    """Walls along a closed line, with the lane on its left."""
+    """Walls of randomly drawn kinds along a closed line, with the lane on its left."""
     knots = arc_lengths(line)
     shares = [kind.share for kind in kinds]
     ends: list[float] = []
-    chosen: list[BankKind] = []
-    heights: list[float] = []
+    pieces: list[tuple[BankKind, float]] = []  # With their heights, m.
     s = 0.0
     while s < knots[-1]:
         kind = kinds[weighted_choice(rng, shares)]
         count = max(1, round(float(rng.uniform(*kind.run)) / kind.piece))
         height = float(rng.uniform(*kind.height))
-        for _ in range(count):
+        while count and s < knots[-1]:
             s += kind.piece
+            count -= 1
             ends.append(s)
-            chosen.append(kind)
-            heights.append(height)
-            if s >= knots[-1]:
-                break
+            pieces.append((kind, height))
     # Scaled so that the last piece ends where the first begins.
     at_s = np.array(ends) * (knots[-1] / s)
     points = interpolate(line, knots, at_s)
     back = -normals(line)[np.searchsorted(knots[:-1], at_s % knots[-1]) % len(line)]
-    rough = np.array(
-        [min(a.rough, b.rough) for a, b in zip(chosen, [*chosen[1:], chosen[0]], strict=True)]
-    )
+    each = np.array([kind.rough for kind, _ in pieces])
+    rough = np.minimum(each, np.roll(each, -1))
     points += back * (rng.uniform(0.0, 1.0, len(points)) * rough)[:, None]
     return tuple(
-        Wall.between(points[i - 1], points[i], heights[i], kind.surface)
-        for i, kind in enumerate(chosen)
+        Wall.between(points[i - 1], points[i], height, kind.surface)
+        for i, (kind, height) in enumerate(pieces)
     )
 
 
@@ -215,10 +191,12 @@ def open_course(name: str, rng: np.random.Generator, seed: int) -> Course | None
     channel = _dig_channel(rng, world)
     if channel is None:
         return None
-    left, right = build_banks(rng, *channel, world.banks)
+    route, aside = channel[0], normals(channel[0]) * channel[1][:, None]
+    left = _bank(rng, (route + aside)[::-1], world.banks)
+    right = _bank(rng, route - aside, world.banks)
     if any_crossing(wall_segments((*left, *right))):
         return None
-    obstacles = LaneObstacles(channel[0], left, right, world.gap_m)
+    obstacles = LaneObstacles(route, left, right, world.gap_m)
     half_width = obstacles.half_width
     if half_width.min() < world.half_width[0] or half_width.max() > world.half_width[1]:
         return None
@@ -231,11 +209,11 @@ def open_course(name: str, rng: np.random.Generator, seed: int) -> Course | None
     return Course(
         world=name,
         seed=seed,
-        route=obstacles.route,
+        route=route,
         half_width=half_width,
         walls=(*left, *right),
         obstacles=tuple(obstacles.obstacles),
-        lamps=place_sun_patches(rng, obstacles.route, half_width),
+        lamps=place_sun_patches(rng, route, half_width),
         ceiling_m=0.0,
         gap_m=obstacles.gap_m,
         current_mps=current,

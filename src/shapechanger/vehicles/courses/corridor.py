@@ -20,16 +20,13 @@ from shapechanger.vehicles.courses.geometry import (
     turn_angles,
 )
 
-# Widths of a door without its frame and of the frame, and depth of a recessed door, m.
-DOOR_M: Final = 0.9
-FRAME_M: Final = 0.06
-RECESS_M: Final = 0.15
-
-_PLAIN_M = (0.4, 2.4)
+_DOOR_M: Final = 0.9 + 2 * 0.06  # Width of a door with its frame.
+_RECESS_M: Final = 0.15  # Depth of a recessed door.
+_PLAIN_M: Final = (0.4, 2.4)
 
 # Panels in the plaster: surface, share, and range of widths, m.
 _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
-    ("door", 0.5, (DOOR_M + 2 * FRAME_M, DOOR_M + 2 * FRAME_M)),
+    ("door", 0.5, (_DOOR_M, _DOOR_M)),
     ("window", 0.2, (1.0, 2.0)),
     ("board", 0.18, (1.0, 2.4)),
     ("glass", 0.12, (0.8, 1.6)),
@@ -64,7 +61,7 @@ def panel_walls(
             walls.append(Wall.between(last, end, height, "brick"))
         if cut[after] > 0.0:
             beyond = corners[after] + ahead[after] * cut[after]
-            surface: Surface = "brick" if brick[after] > 0.0 else "plaster"
+            surface = "brick" if brick[after] > 0.0 else "plaster"
             walls.append(Wall.between(end, beyond, height, surface))
     return tuple(walls)
 
@@ -73,7 +70,7 @@ def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) ->
     """Plaster between two points, with panels in it."""
     length = float(np.hypot(*(end - start)))
     ahead = (end - start) / length
-    back = np.array([ahead[1], -ahead[0]]) * RECESS_M  # Away from the lane.
+    back = np.array([ahead[1], -ahead[0]]) * _RECESS_M  # Away from the lane.
     done = start
     t = float(rng.uniform(*_PLAIN_M))
     while True:
@@ -85,23 +82,20 @@ def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) ->
             break
         near, far = start + ahead * t, start + ahead * (t + wide)
         yield Wall.between(done, near, height, "plaster")
+        done, t = far, t + wide + gap
         if recessed:
             yield Wall.between(near, near + back, height, "plaster")
-            yield Wall.between(near + back, far + back, height, surface)
-            yield Wall.between(far + back, far, height, "plaster")
-        else:
-            yield Wall.between(near, far, height, surface)
-        done, t = far, t + wide + gap
+            near, done = near + back, far + back
+        yield Wall.between(near, done, height, surface)
+        if recessed:
+            yield Wall.between(done, far, height, "plaster")
+            done = far
     yield Wall.between(done, end, height, "plaster")
 
 
 _CEILING_M: Final = 2.5  # Height of the ceiling, and of every wall.
-
-_PITCH_M = (4.0, 6.0)
-_WIDTH_M = (1.8, 2.4)
-_LENGTH_M = (40.0, 90.0)
-_GAP_M = 0.9
-_SPACING_M = 0.1
+_PITCH_M, _WIDTH_M, _LENGTH_M = (4.0, 6.0), (1.8, 2.4), (40.0, 90.0)
+_GAP_M, _SPACING_M = 0.9, 0.1
 
 # Furniture along the walls, with the depth as the width; common sizes.
 _FURNITURE = (

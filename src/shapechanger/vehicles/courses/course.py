@@ -37,7 +37,6 @@ Surface = Literal[
 ObstacleKind = Literal[
     "box", "bin", "bench", "plant", "cone", "post", "cabinet", "crate", "tree", "buoy", "dinghy"
 ]
-"""Kind of an obstacle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,18 +208,16 @@ class Look:
     @staticmethod
     def of(world: str) -> Look:
         """Usual look of a world."""
-        try:
-            return LOOKS[world]
-        except KeyError:
-            raise UnknownName("world", world, LOOKS) from None
+        if world not in LOOKS:
+            raise UnknownName("world", world, LOOKS)
+        return LOOKS[world]
 
     @staticmethod
     def random(world: str, rng: np.random.Generator) -> Look:
-        """Domain randomization of the look, around the usual look of a world.
+        """Draw a look around the usual one of a world, uniformly, with one of `VARIANTS` textures.
 
-        All are uniform: `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3,
-        `gloss` x 0.4 to 1.6, each channel of `wall` and `ground` x 0.75 to 1.0, and one of
-        `VARIANTS` texture sets.
+        `light` x 0.6 to 1.4 (at most 1), `warmth` +- 0.35, `contrast` +- 0.3, `gloss` x 0.4 to 1.6,
+        each channel of `wall` and `ground` x 0.75 to 1.0.
         """
         usual = Look.of(world)
 

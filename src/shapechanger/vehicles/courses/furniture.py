@@ -34,10 +34,8 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     return len(shares) - 1
 
 
-# Lengths of the route after and before its first point that stay free, m; a truck with its trailer
-# is 1 m long.
-_FREE_AHEAD_M: Final = 3.0
-_FREE_BEHIND_M: Final = 2.0
+# Lengths of the route after and before its first point that stay free, m; a truck is 1 m long.
+_FREE_AHEAD_M, _FREE_BEHIND_M = 3.0, 2.0
 _BEFORE_DOORS_M: Final = 0.3  # Smallest distance from a door.
 
 
@@ -52,15 +50,14 @@ class Size:
 
     def draw(self, rng: np.random.Generator, yaw: float) -> Obstacle:
         """Draw an obstacle at the origin; a round one is as wide as long, and its yaw is 0."""
-        length, width, height = (
-            float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
-        )
+        bounds = (self.length, self.width, self.height)
+        length, width, height = (float(rng.uniform(*each)) for each in bounds)
         obstacle = Obstacle(self.kind, 0.0, 0.0, yaw, length, width, height)
         return replace(obstacle, yaw=0.0, width=length) if obstacle.is_round else obstacle
 
 
 class LaneObstacles:
-    """Obstacles in a lane; those that would block it are rejected.
+    """Obstacles in a lane; those that would block it or a door are rejected.
 
     Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
     stand close together; two that are passed on different sides are a gap apart.
@@ -94,34 +91,28 @@ class LaneObstacles:
         self.obstacles: list[Obstacle] = []
         self._passed_left: list[bool] = []
 
-    def offer(self, obstacle: Obstacle, s: float) -> bool:
-        """Add an obstacle `s` m along the route if it fits; return whether it was added."""
+    def offer(self, obstacle: Obstacle, s: float) -> None:
+        """Add an obstacle `s` m along the route if it fits."""
         reach = max(obstacle.length, obstacle.width) / 2.0
         s %= self._round_m
         if s - reach < _FREE_AHEAD_M or self._round_m - s - reach < _FREE_BEHIND_M:
-            return False
+            return
         far = distances_from_obstacle(obstacle, self._walls)
         left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())
-        if min(left, right) <= 0.0 or max(left, right) < self._wanted:
-            return False
-        # Doors stay free.
+        narrowest, passed_left = max(left, right), left >= right
+        if min(left, right) <= 0.0 or narrowest < self._wanted:
+            return
         if (far[self._doors] < _BEFORE_DOORS_M).any():
-            return False
-        narrowest = max(left, right)
-        passed_left = left >= right
+            return
         for other, other_left in zip(self.obstacles, self._passed_left, strict=True):
-            apart = obstacle_gap(obstacle, other)
-            if passed_left == other_left:
-                if apart <= 0.0:
-                    return False
-            elif apart < self._wanted + 0.1:
-                return False
-            else:
+            apart, across = obstacle_gap(obstacle, other), passed_left != other_left
+            if apart <= 0.0 or (across and apart < self._wanted + 0.1):
+                return
+            if across:
                 narrowest = min(narrowest, apart)
         self.gap_m = min(self.gap_m, narrowest)
         self.obstacles.append(obstacle)
         self._passed_left.append(passed_left)
-        return True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,10 +131,7 @@ class Scatter(Size):
 def scatter_obstacles(
     rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
 ) -> None:
-    """Scatter obstacles of these kinds over a lane.
-
-    Attempts are drawn with a mean of `per_m` for each metre; obstacles that do not fit are dropped.
-    """
+    """Scatter obstacles over a lane, `per_m` for each metre on average but for those that miss."""
     route, half_width = obstacles.route, obstacles.half_width
     along, left = arc_lengths(route), normals(route)
     shares = [kind.share for kind in kinds]

@@ -1,12 +1,13 @@
-"""Geometry of courses seen from above: closed lines, loops on a grid, and distances.
+"""Geometry of courses seen from above: closed lines, loops on a grid, distances, and progress.
 
 Closed lines are arrays of points, m, (n, 2); the last point is joined to the first.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +39,11 @@ def interpolate(
 
 
 def resample(line: Points, spacing: float) -> Points:
-    """Resample a closed line, m, (n, 2), to points that are about `spacing` m apart, equally far.
-
-    Equal arc lengths give unequal chords on a curved line; after two corrections they differ by
-    less than a thousandth on curves that vehicles can drive.
-    """
+    """Resample a closed line, m, (n, 2), to points equally far apart, about `spacing` m."""
     knots = arc_lengths(line)
     n = max(8, round(float(knots[-1]) / spacing))
     s = even_distances(float(knots[-1]), n)
+    # Equal arc lengths give unequal chords on a curve; two corrections leave a thousandth.
     for _ in range(2):
         chords = arc_lengths(interpolate(line, knots, s))
         s = np.interp(even_distances(float(chords[-1]), n), chords, np.append(s, knots[-1]))
@@ -85,9 +83,7 @@ def tangent_radii(line: Points) -> NDArray[np.float64]:
     """Half width to which a lane around a closed line can grow before it overlaps itself, m, (n,).
 
     It is the radius of the smallest circle that is tangent to the line at a point and passes
-    through another point: small in tight curves, and where two parts of the line come close. A
-    similar quantity is the global radius of curvature (Gonzalez and Maddocks, PNAS 96, 1999,
-    pages 4769-4773).
+    through another one, like the global radius of curvature (Gonzalez, Maddocks, PNAS 96, 1999).
     """
     x, y = line[:, 0] - line[:, :1], line[:, 1] - line[:, 1:]
     left = normals(line)
@@ -154,7 +150,7 @@ Segments = NDArray[np.float64]
 
 
 def wall_segments(walls: Iterable[Wall]) -> Segments:
-    """Segments on the ground that walls stand on, m, (m, 4)."""
+    """Segments on the ground that walls stand on."""
     return np.array([(*wall.start, *wall.end) for wall in walls], dtype=np.float64).reshape(-1, 4)
 
 
@@ -173,7 +169,7 @@ def any_crossing(pieces: Segments) -> bool:
     start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
 
     def side(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Side of each segment (rows) that each point (columns) is on; left is positive."""
+        """Side of each segment (rows) on which each point (columns) is; left is positive."""
         x, y = points[:, 0] - start[:, :1], points[:, 1] - start[:, 1:]
         hand = along[:, :1] * y - along[:, 1:] * x
         return np.where(np.abs(hand) < 1e-9, 0.0, hand)
@@ -205,11 +201,11 @@ def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.
 
 def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
     """Distance between two obstacles, m; 0 or less if they overlap."""
-    for thing, round_one in ((one, other), (other, one)):
+    pairs = ((one, other), (other, one))
+    for thing, round_one in pairs:
         if round_one.is_round:
             middle = np.array([[round_one.x, round_one.y]])
             return float(_distances_from_points(thing, middle)[0]) - round_one.length / 2.0
-    pairs = ((one, other), (other, one))
     return float(min(distances_from_obstacle(a, box_sides(b)).min() for a, b in pairs))
 
 
@@ -248,11 +244,7 @@ _CHUNK: Final = 256
 
 
 class ClearanceField:
-    """Distances from the walls and obstacles of a course, seen from above.
-
-    Args:
-        course: The course.
-    """
+    """Distances from the walls and obstacles of a course, seen from above."""
 
     def __init__(self, course: Course) -> None:
         self._walls = wall_segments(course.walls)
@@ -270,7 +262,6 @@ class ClearanceField:
         return np.concatenate([np.empty(0), *parts])
 
     def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances of points that are close together."""
         low, high = points.min(axis=0) - FAR_M, points.max(axis=0) + FAR_M
         near = ((self._high >= low) & (self._low <= high)).all(axis=1)
         far = distances_to_segments(points, self._walls[near])
@@ -280,3 +271,101 @@ class ClearanceField:
             if (here + reach >= low).all() and (here - reach <= high).all():
                 found = np.minimum(found, _distances_from_points(obstacle, points))
         return np.maximum(found, 0.0)
+
+
+# Distance along the line, m, within which a nearest spot is searched around a hint. Parallel legs
+# of a course are much farther apart along the line, so none is mistaken for another.
+_WINDOW_M: Final = 2.0
+
+
+class Spot(NamedTuple):
+    """Position relative to a line.
+
+    Attributes:
+        station: Distance along the line, m, from 0 to its length.
+        lateral: Distance from the line, m; positive to the left.
+    """
+
+    station: float
+    lateral: float
+
+
+class ClosedLine:
+    """Closed polyline; the last point is joined to the first.
+
+    Args:
+        points: Points, m, (N, 2); neighbours differ.
+
+    Attributes:
+        points: The points.
+        stations: Distance of each point along the line, m, (N,).
+        length: Length of the line, m.
+    """
+
+    def __init__(self, points: NDArray[np.float64]) -> None:
+        self.points = points
+        self._steps = np.roll(points, -1, axis=0) - points
+        self._squared = np.einsum("ij,ij->i", self._steps, self._steps)
+        lengths = np.sqrt(self._squared)
+        self.stations: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
+        self.length = float(lengths.sum())
+        self._window = int(np.ceil(_WINDOW_M / (self.length / len(points))))
+        # Extended beyond both ends by a window, so that each window is a slice.
+        around = np.arange(-self._window, len(points) + self._window) % len(points)
+        self._around = np.column_stack((points, self._steps, self._squared))[around].T.copy()
+
+    def index(self, station: float) -> int:
+        """Index of the last point at or before a station, m, which wraps around."""
+        return int(np.searchsorted(self.stations, station % self.length, side="right")) - 1
+
+    def at(self, station: float) -> tuple[float, float]:
+        """Point, m, at a station, m, which wraps around."""
+        i = self.index(station)
+        share = (station % self.length - self.stations[i]) / np.sqrt(self._squared[i])
+        x, y = self.points[i] + share * self._steps[i]
+        return float(x), float(y)
+
+    def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
+        """Nearest spot of the line to a point, m; with a hint, near that station only."""
+        if hint is None:
+            first, count = 0, len(self.points)
+        else:
+            first, count = self.index(hint) - self._window, 2 * self._window + 1
+        # Called at each control step, so it makes few and small arrays.
+        near = self._around[:, first + self._window : first + self._window + count]
+        start_x, start_y, step_x, step_y, squared = near
+        away_x, away_y = x - start_x, y - start_y
+        share = (away_x * step_x + away_y * step_y) / squared
+        np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)
+        off_x, off_y = away_x - share * step_x, away_y - share * step_y
+        best = int((off_x * off_x + off_y * off_y).argmin())
+        behind = self.stations[(first + best) % len(self.points)]
+        station = float(behind + share[best] * np.sqrt(squared[best])) % self.length
+        cross = float(step_x[best] * away_y[best] - step_y[best] * away_x[best])
+        return Spot(station, math.copysign(math.hypot(off_x[best], off_y[best]), cross))
+
+    def ahead_by(self, start: float, end: float) -> float:
+        """Shorter way along the line from one station to another, m; backward is negative."""
+        return (end - start + self.length / 2) % self.length - self.length / 2
+
+
+class CourseProgress:
+    """Net distance of a vehicle along the route of a course, lap after lap; backward counts down.
+
+    Call `reset` first, and after moving the vehicle by more than 2 m.
+    """
+
+    def __init__(self, course: Course) -> None:
+        self._line = ClosedLine(course.route)
+
+    def reset(self, x: float, y: float) -> None:
+        """Start at a point, m."""
+        self._station = self._line.nearest(x, y).station
+        self._metres = 0.0
+
+    def update(self, x: float, y: float) -> float:
+        """Move the vehicle to a point, and return the net distance since the last reset, m."""
+        before = self._station
+        self._station = self._line.nearest(x, y, before).station
+        self._metres += self._line.ahead_by(before, self._station)
+        return self._metres

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -10,17 +10,14 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.bodies.visuals import add_lit_mesh
 from shapechanger.vehicles.courses.course import FLOODED, Colour, Course, Look
-from shapechanger.vehicles.courses.harbour import add_banks, far_shore, fittings
-from shapechanger.vehicles.courses.surfaces import Array, QuadMesh, Surfaces
+from shapechanger.vehicles.courses.surfaces import QuadMesh, Surfaces, far_shore, fittings
 from shapechanger.vehicles.courses.textures import texture
 
-# Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
-_SOLID_TYPE: Final = 1
-_SOLID_AFFINITY: Final = 2
-_GROUND_TYPE: Final = 4
-_GROUND_AFFINITY: Final = 8
+# Geoms collide if the contype of one shares a bit with the conaffinity of the other.
+_SOLID: Final[dict[str, Any]] = {"contype": 1, "conaffinity": 2}
+_GROUND_BITS: Final[dict[str, Any]] = {"contype": 4, "conaffinity": 8}
 
-_HIDDEN: Final = 3
+SOLID_GROUP: Final = 3
 """Group of the collision geoms; MuJoCo renders groups 0 to 2."""
 
 # Thickness of a wall behind its visible side, m: thinner than a partition, and more than a vehicle
@@ -36,8 +33,7 @@ _GROUND: Final = {
     FLOODED: ("water", 0.8),
 }
 # Clipping planes, m. The nearest object that a camera sees is the vehicle's own bonnet.
-_NEAR: Final = 0.02
-_FAR: Final = 150.0
+_NEAR, _FAR = 0.02, 150.0
 
 
 def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
@@ -63,16 +59,25 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     def show(
         name: str, mesh: QuadMesh, colour: Colour, image: str = "", opacity: float = 1.0
     ) -> None:
-        """Add a mesh with the texture of its name, or another one."""
-        if mesh:
-            painted = texture(image or name, look.texture_seed)
-            mirrored = look.gloss > 0.0 and opacity == 1.0
-            _add_surface(spec, f"world/{name}", mesh.arrays(mirrored), painted, (*colour, opacity))
+        """Add a mesh with the texture of its name, or another one, lit by its own light only."""
+        if not mesh:
+            return
+        name, image = f"world/{name}", image or name
+        painted = texture(image, look.texture_seed)
+        _add_texture(spec, name, painted, mujoco.mjtTexture.mjTEXTURE_2D)
+        material = spec.add_material(
+            name=name, rgba=(*colour, opacity), emission=0.0, specular=0.0, shininess=0.0,
+            reflectance=0.0,
+        )  # fmt: skip
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+        points, uvs, lights, triangles = mesh.arrays(look.gloss > 0.0 and opacity == 1.0)
+        add_lit_mesh(spec, name, points, np.clip(lights, 0.0, 1.0), uvs, triangles, axis=0)
+        spec.worldbody.add_geom(
+            name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=name, contype=0,
+            conaffinity=0, group=0, mass=0.0,
+        )  # fmt: skip
 
-    walls = surfaces.walls()
-    if course.world == "harbour":
-        add_banks(course, walls, surfaces.light_at)
-    for surface, mesh in walls.items():
+    for surface, mesh in surfaces.walls().items():
         show(surface, mesh, look.tone(look.wall))
     if course.ceiling_m > 0.0:
         show("ceiling", surfaces.ceiling(), plain)
@@ -99,38 +104,31 @@ def _add_collision(spec: mujoco.MjSpec, course: Course) -> None:
     """Add the collision geoms "world/ground", "world/wall/0" ... and "world/thing/0" ...."""
     spec.worldbody.add_geom(
         name="world/ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0],  # Infinite.
-        friction=[_GROUND[course.world][1], 0.005, 0.0001], contype=_GROUND_TYPE,
-        conaffinity=_GROUND_AFFINITY, group=_HIDDEN,
+        friction=[_GROUND[course.world][1], 0.005, 0.0001], group=SOLID_GROUP, **_GROUND_BITS,
     )  # fmt: skip
     box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
+
+    def add(
+        name: str, shape: mujoco.mjtGeom, size: list[float], place: list[float], yaw: float
+    ) -> None:
+        spec.worldbody.add_geom(
+            name=name, type=shape, size=size, pos=place,
+            quat=[np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)],
+            friction=[_WALL_FRICTION, 0.005, 0.0001], group=SOLID_GROUP, **_SOLID,
+        )  # fmt: skip
+
     for number, wall in enumerate(course.walls):
         _, along, length = wall.frame()
         x, y = 0.5 * np.add(wall.start, wall.end) + 0.5 * _THICKNESS * wall.behind()
         half, yaw = 0.5 * wall.height, float(np.arctan2(along[1], along[0]))
         size = [0.5 * length, 0.5 * _THICKNESS, half]
-        _add_solid(spec, f"world/wall/{number}", box, size, [x, y, half], yaw)
+        add(f"world/wall/{number}", box, size, [x, y, half], yaw)
     for number, thing in enumerate(course.obstacles):
         half, place = 0.5 * thing.height, [thing.x, thing.y, 0.5 * thing.height]
         shape, size = box, [0.5 * thing.length, 0.5 * thing.width, half]
         if thing.is_round:
             shape, size = cylinder, [0.5 * thing.length, half, 0.0]
-        _add_solid(spec, f"world/thing/{number}", shape, size, place, thing.yaw)
-
-
-def _add_solid(
-    spec: mujoco.MjSpec,
-    name: str,
-    shape: mujoco.mjtGeom,
-    size: list[float],
-    place: list[float],
-    yaw: float,
-) -> None:
-    spec.worldbody.add_geom(
-        name=name, type=shape, size=size, pos=place,
-        quat=[np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)],
-        friction=[_WALL_FRICTION, 0.005, 0.0001], contype=_SOLID_TYPE, conaffinity=_SOLID_AFFINITY,
-        group=_HIDDEN,
-    )  # fmt: skip
+        add(f"world/thing/{number}", shape, size, place, thing.yaw)
 
 
 def _add_texture(
@@ -139,24 +137,3 @@ def _add_texture(
     height, width, channels = image.shape
     texture = spec.add_texture(name=name, type=kind, height=height, width=width, nchannel=channels)
     texture.data = image.tobytes()
-
-
-def _add_surface(
-    spec: mujoco.MjSpec,
-    name: str,
-    mesh: tuple[Array, Array, Array, NDArray[np.int64]],
-    image: NDArray[np.uint8],
-    rgba: tuple[float, float, float, float],
-) -> None:
-    """Add a visual mesh, without mass and collisions, lit by its own light only."""
-    _add_texture(spec, name, image, mujoco.mjtTexture.mjTEXTURE_2D)
-    material = spec.add_material(
-        name=name, rgba=rgba, emission=0.0, specular=0.0, shininess=0.0, reflectance=0.0
-    )
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
-    points, uvs, lights, triangles = mesh
-    add_lit_mesh(spec, name, points, np.clip(lights, 0.0, 1.0), uvs, triangles, axis=0)
-    spec.worldbody.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=name, contype=0,
-        conaffinity=0, group=0, mass=0.0,
-    )  # fmt: skip

@@ -1,28 +1,29 @@
 """Surfaces of a course as meshes with precomputed light: ground, ceiling, walls and obstacles.
 
-Obstacles, boats and the fittings of quays are the solids of `solids.obj`.
+A harbour also has quays with fittings, moored boats and a far shore, which are drawn only: but for
+tyres and ladders, which stand out of their wall by 2 cm at most, all of it is behind the walls.
+Obstacles, boats and fittings are the solids of `solids.obj`.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.vehicles.bodies.visuals import read_obj
 from shapechanger.vehicles.courses.course import Course, Look, Wall
+from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
 
 Array = NDArray[np.float64]
 
 _SOLIDS: Final = Path(__file__).with_name("solids.obj")
-# The corners of a quad are counter-clockwise seen from its front.
+# Corners of a quad are counter-clockwise seen from its front, and clockwise if it is mirrored.
 _TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
-# A mirrored quad has the opposite order.
 _MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
-_DOWN: Final = np.array([1.0, 1.0, -1.0])
 
 
 class QuadMesh:
@@ -51,7 +52,12 @@ class QuadMesh:
 
         Its arrays have the shapes (rows, columns, 3), (rows, columns, 2) and (rows, columns).
         """
-        self.add(*(_grid_cells(grid) for grid in (points, uvs, lights)))
+
+        def cells(grid: Array) -> Array:
+            corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
+            return np.stack(corners, axis=2).reshape(-1, 4, *grid.shape[2:])
+
+        self.add(*map(cells, (points, uvs, lights)))
 
     def add_solid(
         self,
@@ -87,7 +93,7 @@ class QuadMesh:
         if mirrored:
             first = first[: shown.sum()] + 4 * len(corners)
             triangles = np.concatenate([triangles, first + _MIRRORED])
-            corners = np.concatenate([corners, corners[shown] * _DOWN])
+            corners = np.concatenate([corners, corners[shown] * (1.0, 1.0, -1.0)])
             uvs, lights = (np.concatenate([values, values[shown]]) for values in (uvs, lights))
         return (
             corners.reshape(-1, 3), uvs.reshape(-1, 2), lights.reshape(-1),
@@ -95,32 +101,20 @@ class QuadMesh:
         )  # fmt: skip
 
 
-def _grid_cells(grid: Array) -> Array:
-    """Values at the corners of each cell of a grid (rows, columns, ...): (n, 4, ...)."""
-    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
-    return np.stack(corners, axis=2).reshape(-1, 4, *grid.shape[2:])
-
-
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
-# Share of the light on a wall that faces away from the sun.
-_SHADE: Final = 0.72
+_SHADE: Final = 0.72  # Share of the light on a wall that faces away from the sun.
 # Light far from any lamp at full contrast, indoors and outdoors.
-_DARKEST: Final = 0.12
-_CLOUDED: Final = 0.6
+_DARKEST, _CLOUDED = 0.12, 0.6
 # Size of a ground patch indoors, where the light varies, and outdoors, m.
-_FINE: Final = 0.6
-_COARSE: Final = 3.0
+_FINE, _COARSE = 0.6, 3.0
 # Extent of the ground behind the walls, m; farther out it would be below one pixel.
-_INDOORS_BEHIND: Final = 0.8
-_OUTDOORS_BEHIND: Final = 30.0
+_INDOORS_BEHIND, _OUTDOORS_BEHIND = 0.8, 30.0
 # Width of the ground's and the ceiling's texture, m.
-_GROUND_PERIOD: Final = 3.0
-_CEILING_PERIOD: Final = 2.4
-# Distance of lamps below the ceiling, and of verges above the ground, m.
-_GAP: Final = 0.02
-_VERGE_RISE: Final = 0.004
-_VERGE_WIDTH: Final = 0.4
+_GROUND_PERIOD, _CEILING_PERIOD = 3.0, 2.4
+_GAP: Final = 0.02  # Distance of lamps below the ceiling, m.
+# Height of verges above the ground, and their width, m.
+_VERGE_RISE, _VERGE_WIDTH = 0.004, 0.4
 # Width of repeating textures, m.
 _PERIOD: Final = {
     "plaster": 4.0, "panel": 4.0, "brick": 1.2, "hedge": 1.5, "fence": 1.2, "quay": 2.4,
@@ -128,20 +122,17 @@ _PERIOD: Final = {
 }  # fmt: skip
 # Width of textures that show one object, which is fitted into its wall, m.
 _WHOLE: Final = {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
-# Share of the plastered walls with wooden panels.
-_CLAD: Final = 0.2
+_CLAD: Final = 0.2  # Share of the plastered walls with wooden panels.
 # Height of the brick texture, m, which repeats; the others are stretched to the wall.
 _BRICK_HEIGHT: Final = 1.8
-# Height of a door with its frame, m, below plaster.
-_DOOR_HEIGHT: Final = 2.1
+_DOOR_HEIGHT: Final = 2.1  # Of a door with its frame, m, below plaster.
 # Longest patch of a wall, m: shorter than the distance between two lamps, over which light varies.
 _LONGEST: Final = 0.8
 # Relative heights at which a wall's light is computed, and its factor there.
 _ROWS: Final = np.array([0.0, 0.35, 1.0])
 _UPWARDS: Final = np.array([0.86, 1.0, 0.94])
 
-SHORE_M: Final = 45.0
-"""Distance of the far shore from the corners of the course."""
+_SHORE_M: Final = 45.0  # Distance of the far shore from the corners of the course.
 
 
 class Surfaces:
@@ -164,10 +155,8 @@ class Surfaces:
 
     def ceiling(self) -> QuadMesh:
         """Ceiling, seen from below."""
-        corners = self._tiles()[:, ::-1]
-        return _level(
-            corners, self._course.ceiling_m, _CEILING_PERIOD, 0.9 * self.light_at(corners)
-        )
+        corners, height = self._tiles()[:, ::-1], self._course.ceiling_m
+        return _level(corners, height, _CEILING_PERIOD, 0.9 * self.light_at(corners))
 
     def lamps(self) -> QuadMesh:
         """Lamps, seen from below, with the middle of their texture cell everywhere."""
@@ -202,20 +191,33 @@ class Surfaces:
             else:
                 name = "panel" if clad and wall.surface == "plaster" else wall.surface
                 self._add_wall(result[name], wall, 0.0, wall.height, offset)
+        if self._course.world == "harbour":
+            self._add_banks(result)
         return result
+
+    def _add_banks(self, walls: dict[str, QuadMesh]) -> None:
+        """Add tops and rear sides of walls, so that they are quays and moles from above."""
+        course = self._course
+        for wall, (start, end) in zip(course.walls, _rears(course.walls), strict=True):
+            flat = np.array([start, end, wall.end, wall.start])
+            corners = _raised(flat[None], wall.height)
+            far = wall.frame()[2] / _PAVING_PERIOD
+            uvs = np.array([[(0.0, 0.0), (far, 0.0), (far, 1.0), (0.0, 1.0)]])
+            name = "paving" if wall.surface == "quay" else wall.surface
+            walls[name].add(corners, uvs, self.light_at(flat)[None], reflected=False)
+            z = wall.height
+            rear = np.array([[(*start, 0.0), (*end, 0.0), (*end, z), (*start, z)]])
+            walls[wall.surface].add(rear, uvs[:, [3, 2, 1, 0]], _SHADE, reflected=False)
 
     def obstacles(self) -> QuadMesh:
         """All obstacles of a course, which share one texture."""
         mesh = QuadMesh()
-        for obstacle in self._course.obstacles:
-            place, size = (
-                (obstacle.x, obstacle.y),
-                (obstacle.length, obstacle.width, obstacle.height),
-            )
-            light = float(self.light_at(np.array(place)))
-            has_cabin = obstacle.kind == "dinghy" and round(1000.0 * obstacle.length) % 2
-            name = "cabin dinghy" if has_cabin else obstacle.kind
-            mesh.add_solid(name, (*place, 0.0), obstacle.yaw, size, light)
+        for thing in self._course.obstacles:
+            light = float(self.light_at(np.array((thing.x, thing.y))))
+            has_cabin = thing.kind == "dinghy" and round(1000.0 * thing.length) % 2
+            name = "cabin dinghy" if has_cabin else thing.kind
+            size = (thing.length, thing.width, thing.height)
+            mesh.add_solid(name, (thing.x, thing.y, 0.0), thing.yaw, size, light)
         return mesh
 
     def light_at(self, points: Array) -> Array:
@@ -282,7 +284,7 @@ class Surfaces:
 def extent(course: Course) -> tuple[Array, float]:
     """Middle of a course, m, (2,), and radius of the far shore around it, m."""
     low, high = course.route.min(axis=0), course.route.max(axis=0)
-    return 0.5 * (low + high), 0.5 * float(np.hypot(*(high - low))) + SHORE_M
+    return 0.5 * (low + high), 0.5 * float(np.hypot(*(high - low))) + _SHORE_M
 
 
 def _level(corners: Array, height: float, period: float, lights: Array) -> QuadMesh:
@@ -305,3 +307,123 @@ def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, 
     if wall.surface in _WHOLE:
         return float(max(1, round(length / _WHOLE[wall.surface]))), 1.0
     return length / _PERIOD[wall.surface], high / _BRICK_HEIGHT if wall.surface == "brick" else 1.0
+
+
+BANK_M: Final = 0.4
+"""Width of quays and rocks; two parts of the lane are at least twice this apart."""
+
+_PAVING_PERIOD: Final = 2.4
+# Probabilities that a quay wall of 2 m has them.
+_BOLLARD, _TYRE, _LADDER = 0.55, 0.4, 0.12
+_MOST_BOATS: Final = 12
+_KINDS: Final = ("sail", "motor", "fishing")
+_BEAM: Final = 0.34  # Width of a boat over its length.
+_SPACE_M: Final = 0.15  # Between a moored boat and its quay.
+_SHORE_SIDES: Final = 72
+_HILL_M: Final = (2.0, 9.0)
+_HOUSES: Final = 26
+
+
+def _rears(walls: tuple[Wall, ...]) -> list[tuple[Array, Array]]:
+    """Corners of the walls' rear sides, m, each shared with the next wall."""
+    ending = {wall.end: wall for wall in walls}
+    starting = {wall.start: wall for wall in walls}
+
+    def corner(point: tuple[float, float], wall: Wall, other: Wall) -> Array:
+        back = wall.behind() + other.behind()
+        # Both walls' rear sides are as far back.
+        return np.asarray(point) + 2.0 * BANK_M * back / max(1.0, float(back @ back))
+
+    return [
+        (corner(w.start, w, ending.get(w.start, w)), corner(w.end, w, starting.get(w.end, w)))
+        for w in walls
+    ]
+
+
+def fittings(course: Course) -> QuadMesh:
+    """Bollards, tyres and ladders on the quays, boats behind them, and houses on the far shore."""
+    rng = np.random.default_rng([course.seed, 79])
+    mesh = QuadMesh()
+    for wall in course.walls:
+        start, ahead, length = wall.frame()
+        yaw = float(np.arctan2(ahead[1], ahead[0]))
+        draws, place = rng.random(2), float(rng.uniform(0.25, 0.75)) * length
+        if wall.surface != "quay":
+            continue
+        if draws[0] < _BOLLARD:
+            mesh.add_solid("bollard", (*start + place * ahead, wall.height), yaw, reflected=False)
+        there = np.asarray(wall.end) - place * ahead
+        if draws[1] < _TYRE:
+            mesh.add_solid("tyre", (*there, 0.55 * wall.height), yaw)
+        elif draws[1] < _TYRE + _LADDER:
+            mesh.add_solid("ladder", (*there, 0.0), yaw, (1.0, 1.0, wall.height))
+    for boat in moored(course):
+        mesh.add_solid(boat.kind, (boat.x, boat.y, 0.0), boat.yaw, boat.length)
+    # Houses in two groups at the foot of the hills, and a lighthouse.
+    middle, radius = extent(course)
+    centres = rng.uniform(0.0, 2.0 * np.pi, 2)
+
+    def build(kind: str, angle: float, away: float, yaw: float, size: tuple[float, ...]) -> None:
+        x, y = middle + away * np.array([np.cos(angle), np.sin(angle)])
+        mesh.add_solid(kind, (x, y, 0.0), yaw, size, reflected=False)
+
+    for number in range(_HOUSES):
+        angle = float(centres[number % 2] + rng.normal(0.0, 0.22))
+        away = radius - float(rng.uniform(1.5, 5.0))
+        size = tuple(rng.uniform((2.0, 1.6, 1.6), (3.6, 2.4, 3.2)))
+        build("house", angle, away, angle + 0.5 * np.pi + float(rng.normal(0.0, 0.3)), size)
+    build("lighthouse", float(centres[0] + 0.9), radius - 6.0, 0.0, (1.0, 1.0, 1.0))
+    return mesh
+
+
+class MooredBoat(NamedTuple):
+    """A boat behind a quay: middle, m, direction of its bow, rad, length, m, and kind."""
+
+    x: float
+    y: float
+    yaw: float
+    length: float
+    kind: str
+
+
+def moored(course: Course) -> list[MooredBoat]:
+    """Boats along the rear sides of quays, as many as there is room for."""
+    rng = np.random.default_rng([course.seed, 80])
+    segments = wall_segments(course.walls)
+    starts, ways = segments[:, :2], segments[:, 2:] - segments[:, :2]
+    placed: list[MooredBoat] = []
+    for i in map(int, rng.permutation(len(course.walls))):
+        wall, length = course.walls[i], float(rng.uniform(1.5, 2.8))
+        kind = _KINDS[int(rng.integers(len(_KINDS)))]
+        yaw = float(np.arctan2(ways[i, 1], ways[i, 0]) + rng.integers(2) * np.pi)
+        if wall.surface != "quay" or len(placed) == _MOST_BOATS:
+            continue
+        half = 0.5 * _BEAM * length
+        place: Array = starts[i] + 0.5 * ways[i] + (BANK_M + _SPACE_M + half) * wall.behind()
+        axis = np.linspace(-0.5, 0.5, 5)[:, None] * length * (np.cos(yaw), np.sin(yaw)) + place
+        if distances_to_segments(axis, segments).min() < half + BANK_M:
+            continue
+        boat = MooredBoat(float(place[0]), float(place[1]), yaw, length, kind)
+        apart = (np.hypot(boat.x - o.x, boat.y - o.y) / (length + o.length) for o in placed)
+        if all(gap > 0.55 for gap in apart):
+            placed.append(boat)
+    return placed
+
+
+def far_shore(course: Course) -> QuadMesh:
+    """Hills around the harbour, seen from within."""
+    rng = np.random.default_rng([course.seed, 81])
+    middle, radius = extent(course)
+    angle = np.linspace(0.0, 2.0 * np.pi, _SHORE_SIDES + 1)[::-1]
+    orders = np.array([2.0, 3.0, 5.0, 8.0, 13.0, 21.0])[:, None]
+    swing = np.sin(orders * angle + rng.uniform(0.0, 2.0 * np.pi, orders.shape))
+    waves: Array = (swing / orders**0.7).sum(axis=0)
+    share = (waves - waves.min()) / np.ptp(waves)
+    points, uvs = np.zeros((2, _SHORE_SIDES + 1, 3)), np.zeros((2, _SHORE_SIDES + 1, 2))
+    points[..., 0] = middle[0] + radius * np.cos(angle)
+    points[..., 1] = middle[1] + radius * np.sin(angle)
+    points[1, :, 2] = _HILL_M[0] + (_HILL_M[1] - _HILL_M[0]) * share
+    uvs[..., 0], uvs[0, :, 1] = angle / np.pi, 1.0
+    mesh = QuadMesh()
+    mesh.add_grid(points, uvs, np.ones(points.shape[:2]))
+    return mesh

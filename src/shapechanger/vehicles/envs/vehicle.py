@@ -93,7 +93,7 @@ class VehicleEnv(DriveEnv):
         put_back: Whether to put the vehicle back on the lane after a collision, as a person next to
             it would do. A collision then does not end the episode.
         lenses: Impairments of the camera, such as ("night", "dirt"); see
-            `shapechanger.vehicles.cameras.corruptions`.
+            `shapechanger.vehicles.cameras.camera`.
         render_mode: "rgb_array" for `render` to return the newest frame.
 
     Attributes:

@@ -25,17 +25,14 @@ from shapechanger.contract.world import Pose
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.bodies import VEHICLES, VehicleModel, vehicle_model
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.courses.geometry import ClearanceField
+from shapechanger.vehicles.courses.geometry import ClearanceField, Spot
 from shapechanger.vehicles.expert import PERIOD_S
-from shapechanger.vehicles.expert.line import Spot
 from shapechanger.vehicles.expert.path import CoursePath, plan_path
 
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Driving properties of a vehicle.
-
-    All but the body was tuned on training courses.
+    """Driving properties of a vehicle, all but the body tuned on training courses.
 
     Attributes:
         body: Model of the vehicle.
@@ -75,18 +72,13 @@ class Traits:
         """Half of the vehicle's largest width, m."""
         return self.body.width_m / 2
 
-    @property
-    def top_speed(self) -> float:
-        """Speed at full throttle on level ground, m/s."""
-        return self.body.top_speed_mps
 
+_FILE: Final = Path(__file__).with_name("traits.toml")
 
 TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
     {
         name: Traits(body=VEHICLES[name], **numbers)
-        for name, numbers in tomllib.loads(
-            Path(__file__).with_name("traits.toml").read_text("utf-8")
-        ).items()
+        for name, numbers in tomllib.loads(_FILE.read_text("utf-8")).items()
     }
 )
 """Driving properties by the name of the vehicle."""
@@ -103,14 +95,14 @@ def plan_path_for(course: Course, traits: Traits) -> CoursePath:
     Passages are as wide as the vehicles of a world need, and a boat in a flooded corridor would
     need more: 6 of the first 1,300 training courses are too narrow for its clearance.
     """
+    half_width_m, margin_m, comfort_m = traits.half_width_m, traits.margin_m, traits.comfort_m
     try:
-        return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
+        return plan_path(course, half_width_m, margin_m, comfort_m=comfort_m)
     except WorldError:
-        narrow = 2.0 / 3.0 * traits.margin_m
-        return plan_path(course, traits.half_width_m, narrow, comfort_m=traits.comfort_m)
+        return plan_path(course, half_width_m, 2.0 / 3.0 * margin_m, comfort_m=comfort_m)
 
 
-def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
+def _speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
     """Speed at each point of a path, m/s, (N,).
 
     It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
@@ -119,7 +111,7 @@ def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
     least = traits.half_width_m + traits.margin_m
     comfort = traits.half_width_m + traits.comfort_m
     room = np.clip((path.clearance - least) / (comfort - least), 0.0, 1.0)
-    speed = traits.top_speed * traits.cruise * (0.65 + 0.35 * room)
+    speed = traits.body.top_speed_mps * traits.cruise * (0.65 + 0.35 * room)
     bend = np.maximum(np.abs(path.curvature), 1e-6)
     speed = np.minimum(speed, np.sqrt(traits.lateral_limit / bend))
     step = path.length / len(speed)
@@ -128,11 +120,6 @@ def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
         can_brake_from = np.sqrt(speed[after] ** 2 + 2 * traits.braking * step)
         speed[here] = min(speed[here], can_brake_from)
     return speed
-
-
-def _wrap_angle(angle: float) -> float:
-    """Equivalent angle from -pi to pi, rad."""
-    return math.remainder(angle, 2 * math.pi)
 
 
 def _clipped(value: float) -> float:
@@ -168,7 +155,7 @@ _ASIDE: Final = 0.7
 _BLOCKED_M: Final = 0.15
 
 
-class Recovery:
+class _Recovery:
     """Detects that a vehicle is stuck, and takes over until it is free."""
 
     def __init__(self, traits: Traits, rng: np.random.Generator) -> None:
@@ -176,9 +163,7 @@ class Recovery:
         self._rng = rng
         self._moves: deque[tuple[float, float, float]] = deque()  # Seconds, steering, throttle.
         self._left_s = 0.0  # Remaining time of the first move.
-        self._still_s = 0.0
-        self._slow_s = 0.0
-        self._free_s = 0.0
+        self._still_s = self._slow_s = self._free_s = 0.0
         self._tries = 0
 
     def watch(
@@ -188,7 +173,7 @@ class Recovery:
 
         `blocked` says whether an obstacle ahead prevents a necessary turn.
         """
-        share = abs(speed) / self._traits.top_speed
+        share = abs(speed) / self._traits.body.top_speed_mps
         driven = abs(action[1]) > _ASKED
         turned = self._traits.drive == "tracks" and abs(action[0]) > _ASKED
         straight = abs(yaw_rate) < _TURNING  # Turning on the spot is progress.
@@ -203,10 +188,7 @@ class Recovery:
             self._tries = 0
 
     def action(self, angle: float) -> tuple[float, float] | None:
-        """Steering and throttle of the manoeuvre; None if the vehicle is not stuck.
-
-        `angle` is that from the heading to the target, rad, counter-clockwise.
-        """
+        """Steering and throttle of the manoeuvre, for an angle to the target; None if not stuck."""
         if self._moves:
             self._left_s -= PERIOD_S
             if self._left_s <= 0 or self._still_s > _PATIENCE_S:  # Finished, or stuck again.
@@ -222,13 +204,13 @@ class Recovery:
         """Choose the moves of a manoeuvre."""
         self._tries += 1
         longer = 1.4 ** (self._tries - 1) * self._rng.uniform(0.8, 1.2)
-        side: Literal[-1, 1] = 1 if angle >= 0 else -1
+        side = 1.0 if angle >= 0 else -1.0
         if self._tries > 2 and self._rng.random() < 0.4:
-            side = -1 if side == 1 else 1
+            side = -side
         if self._traits.drive == "rudder" and scraping:
             # A rudder swings the stern, which a quay at its side prevents. Steering towards the
             # quay puts the bow there and frees the stern; then the boat backs away.
-            self._moves.append((1.5 * longer, float(side), 0.5))
+            self._moves.append((1.5 * longer, side, 0.5))
         seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
         # Going back, wheels and rudders turn the other way; tracks do not.
         turn = side * min(1.0, 0.4 + abs(angle))
@@ -264,7 +246,7 @@ class CourseExpert:
     ) -> None:
         traits = self._traits = traits_of(vehicle)
         self.path = path or plan_path_for(course, traits)
-        self.speeds = speed_profile(self.path, traits)
+        self.speeds = _speed_profile(self.path, traits)
         self._obstacles = ClearanceField(course)
         self._rng = np.random.default_rng(seed)
         self._station: float | None = None
@@ -274,7 +256,7 @@ class CourseExpert:
         self._station = self.path.nearest(pose.x, pose.y).station
         self._before: Pose | None = None
         self._drift = 0.0
-        self._recovery = Recovery(self._traits, self._rng)
+        self._recovery = _Recovery(self._traits, self._rng)
 
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
         """Choose an action; call it once per period.
@@ -295,13 +277,13 @@ class CourseExpert:
         self._station = spot.station
         look = self._traits.look_m + self._traits.look_s * max(speed, 0.0)
         x, y = self.path.at(spot.station + look)
-        angle = _wrap_angle(math.atan2(y - soon.y, x - soon.x) - soon.heading)
+        angle = math.remainder(math.atan2(y - soon.y, x - soon.x) - soon.heading, math.tau)
         action = self._recovery.action(angle)
         if action is None:
             distance = max(math.hypot(x - soon.x, y - soon.y), 0.1)
             steering = self._steering(angle, distance, speed, yaw_rate)
             action = self._driven(steering, spot, angle, speed)
-        blocked = abs(angle) > _ASIDE and self._ahead(pose) < _BLOCKED_M
+        blocked = abs(angle) > _ASIDE and self._room_ahead(pose) < _BLOCKED_M
         self._recovery.watch(action, speed, yaw_rate, blocked=blocked)
         return np.array(action, np.float32)
 
@@ -311,37 +293,32 @@ class CourseExpert:
         if before is None:
             return
         dx, dy = pose.x - before.x, pose.y - before.y
-        going = math.hypot(dx, dy) / PERIOD_S > 0.2 * self._traits.top_speed
-        now = _wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
+        going = math.hypot(dx, dy) / PERIOD_S > 0.2 * self._traits.body.top_speed_mps
+        now = math.remainder(math.atan2(dy, dx) - pose.heading, math.tau) if going else 0.0
         if abs(now) > math.pi / 3:  # Astern, or moved by hand.
             now = 0.0
         self._drift += (now - self._drift) * PERIOD_S / _DRIFT_S
 
     def _steering(self, angle: float, distance: float, speed: float, yaw_rate: float) -> float:
         """Steering towards a point, at an angle from the heading, rad, from -1, left, to 1."""
-        match self._traits.drive:
-            case "wheels":
-                return _clipped(-self._curvature(angle, distance) / self._traits.turn)
-            case "tracks":
-                rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
-                if abs(angle) > _ABOUT:
-                    rate = _ABOUT_RATE * angle
-                # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
-                value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
-                value += self._traits.dead * _clipped(rate / _STICKING)
-                return _clipped(-value)
-            case "rudder":
-                angle = _wrap_angle(angle - self._drift)
-                rate = 1.6 * angle
-                water = max(speed, 0.3 * self._traits.top_speed)
-                return _clipped(-(2.0 * rate - 1.0 * yaw_rate) / (self._traits.turn * water))
-
-    def _curvature(self, angle: float, distance: float) -> float:
-        """Curvature of the circle to the target, 1/m; targets behind count as abeam."""
+        traits = self._traits
+        fast = max(speed, 0.3 * traits.body.top_speed_mps)
+        # Curvature of the circle to the target, 1/m; targets behind count as abeam.
         side = math.sin(angle) if abs(angle) < math.pi / 2 else math.copysign(1.0, angle)
-        return 2 * side / distance
+        curvature = 2 * side / distance
+        match traits.drive:
+            case "wheels":
+                return _clipped(-curvature / traits.turn)
+            case "tracks":
+                rate = _ABOUT_RATE * angle if abs(angle) > _ABOUT else fast * curvature
+                # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
+                value = (1.5 * rate - 0.5 * yaw_rate) / traits.turn
+                return _clipped(-(value + traits.dead * _clipped(rate / _STICKING)))
+            case "rudder":
+                rate = 1.6 * math.remainder(angle - self._drift, math.tau)
+                return _clipped(-(2.0 * rate - 1.0 * yaw_rate) / (traits.turn * fast))
 
-    def _ahead(self, pose: Pose) -> float:
+    def _room_ahead(self, pose: Pose) -> float:
         """Clearance at `_BLOCKED_M` ahead of the nose, m."""
         reach = self._traits.body.nose_m + _BLOCKED_M
         nose = pose.x + reach * math.cos(pose.heading), pose.y + reach * math.sin(pose.heading)
@@ -370,8 +347,8 @@ class CourseExpert:
             wanted *= 0.5 + 0.5 * max(room, 0.0) / traits.margin_m
         slowest = 0.1 if traits.drive == "tracks" else 0.4
         wanted *= max(math.cos(angle), slowest)
-        throttle = wanted / traits.top_speed
-        throttle += _SPEED_GAIN * (wanted - speed) / traits.top_speed
+        fastest = traits.body.top_speed_mps
+        throttle = wanted / fastest + _SPEED_GAIN * (wanted - speed) / fastest
         throttle = max(traits.least_throttle, min(1.0, throttle))
         if traits.drive == "tracks":  # Saturating one track would prevent the turn.
             throttle = min(throttle, 1.0 - abs(steering))

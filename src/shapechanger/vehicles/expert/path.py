@@ -18,8 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.courses.geometry import ClearanceField, arc_lengths
-from shapechanger.vehicles.expert.line import ClosedLine
+from shapechanger.vehicles.courses.geometry import ClearanceField, ClosedLine, arc_lengths
 
 _STATION_M: Final = 0.2
 _OFFSET_M: Final = 0.1
@@ -37,20 +36,15 @@ _OVERLAP_M: Final = 12.0
 _ROUNDS: Final = 150
 _RELAXATION: Final = 1.6
 _SPACING_M: Final = 0.1  # Approximate distance between the points of a path.
-_PULL: Final = 0.02  # Weight of the preferred offsets, 1/m^4; see `_least_bent`.
+# Weight of the preferred offsets, 1/m^4: a curvature of 1/m costs as much as `1 / sqrt(_PULL)` m.
+_PULL: Final = 0.02
 _ATTEMPTS: Final = 8  # To push a line away from obstacles.
 
 
 class _Lattice:
-    """Rows of points across the lane of a course, at stations along it, and ways through them.
+    """Rows of K points across the lane of a course, at N stations along it, and ways through them.
 
     A vehicle's path has a clearance of at least `least_m`, and prefers `comfort_m`.
-
-    Attributes:
-        middle: Middle of the lane, m, (N, 2).
-        left: Unit vectors to the left, (N, 2).
-        offsets: Offsets from the middle, m, positive to the left, (K,).
-        clearance: Clearance of each point, m, (N, K); 0 outside the lane.
     """
 
     def __init__(self, course: Course, least_m: float, comfort_m: float) -> None:
@@ -59,13 +53,9 @@ class _Lattice:
         line = ClosedLine(course.route)
         count = max(round(line.length / _STATION_M), 8)
         middle = np.array([line.at(line.length * i / count) for i in range(count)])
-        half_width = np.interp(
-            np.arange(count) * line.length / count,
-            line.stations,
-            course.half_width,
-            period=line.length,
-        )
         step = line.length / count
+        at_m = np.arange(count) * line.length / count
+        half_width = np.interp(at_m, line.stations, course.half_width, period=line.length)
         # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
         ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
@@ -79,20 +69,19 @@ class _Lattice:
         gained = np.einsum("ikj,ij->ik", np.roll(points, -1, axis=0) - points, ahead)
         backward = gained < 0.2 * step
         clearance[backward | np.roll(backward, 1, axis=0)] = 0.0
-        self.middle, self.left = middle, left
-        self.offsets, self.clearance = offsets, clearance
+        self._middle, self._left = middle, left  # m, and unit vectors to the left, (N, 2).
+        self._offsets, self._clearance = offsets, clearance  # m, (K,) and (N, K).
 
-    def cheapest_way(self, spare_m: float) -> NDArray[np.int64]:
-        """Index of the offset at each station, (N,), of the closed way with the least cost.
+    def path(self, spare_m: float) -> CoursePath | None:
+        """A smooth path on the cheapest way, or None.
 
-        It is found by dynamic programming over stations, with offset and slope as the state. Points
-        with less than the least clearance and a spare are forbidden. Raises a `WorldError` if there
-        is no such way.
+        Points with less than the least clearance and a spare are forbidden. Raises a `WorldError`
+        if there is no way.
         """
         least_m = self._least_m + spare_m
         comfort_m = max(self._comfort_m, self._least_m + 0.05)
-        missing = np.clip((comfort_m - self.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
-        cost = np.where(self.clearance >= least_m, _NARROW_COST * missing**2, np.inf)
+        missing = np.clip((comfort_m - self._clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
+        cost = np.where(self._clearance >= least_m, _NARROW_COST * missing**2, np.inf)
         count = len(cost)
         overlap = min(round(_OVERLAP_M / _STATION_M), count)
         way = _search(cost, np.arange(count + overlap) % count, None, least_m)
@@ -100,16 +89,16 @@ class _Lattice:
         if way[seam] != way[seam + count]:
             stations = (np.arange(count + 1) + seam) % count
             closed = _search(cost, stations, int(way[seam + count]), least_m)
-            return np.roll(closed[:-1], seam)
-        return np.roll(way[seam : seam + count], seam)
+            return self._smoothed(np.roll(closed[:-1], seam))
+        return self._smoothed(np.roll(way[seam : seam + count], seam))
 
-    def smoothed(self, way: NDArray[np.int64]) -> CoursePath | None:
+    def _smoothed(self, way: NDArray[np.int64]) -> CoursePath | None:
         """A smooth path that passes all obstacles on the same sides as a way, or None."""
         extra = np.zeros(len(way))
         for _ in range(_ATTEMPTS):
             low, high = self._room(way, extra)
-            offsets = _least_bent(self.middle, self.left, low, high, self.offsets[way], _PULL)
-            path = CoursePath(self.middle + offsets[:, None] * self.left, self._obstacles)
+            offsets = _least_bent(self._middle, self._left, low, high, self._offsets[way])
+            path = CoursePath(self._middle + offsets[:, None] * self._left, self._obstacles)
             short = self._least_m - path.clearance
             if short.max() <= 0:
                 return path
@@ -129,7 +118,7 @@ class _Lattice:
         low, high = np.empty(len(way)), np.empty(len(way))
         for i, k in enumerate(way):
             # They always include the way, so bounds of neighbours overlap.
-            clear = float(self.clearance[i, k])
+            clear = float(self._clearance[i, k])
             least = self._least_m + extra[i]
             wanted = min(max(self._comfort_m, least), clear - 0.02 + extra[i])
             wanted = min(max(wanted, least), clear)
@@ -138,7 +127,7 @@ class _Lattice:
 
     def _edge(self, i: int, k: int, side: int, wanted: float) -> float:
         """Offset to one side of point k at which the clearance falls below `wanted`, m."""
-        clearance, offsets = self.clearance[i], self.offsets
+        clearance, offsets = self._clearance[i], self._offsets
         beyond = k + side
         while 0 <= beyond < len(offsets) and clearance[beyond] >= wanted:
             k, beyond = beyond, beyond + side
@@ -157,7 +146,8 @@ def _search(
 ) -> NDArray[np.int64]:
     """The cheapest way along stations, (M,), as indices of offsets, (M,); cost is (N, K).
 
-    `seam` is the offset to start and end with; None leaves both free.
+    It is found by dynamic programming, with offset and slope as the state. `seam` is the offset to
+    start and end with; None leaves both free.
     """
     width = cost.shape[1]
     bends = _BEND_COST * (_SLOPES[:, None] - _SLOPES[None, :]) ** 2  # (from, to)
@@ -181,15 +171,13 @@ def _search(
         if not np.isfinite(total).any():
             raise WorldError(
                 f"The course is blocked for anything {2 * least_m:.2f} m wide "
-                f"{station * _STATION_M:.0f} m from its start. Use a narrower vehicle, a smaller "
-                "margin, or another seed."
+                f"{station * _STATION_M:.0f} m from its start: use another seed."
             )
     if seam is not None:
         total[np.arange(width) != seam] = np.inf
         if not np.isfinite(total).any():
             raise WorldError(
-                f"No way around this course with a width of {2 * least_m:.2f} m returns to its "
-                "start. Use a smaller margin, or another seed."
+                f"No way around this course is {2 * least_m:.2f} m wide: use another seed."
             )
     offset, slope = np.unravel_index(int(np.argmin(total)), total.shape)
     way = np.empty(len(stations), np.int64)
@@ -206,27 +194,22 @@ def _least_bent(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
     wish: NDArray[np.float64],
-    pull: float,
 ) -> NDArray[np.float64]:
-    """Offsets of the least bent closed line between bounds.
+    """Offsets of the least bent closed line between bounds, with preferred offsets `wish`.
 
     The alternating direction method approximates the solution, and an active-set step refines it.
-    SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size. The preferred offsets
-    `wish` pull with a weight, 1/m^4: a curvature of 1/m costs as much as an offset of
-    `1 / sqrt(pull)` m from them.
+    SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size.
     """
     count = len(middle)
     step = float(np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1).mean())
-    bend = (
-        np.roll(np.eye(count), 1, axis=1) + np.roll(np.eye(count), -1, axis=1) - 2 * np.eye(count)
-    )
-    bend /= step**2
+    one = np.eye(count)
+    bend = (np.roll(one, 1, axis=1) + np.roll(one, -1, axis=1) - 2 * one) / step**2
     gram = bend.T @ bend
-    quadratic = gram * (left @ left.T) + pull * np.eye(count)
-    linear = np.einsum("ij,ij->i", left, gram @ middle) - pull * wish
+    quadratic = gram * (left @ left.T) + _PULL * one
+    linear = np.einsum("ij,ij->i", left, gram @ middle) - _PULL * wish
     # Alternating direction method in scaled form: a step without bounds, then a projection.
-    weight = 10.0 * pull + 1.0
-    inverse = np.linalg.inv(quadratic + weight * np.eye(count))
+    weight = 10.0 * _PULL + 1.0
+    inverse = np.linalg.inv(quadratic + weight * one)
     bounded = np.clip(wish, low, high)
     debt = np.zeros(count)
     for _ in range(_ROUNDS):
@@ -282,11 +265,8 @@ def plan_path(
     Args:
         course: The course.
         half_width_m: Half width of the vehicle, m.
-        margin_m: Smallest clearance to each side of the vehicle, m.
-        comfort_m: Preferred clearance to each side of the vehicle, m.
-
-    Returns:
-        A path with a clearance of at least `half_width_m + margin_m` at every point.
+        margin_m: Smallest clearance to each side of it at every point of the path, m.
+        comfort_m: Preferred clearance to each side of it, m.
 
     Raises:
         WorldError: If there is no such path.
@@ -295,7 +275,7 @@ def plan_path(
     # Between two lattice points the line may come closer to obstacles, so ask for a spare first.
     for spare in (0.03, 0.0):
         try:
-            path = lattice.smoothed(lattice.cheapest_way(spare))
+            path = lattice.path(spare)
         except WorldError:
             if not spare:
                 raise
@@ -304,6 +284,6 @@ def plan_path(
             return path
     raise WorldError(
         f"No smooth path through the {course.world} with seed {course.seed} leaves "
-        f"{margin_m:.2f} m on each side of a vehicle {2 * half_width_m:.2f} m wide. Use a smaller "
-        "margin, or another seed."
+        f"{margin_m:.2f} m on each side of a vehicle {2 * half_width_m:.2f} m wide: use another "
+        "seed."
     )
