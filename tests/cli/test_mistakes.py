@@ -23,7 +23,7 @@ from tests.cli.running import Cli
         ("train Ant --set learning_rate", "NAME=VALUE"),
         ("train Ant --set \"n_envs='a'\"", "n_envs"),
         ("train Ant --set gamma=0.9 gamma=0.8", "more than once"),
-        ("train Ant --learner cloning", "Ant-v1 has no camera and no demonstrator"),
+        ("train Ant --learner cloning", "Ant-v1 has no camera, and"),
         ("transfer Finger Finger --target-options '{'", "must be JSON"),
         ("play Ant --policy none.safetensors", "There is no policy file none.safetensors"),
         ("play Ant --policy referense", "did you mean reference?"),

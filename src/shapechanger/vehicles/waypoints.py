@@ -39,20 +39,13 @@ LEAST_THROTTLE: Final = 0.25
 
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
-# Of a fit to a drive: largest change of the steering within the lag of the turn, the jitter of the
-# steps' times, and the least share of the turning that the steering must explain.
-_CHANGE: Final = 0.1
-_LAG_S: Final = 0.1
-_JITTER_S: Final = 0.02
-_EXPLAINED: Final = 0.5
+# Of a fit to a drive: largest change of the steering within the lag of the turn, s, the jitter of
+# the steps' times, s, and the least share of the turning that the steering must explain.
+_CHANGE, _LAG_S, _JITTER_S, _EXPLAINED = 0.1, 0.1, 0.02, 0.5
 _ROUNDING: Final = 1e-9
-
 # Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
 # is left out because the vehicle is still changing its motion.
-_SECONDS: Final = 5.0
-_HOLD: Final = 6
-
-_COMMANDS: Final = ("steering", "throttle")
+_SECONDS, _HOLD = 5.0, 6
 _MOTION: Final = ("steering/applied", "speed", "yaw_rate")
 
 
@@ -174,13 +167,10 @@ def _is_steady(steering: NDArray[np.floating], times_s: NDArray[np.floating]) ->
 
 _COLUMNS, _ROWS = CANONICAL_SIZE
 
-OBSERVATION_LAYOUT: Final = Layout(
-    (
-        Feature(
-            "camera/canonical", "1", 0.0, 255.0, Element("camera", "front"), (_ROWS, _COLUMNS, 3)
-        ),
-    )
+_FRAME: Final = Feature(
+    "camera/canonical", "1", 0.0, 255.0, Element("camera", "front"), (_ROWS, _COLUMNS, 3)
 )
+OBSERVATION_LAYOUT: Final = Layout((_FRAME,))
 """Layout of a rectified frame."""
 
 ACTION_LAYOUT: Final = Layout(
@@ -233,8 +223,7 @@ def _numbers(seen: Any) -> NDArray[np.float32]:
 class WaypointView(gym.Env[Any, NDArray[np.float32]]):
     """A vehicle, simulated or on the network, with the camera and the action of all vehicles.
 
-    Attributes:
-        response: How the vehicle turns; None before it was measured.
+    `response` is how it turns; None before it was measured.
     """
 
     response: SteeringResponse | None
@@ -266,18 +255,14 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
         if size is None:
             raise error(f"{robot} has no camera, which a policy with waypoints needs.")
         if pitch is None or fovy is None:
-            unknown = zip(("pitch_deg", "fovy_deg"), camera, strict=False)
-            missing = " and ".join(name for name, value in unknown if value is None)
             raise error(
-                f"{robot}: [camera] does not state {missing}, which waypoints need: `shapechanger "
-                "robot camera` measures them from one image of a checkerboard, and writes a "
-                "profile to use."
+                f"{robot}: [camera] does not state pitch_deg and fovy_deg, which waypoints need: "
+                "`shapechanger robot camera` measures them."
             )
         if missing := " and ".join(name for name in sensors if name not in slices):
             raise error(
-                f"{robot} has no sensor of {missing}, which waypoints need: add it to the profile. "
-                "In a simulation leave out sensed; a robot without yaw_rate takes "
-                "response=(RAD_PER_M, RAD_PER_S)."
+                f"{robot} has no sensor of {missing}, which waypoints need: add it to the profile, "
+                "leave out sensed in a simulation, or give response=(RAD_PER_M, RAD_PER_S)."
             )
         try:
             self._rectifier = Rectifier(CameraGeometry(pitch, fovy), size)
@@ -410,19 +395,30 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
             unknown, or no step is left.
     """
     names = data.action_layout.names
-    if names == ACTION_LAYOUT.names:
-        raise DemosError("These demonstrations have waypoints as actions: leave out --waypoints.")
-    if names != _COMMANDS:
+    if names != ("steering", "throttle"):
         raise DemosError(
             f"Waypoints follow from steering and throttle, and these demonstrations have the "
-            f"actions {', '.join(names)}."
+            f"actions {', '.join(names)}: leave out --waypoints."
         )
     if data.pictures is None:
         raise DemosError("These demonstrations have no images, and waypoints are seen in them.")
+    layout, states = data.state_layout, data.states
+    columns: dict[str, NDArray[np.float64]] = {}
+    if layout is not None and states is not None:
+        columns = {n: states[:, layout.slices[n].start].astype(np.float64) for n in layout.names}
     source = "as given"
     if response is None:
-        response, source = _fitted(data), "fitted to the recorded motion"
-    labels = waypoints_of(data.actions, response, _speed(data, response))
+        response, source = _fitted(columns, data.times_s), "fitted to the recorded motion"
+    speed = columns.get("speed")
+    if speed is None and response.per_second > 0.0:
+        raise DemosError(
+            "The recording has no speed, on which the waypoint depends in a vehicle that turns "
+            f"{response.per_second:g} rad for each second: record it with a sensor of speed."
+        )
+    if speed is None:
+        # The circle of wheels does not depend on the speed; with a throttle they roll forward.
+        speed = np.where(data.actions[:, 1] > 0.0, 1.0, np.nan)
+    labels = waypoints_of(data.actions, response, speed)
     kept = labels.usable
     if not kept.any():
         raise DemosError("In no step of these demonstrations does the vehicle drive forward.")
@@ -447,40 +443,19 @@ def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> Way
     return WaypointDemonstrations(converted, kept, response, notes)
 
 
-def _fitted(data: Dataset) -> SteeringResponse:
-    """Fit the response to the recorded motion."""
-    motion = [_column(data, name) for name in _MOTION]
-    missing = [name for name, column in zip(_MOTION, motion, strict=True) if column is None]
+def _fitted(
+    columns: dict[str, NDArray[np.float64]], times_s: NDArray[np.floating]
+) -> SteeringResponse:
+    """Fit the response to the recorded motion, keyed by name."""
+    missing = [name for name in _MOTION if name not in columns]
     why = f"How the vehicle turns is unknown, because the recording lacks {', '.join(missing)}"
     if not missing:
-        steering, speed, yaw_rate = cast("list[NDArray[np.float64]]", motion)
+        steering, speed, yaw_rate = (columns[name] for name in _MOTION)
         try:
-            return fit_response(steering, speed, yaw_rate, data.times_s)
+            return fit_response(steering, speed, yaw_rate, times_s)
         except StudyError as error:
             why = str(error).rstrip(".")
     raise DemosError(
         f"{why}: give --response RAD_PER_M RAD_PER_S, the `response` of RemoteWaypoint-v1 after "
         "its first reset."
     )
-
-
-def _speed(data: Dataset, response: SteeringResponse) -> NDArray[np.float64]:
-    """Return the speed at each step, m/s; NaN where it is unknown."""
-    speed = _column(data, "speed")
-    if speed is not None:
-        return speed
-    if response.per_second > 0.0:
-        raise DemosError(
-            "The recording has no speed, on which the waypoint depends in a vehicle that turns "
-            f"{response.per_second:g} rad for each second: record it with a sensor of speed."
-        )
-    # The circle of wheels does not depend on the speed; with a throttle they roll forward.
-    return np.where(data.actions[:, 1] > 0.0, 1.0, np.nan)
-
-
-def _column(data: Dataset, name: str) -> NDArray[np.float64] | None:
-    """Return a number of the state at each step, (n,); None if it was not recorded."""
-    layout, states = data.state_layout, data.states
-    if layout is None or states is None or name not in layout.names:
-        return None
-    return states[:, layout.slices[name].start].astype(np.float64)

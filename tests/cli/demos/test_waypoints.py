@@ -153,11 +153,19 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
     assert as_waypoints(data, SteeringResponse(1.9, 0.0)).kept.sum() == 50
     with pytest.raises(DemosError, match="has no speed, on which the waypoint depends"):
         as_waypoints(data, SteeringResponse(0.8, 3.1))
-    standing = _loaded(_record(tmp_path / "stands", 10))
+    only_speed = Layout((Feature("speed", "m/s"),))
+    data = _loaded(_record(tmp_path / "other", state=only_speed))
+    with pytest.raises(DemosError, match=r"lacks steering/applied, yaw_rate: give --response"):
+        as_waypoints(data)
+
+
+def test_a_motion_that_does_not_tell_the_response_is_refused(tmp_path: Path) -> None:
+    """A vehicle that stands all the time is refused with the option to give."""
+    data = _loaded(_record(tmp_path, 10))
     with pytest.raises(DemosError, match=r"drive curves to both sides: give --response RAD_PER_M"):
-        as_waypoints(standing)
+        as_waypoints(data)
     with pytest.raises(DemosError, match=r"In no step .* drive forward"):
-        as_waypoints(standing, SteeringResponse(1.9, 0.0))
+        as_waypoints(data, SteeringResponse(1.9, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -165,7 +173,8 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
     [
         ({"camera_pitch_deg": None}, "does not state pitch and field of view .* give --camera"),
         ({"camera_fovy_deg": 0.0}, "from 0 to 180, got 0 and 0"),
-        ({"action_layout": ACTION_LAYOUT.to_json()}, "have waypoints as actions: leave out"),
+        ({"camera_fovy_deg": 20.0}, "misses"),
+        ({"action_layout": ACTION_LAYOUT.to_json()}, "leave out --waypoints"),
         (
             {"action_layout": Layout((Feature("left", "1"), Feature("right", "1"))).to_json()},
             "have the actions left, right",
@@ -180,6 +189,22 @@ def test_unsuitable_recordings_are_refused(
     with pytest.raises((DemosError, WorldError), match=why):
         DemosTrain(data, out, waypoints=True).run()
     assert not out.exists()
+
+
+def test_several_bodies_are_refused(tmp_path: Path) -> None:
+    _record(tmp_path)
+    _record(tmp_path, body="truck")
+    with pytest.raises(DemosError, match="several bodies, car, truck"):
+        _loaded(tmp_path)
+
+
+def test_recordings_without_pictures_are_refused(tmp_path: Path) -> None:
+    header = EpisodeHeader(action_layout=_ACTIONS.to_json(), clock="none")
+    with EpisodeWriter.create(tmp_path, header) as writer:
+        writer.add(Step(action=(0.0, 0.5), driver="person"))
+        writer.close()
+    with pytest.raises(DemosError, match="have no images"):
+        as_waypoints(_loaded(tmp_path))
 
 
 def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path)
     text = changed('part = "steering"', 'part = "rudder"')
     odd = write_profile(tmp_path, text)
     assert place_of(odd, "", ()) == Place()
-    with pytest.raises(ProfileError, match="A car has no 'rudder'"):
+    with pytest.raises(ProfileError, match="a car is driven by"):
         place_of(odd, "corridor", ())
 
 

@@ -64,7 +64,7 @@ def test_a_place_in_mujoco() -> None:
 
 def test_an_invalid_place_is_refused() -> None:
     """Mismatched parts, unknown names and a boat on land raise errors."""
-    with pytest.raises(ProfileError, match="A tank has no 'steering' or 'wheels'"):
+    with pytest.raises(ProfileError, match="a tank is driven by"):
         open_world(course_place("corridor", "tank"), _PARTS, None, 1)
     with pytest.raises(UnknownName, match=r"No vehicle matches 'cra'. Did you mean 'car'"):
         open_world(course_place("corridor", "cra"), _PARTS, None, 1)
@@ -157,4 +157,4 @@ def test_a_board_that_fails_to_start_prints_the_reason(
     """The reason is on standard error before the board exits."""
     with pytest.raises(RobotError, match="did not start"):
         start_board(CAR, "twin", tmp_path, place=course_place("corridor", "tank"))
-    assert "A tank has no 'steering' or 'wheels'" in capfd.readouterr().err
+    assert "a tank is driven by" in capfd.readouterr().err

@@ -18,15 +18,6 @@ def test_a_boat_has_no_brakes() -> None:
     assert here.vehicle.current_a() == 0.0
 
 
-def test_reverse_thrust_is_weak() -> None:
-    here = ground("boat")
-    here.drive(6.0, AHEAD["boat"])
-    here.drive(0.5, {"propeller": -1.0, "rudder": 0.0})
-    assert here.vehicle.motion().speed > 0.3
-    here.drive(8.0, {"propeller": -1.0, "rudder": 0.0})
-    assert -0.95 * here.kind.top_speed_mps < here.vehicle.motion().speed < -0.3
-
-
 def test_a_boat_slows_down_and_drifts_outwards_in_a_turn() -> None:
     here = ground("boat")
     here.drive(8.0, {**TO_THE_LEFT["boat"], "rudder": 0.0})
@@ -38,15 +29,6 @@ def test_a_boat_slows_down_and_drifts_outwards_in_a_turn() -> None:
     assert math.radians(8.0) < drift < math.radians(35.0)
     radius = here.pace() / here.vehicle.motion().yaw_rate
     assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.25)
-
-
-def test_a_current_carries_the_boat() -> None:
-    here = ground("boat")
-    here.vehicle.set_current(0.0, 0.3)
-    here.drive(60.0, {})
-    assert here.vehicle.motion().y > 10.0
-    assert here.vehicle.motion().lateral_speed == pytest.approx(0.3, rel=0.1)
-    assert abs(here.vehicle.travelled_m()) < 0.05 * here.vehicle.motion().y
 
 
 def test_motion_is_relative_to_the_current() -> None:
@@ -70,14 +52,6 @@ def test_the_rudder_needs_flow() -> None:
     here.drive(5.0, AHEAD["boat"])
     here.drive(1.0, {"propeller": 0.0, "rudder": -1.0})
     assert here.vehicle.motion().yaw_rate > 0.1
-
-
-def test_a_boat_keeps_its_course() -> None:
-    here = ground("boat")
-    here.drive(5.0, AHEAD["boat"])
-    here.data.qvel[2] += 0.5
-    here.drive(6.0, AHEAD["boat"])
-    assert abs(here.vehicle.motion().yaw_rate) < 0.05
 
 
 def test_two_propellers_steer() -> None:

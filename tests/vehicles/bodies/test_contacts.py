@@ -36,14 +36,6 @@ class _Bench:
             self.touch.follow(self.data, Motion(x, 0.0, heading, 0.0, 0.0, 0.0), _DT)
 
 
-def test_ground_contact_is_no_collision() -> None:
-    bench = _Bench()
-    bench.stand(0.0)
-    assert bench.data.ncon > 0
-    assert not bench.touch.touches
-    assert bench.touch.collisions == 0
-
-
 def test_wall_contact_is_a_collision() -> None:
     bench = _Bench()
     bench.stand(0.91, seconds=3.0)

@@ -12,9 +12,7 @@ from shapechanger.vehicles.bodies import VEHICLES, add_vehicle
 from shapechanger.vehicles.bodies.visuals import (
     OUTSIDE_VIEW,
     OWN_VIEW,
-    normals,
     read_obj,
-    shading,
 )
 from tests.vehicles.bodies.grounds import ALL
 
@@ -129,15 +127,3 @@ def test_meshes_are_read_by_object_and_material(tmp_path: Path) -> None:
     faces, uvs = objects["cube"]["top"]
     np.testing.assert_array_equal(faces[0], [(0, 0, 1), (1, 0, 1), (1, 1, 1), (1, 1, 1)])
     np.testing.assert_array_equal(uvs, np.full((2, 4, 2), (0.25, 0.5)))
-
-
-def test_the_top_is_brightest_and_the_bottom_darkest(tmp_path: Path) -> None:
-    path = tmp_path / "cube.obj"
-    path.write_text(_CUBE)
-    objects = read_obj(path)
-    sides, top = (objects["cube"][name].faces for name in ("side", "top"))
-    np.testing.assert_allclose(normals(top), [(0, 0, 1), (0, 0, 1)])
-    assert shading(top) == pytest.approx(1.0)
-    bottom, around = shading(objects["floor"]["side"].faces), shading(sides)
-    assert bottom.max() < around.min() < around.max() < 0.9
-    assert len(set(around.round(3))) == 4  # So that edges between them are visible.

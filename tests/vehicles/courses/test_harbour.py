@@ -9,13 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses import lay_out
-from shapechanger.vehicles.courses.course import Course, Look, Obstacle
+from shapechanger.vehicles.courses.course import Course, Look
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
 from shapechanger.vehicles.courses.surfaces import (
     BANK_M,
     QuadMesh,
     Surfaces,
-    extent,
     fittings,
     moored,
 )
@@ -93,21 +92,3 @@ def test_obstacles_are_drawn_where_the_course_says(seed: int) -> None:
             assert np.linalg.norm(flat, axis=1).max() == pytest.approx(half[0], rel=0.01)
         else:
             np.testing.assert_allclose(np.abs(flat).max(axis=0), half, rtol=0.01)
-
-
-@pytest.mark.parametrize("length", [1.600, 1.601], ids=["open", "with a cabin"])
-def test_a_dinghy_is_blunt(length: float) -> None:
-    """The bow is at least 70 % as wide as its collision box, so that a boat meets what it sees."""
-    dinghy = Obstacle("dinghy", 0.0, 0.0, 0.0, length, 0.8, 0.45)
-    course = replace(lay_out("harbour", 0), obstacles=(dinghy,))
-    bow = _points(Surfaces(course, Look.of("harbour")).obstacles())
-    bow = bow[bow[:, 0] > 0.49 * length]
-    assert np.abs(bow[:, 1]).max() > 0.7 * 0.4
-
-
-def test_the_far_shore_is_within_the_water() -> None:
-    course = lay_out("harbour", 0)
-    middle, radius = extent(course)
-    water = _points(Surfaces(course, Look.of("harbour")).ground())
-    assert (np.abs(water[:, :2] - middle).max(axis=0) >= radius - 1e-6).all()
-    assert np.linalg.norm(course.route - middle, axis=1).max() < radius - 40.0

@@ -16,7 +16,7 @@ from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.start import Place, open_world
 from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
-from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
+from shapechanger.vehicles.envs import RangesEnv, WaypointEnv
 from shapechanger.vehicles.twin import course_place
 
 # Of lab-car, and the same place seen by others: pitch and field of view in degrees, and the size.
@@ -107,14 +107,6 @@ def test_the_room_is_seen_by_the_camera_of_the_profile(tmp_path: Path) -> None:
     _agree(_twin(Place()), tmp_path)
 
 
-def test_frames_have_the_size_of_the_profile(tmp_path: Path) -> None:
-    """An env's own size replaces the one of the profile."""
-    profile = _profile(tmp_path, _OTHERS[1])
-    for size, expected in ((None, (240, 320, 3)), ((64, 48), (48, 64, 3))):
-        with closing(VehicleEnv("car", robot=profile, size=size)) as env:
-            assert env.observation_space.shape == expected
-
-
 @pytest.mark.parametrize("sensed", [False, True])
 def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, sensed: bool) -> None:
     """The error names the profile, what is missing and ways out."""
@@ -124,16 +116,3 @@ def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, sensed: bool) 
     )
     with pytest.raises(ProfileError, match=message):
         WaypointEnv("car", robot=profile, sensed=sensed)
-
-
-@pytest.mark.gl
-@pytest.mark.usefixtures("gl")
-def test_the_certificate_names_the_camera_of_the_profile(tmp_path: Path) -> None:
-    """Two cameras on the same car are a shift."""
-    other = _profile(tmp_path, _OTHERS[0])
-    with closing(VehicleEnv("car")) as source, closing(VehicleEnv("car", robot=other)) as target:
-        changes = VehicleEnv.certify_shift(source, target).changes
-    assert changes == (
-        "camera's angle below the horizon: 0 degrees -> 8 degrees",
-        "camera's angle of view: 48.8 degrees -> 70 degrees",
-    )

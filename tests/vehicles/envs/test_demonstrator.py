@@ -51,19 +51,6 @@ def test_mistakes_follow_from_the_seed() -> None:
         assert first != second != mistakes(2)[1]
 
 
-def test_begin_takes_the_present_course() -> None:
-    """The demonstrator follows the course of the last reset."""
-    with closing(VehicleEnv("car", image=False)) as env:
-        driver = env.demonstrator(1)
-        for course in (3, 4):
-            _, info = env.reset(options={"course": course, "start": 1})
-            driver.begin()
-            for _ in range(40):
-                _, _, terminated, _, info = env.step(driver.act()[1])
-                assert not terminated
-            assert info["progress"] > 0.3
-
-
 def test_put_back_it_goes_on_as_from_a_start() -> None:
     """The demonstrator forgets the manoeuvre that would have freed the vehicle."""
     with closing(VehicleEnv("car", image=False)) as env:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
-from shapechanger.errors import UnknownName, WorldError
-from shapechanger.vehicles.courses.course import HELD_OUT, HOME
+from shapechanger.vehicles.courses.course import HOME
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
 from shapechanger.vehicles.envs.ranges import (
     BEARINGS_DEG,
@@ -135,19 +134,6 @@ def test_outputs_follow_the_guards_limits() -> None:
     blocked = [shaper.outputs((1.0,), bumped, 5)["wheels"] for bumped in (True, False, False)]
     assert blocked[1] == pytest.approx(0.0)
     assert blocked[2] == pytest.approx(0.08)
-
-
-def test_invalid_use_is_refused() -> None:
-    """Misuse raises errors that explain it."""
-    with pytest.raises(UnknownName, match="No vehicle matches 'carr'"):
-        RangesEnv("carr")
-    with pytest.raises(UnknownName, match="No weight of the reward matches 'colision'"):
-        RangesEnv("car", reward={"colision": -1.0})
-    with (
-        closing(RangesEnv("car", courses=HELD_OUT)) as env,
-        pytest.raises(WorldError, match="has no camera"),
-    ):
-        env.world.picture()
 
 
 def test_a_vehicle_that_stands_is_moved() -> None:

@@ -31,12 +31,6 @@ def test_at_inverts_nearest(station: float) -> None:
     assert abs(spot.lateral) < 1e-6
 
 
-@given(start=st.floats(0.0, 50.0), moved=st.floats(-20.0, 20.0))
-def test_ahead_by_takes_the_shorter_way(start: float, moved: float) -> None:
-    """`ahead_by` is signed and wraps around."""
-    assert _RING.ahead_by(start, start + moved) == pytest.approx(moved, abs=1e-9)
-
-
 def test_a_hint_selects_the_leg() -> None:
     """With a hint, a nearer parallel leg is ignored."""
     there = [(x, 0.0) for x in np.arange(0.0, 20.0, 0.1)]

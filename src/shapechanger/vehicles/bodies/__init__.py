@@ -77,23 +77,12 @@ def add_vehicle(
 def require_fit(name: str, parts: Collection[str]) -> None:
     """Check that a robot's parts fit a vehicle."""
     model = vehicle_model(name)
-    given = frozenset(parts)
-    foreign = given - model.parts - model.optional_parts
-    if foreign:
-        raise ProfileError(
-            f"A {name} has no {_listed(foreign, 'or')}. It is driven by {_choices(model)}."
-        )
-    driving = given - model.optional_parts
+    driving = frozenset(parts) - model.optional_parts
     if driving not in model.drives:
-        raise ProfileError(
-            f"The robot drives {_listed(driving, 'and') or 'nothing'}; "
-            f"a {name} is driven by {_choices(model)}."
+        chosen, *choices = (
+            " and ".join(map(repr, sorted(drive))) for drive in (driving, *model.drives)
         )
-
-
-def _choices(model: VehicleModel) -> str:
-    return ", or by ".join(_listed(drive, "and") for drive in model.drives)
-
-
-def _listed(names: Collection[str], word: str) -> str:
-    return f" {word} ".join(f"{name!r}" for name in sorted(names))
+        raise ProfileError(
+            f"The robot drives {chosen or 'nothing'}; a {name} is driven by "
+            f"{', or by '.join(choices)}."
+        )

@@ -11,7 +11,7 @@ follow T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -138,44 +138,18 @@ _YAW_1: Final = 0.5 * _YAW_2  # N·m·s
 # speed and rate of turn, N·s2. Clarke, Gedling and Hine's formulas (1983; in Fossen, chapter 6) for
 # the derivatives Y_v and N_r, from length L, beam B, draught T and block.
 _WING: Final = math.pi * (_DRAUGHT / _LENGTH) ** 2
-_SWAY_LIFT: Final = (
-    0.5 * _WATER_DENSITY * _LENGTH**2 * (_WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT))
-)
-_YAW_LIFT: Final = (
-    0.5 * _WATER_DENSITY * _LENGTH**4
-    * (_WING * (0.25 + 0.039 * _WIDTH / _DRAUGHT - 0.56 * _WIDTH / _LENGTH))
-)  # fmt: skip
-
-
-def _acceleration(
-    u: float, v: float, r: float, x: float, y: float, n: float
-) -> tuple[float, float, float]:
-    """Rates of change of u, v and r under the forces of propellers and rudder.
-
-    These are the manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with the
-    Coriolis terms of different masses along and across.
-    """
-    pace = math.hypot(u, v)
-    x += _ACROSS * v * r - (_SURGE_1 + _SURGE_2 * abs(u)) * u
-    y += -_ALONG * u * r - (_SWAY_1 + _SWAY_2 * abs(v) + _SWAY_LIFT * pace) * v
-    n += (_ALONG - _ACROSS) * u * v
-    n -= (_YAW_1 + _YAW_2 * abs(r) + _YAW_LIFT * pace) * r
-    return x / _ALONG, y / _ACROSS, n / _YAW
-
+_SWAY_WING: Final = _WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT)
+_YAW_WING: Final = _WING * (0.25 + 0.039 * _WIDTH / _DRAUGHT - 0.56 * _WIDTH / _LENGTH)
+_SWAY_LIFT: Final = 0.5 * _WATER_DENSITY * _LENGTH**2 * _SWAY_WING
+_YAW_LIFT: Final = 0.5 * _WATER_DENSITY * _LENGTH**4 * _YAW_WING
 
 # Linear fits by eye to the open-water curves of a Wageningen B3-50 propeller with a pitch of 0.9
 # diameters (M. Oosterveld and P. van Oossanen 1975). Astern about half is left: an estimate.
 _PROPELLER: Final = Propeller(
-    diameter=0.035,
-    thrust=0.38,
-    zero_thrust_j=0.95,
-    torque=0.045,
-    zero_torque_j=1.1,
-    astern=0.5,
-    wake=0.85,
-    thrust_deduction=0.1,
-)
-_TWIN: Final = Propeller(0.028, 0.38, 0.95, 0.045, 1.1, 0.5, 0.9, 0.1)
+    diameter=0.035, thrust=0.38, zero_thrust_j=0.95, torque=0.045, zero_torque_j=1.1, astern=0.5,
+    wake=0.85, thrust_deduction=0.1,
+)  # fmt: skip
+_TWIN: Final = replace(_PROPELLER, diameter=0.028, wake=0.9)
 _PROPELLERS: Final = {"propeller": _PROPELLER, "left propeller": _TWIN, "right propeller": _TWIN}
 
 # The motor with a gear of 2.5:1 instead of its own 4.4:1, as sold for model boats.
@@ -184,8 +158,6 @@ _MOTOR: Final = HOBBY_MOTOR.geared(2.5 / 4.4)
 _RUDDER: Final = Fin(x=-0.27, height=0.045, chord=0.035)
 _SKEG: Final = Fin(x=-0.20, height=0.035, chord=0.10)
 _FULL_RUDDER: Final = math.radians(35.0)  # The usual limit of ships.
-
-_TURN: Final = 2.0 * math.pi
 
 
 class Floating(BoundVehicle):
@@ -201,12 +173,10 @@ class Floating(BoundVehicle):
         chassis = model.body("vehicle/chassis")
         self._mass, self._inertia = float(chassis.mass[0]), float(chassis.inertia[2])
         # Address in qvel of the shaft of each propeller, and its position to the left, m.
+        joints = {part: model.joint(f"vehicle/{part}") for part in _PROPELLERS}
         self._shafts = {
-            part: (
-                int(model.joint(f"vehicle/{part}").dofadr[0]),
-                float(model.body(f"vehicle/{part}").pos[1]),
-            )
-            for part in _PROPELLERS
+            part: (int(joint.dofadr[0]), float(model.body(f"vehicle/{part}").pos[1]))
+            for part, joint in joints.items()
         }
         # Three joints in a row: x, y and yaw.
         self._qpos0 = int(model.joint("vehicle/chassis x").qposadr[0])
@@ -238,7 +208,7 @@ class Floating(BoundVehicle):
         heading, cosine, sine, vx, vy, r = self._state()
         x, y = self._qpos[self._qpos0 : self._qpos0 + 2].tolist()
         ahead, left = vx * cosine + vy * sine, vy * cosine - vx * sine
-        return Motion(x, y, math.remainder(heading, _TURN), ahead, left, r)
+        return Motion(x, y, math.remainder(heading, math.tau), ahead, left, r)
 
     def travelled_m(self) -> float:
         """Distance through the water since `place`; astern counts down."""
@@ -267,7 +237,7 @@ class Floating(BoundVehicle):
             if abs(rate) < 1e-3:  # Stopped: neither thrust nor torque.
                 self._push[dof] = 0.0
                 continue
-            thrust, torque = propeller.loads(rate / _TURN, u)
+            thrust, torque = propeller.loads(rate / math.tau, u)
             self._push[dof] = -torque
             push = (1.0 - propeller.thrust_deduction) * thrust
             x += push
@@ -280,7 +250,14 @@ class Floating(BoundVehicle):
         if has_rudder:
             rx, ry, rn = _RUDDER.force(flow, v, r, float(self._qpos[self._rudder]))
             x, y, n = x + rx, y + ry, n + rn
-        du, dv, dr = _acceleration(u, v, r, x, y, n)
+        # The manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with the
+        # Coriolis terms of different masses along and across.
+        pace = math.hypot(u, v)
+        x += _ACROSS * v * r - (_SURGE_1 + _SURGE_2 * abs(u)) * u
+        y += -_ALONG * u * r - (_SWAY_1 + _SWAY_2 * abs(v) + _SWAY_LIFT * pace) * v
+        n += (_ALONG - _ACROSS) * u * v
+        n -= (_YAW_1 + _YAW_2 * abs(r) + _YAW_LIFT * pace) * r
+        du, dv, dr = x / _ALONG, y / _ACROSS, n / _YAW
         # From rates in the turning frame of the boat to the acceleration in the world. A uniform
         # flow adds nothing, because u and v are relative to it.
         along, across = self._mass * (du - r * v), self._mass * (dv + r * u)

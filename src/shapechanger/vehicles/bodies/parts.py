@@ -53,12 +53,8 @@ def aim_camera(camera: mujoco.MjsCamera, mount: CameraMount) -> None:
 
 
 # Largest errors of a screwed, printed mount: estimates.
-_HEIGHT_M: Final = 0.015
-_SIDE_M: Final = 0.01
-_ANGLE_RAD: Final = math.radians(3.0)
-
-_LOWEST_M: Final = 0.01  # Above the floor.
-_FARTHEST_M: Final = 1.0  # Still on the vehicle.
+_HEIGHT_M, _SIDE_M, _ANGLE_RAD = 0.015, 0.01, math.radians(3.0)
+_LOWEST_M, _FARTHEST_M = 0.01, 1.0  # Above the floor, and still on the vehicle.
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +88,9 @@ def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> Non
     place = model.camera(camera)
     position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
     turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
-    if not np.isfinite([*position, *turns]).all():
-        raise WorldError(f"The error of a camera's pose must be finite, got {jitter}.")
-    if position[2] < _LOWEST_M or np.abs(position).max() > _FARTHEST_M:
-        where = ", ".join(f"{x:.3f}" for x in position)
-        raise WorldError(f"The camera would be off its vehicle or in the floor, at ({where}) m.")
+    finite = np.isfinite([*position, *turns]).all()
+    if not finite or position[2] < _LOWEST_M or np.abs(position).max() > _FARTHEST_M:
+        raise WorldError(f"The camera would be off its vehicle or in the floor with {jitter}.")
     place.pos[:] = position
     # A MuJoCo camera looks along -z of its frame, with x to the right and y up.
     turned = np.empty(4)

@@ -6,7 +6,7 @@ import functools
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -26,16 +26,8 @@ OUTSIDE_VIEW: Final = 2
 """Group of the geoms that are only seen from outside."""
 
 
-class Solids(NamedTuple):
-    """Faces of one object and material of an OBJ file.
-
-    Attributes:
-        faces: Corners of the faces.
-        uvs: Texture coordinates of the corners, (n, 4, 2 or 3); empty without any.
-    """
-
-    faces: Faces
-    uvs: NDArray[np.float64]
+Solids = tuple[Faces, NDArray[np.float64]]
+"""Faces, and texture coordinates of their corners, (n, 4, 2 or 3), which may be empty."""
 
 
 @functools.cache
@@ -59,7 +51,7 @@ def read_obj(path: Path) -> Mapping[str, Mapping[str, Solids]]:
 
     def solids(faces: list[list[list[int]]]) -> Solids:
         at = np.array(faces)
-        return Solids(points[at[..., 0]], uvs[at[..., -1]] if at.shape[2] > 1 else np.empty(0))
+        return points[at[..., 0]], uvs[at[..., -1]] if at.shape[2] > 1 else np.empty(0)
 
     return {
         name: {material: solids(faces) for material, faces in materials.items()}
@@ -85,9 +77,7 @@ def shading(faces: Faces) -> NDArray[np.float64]:
 
 
 # A shadow is a stack of layers, each larger than the next, so that its edge is soft.
-_LAYERS: Final = 18
-_LAYER_DARKNESS: Final = 0.055
-_LAYER_RISE_M: Final = 0.0002
+_LAYERS, _LAYER_DARKNESS, _LAYER_RISE_M = 18, 0.055, 0.0002
 
 
 def dress(spec: mujoco.MjSpec, vehicle: str, light: ArrayLike) -> None:

@@ -1,8 +1,7 @@
-"""Pictures of any vehicle's camera as one virtual camera would have taken them.
+"""Images of any vehicle's camera as one virtual camera would have taken them.
 
-Each vehicle mounts its camera at another angle, and some see their own bonnet. A policy that
-learned in one body then meets another horizon in the next. The virtual camera looks level, with the
-same field of view for all, and sees no part of the vehicle.
+Each vehicle mounts its camera at another angle, and some see their own bonnet. The virtual camera
+looks level, with the same field of view for all, and sees no part of the vehicle.
 """
 
 from __future__ import annotations
@@ -37,8 +36,7 @@ _MOST_MISSING: Final = 0.15  # Share of the pixels.
 # Vertical fields of view from which the search for the camera's own begins, degrees.
 _FIRST_FOVY_DEG: Final = (30.0, 48.0, 70.0, 100.0)
 # Standard deviations beyond which an image of a board does not tell the camera's geometry.
-_PITCH_SD_DEG: Final = 1.0
-_FOVY_SD_DEG: Final = 2.5
+_PITCH_SD_DEG, _FOVY_SD_DEG = 1.0, 2.5
 _MOST_TILT_DEG: Final = 45.0
 _CORNER_SD_PX: Final = 0.1
 _YELLOW: Final = (255, 220, 0)
@@ -71,8 +69,7 @@ class Rectifier:
     """Warps images of one camera to the virtual camera.
 
     A pixel of the virtual camera is a ray; the ray, turned by the pitch, meets a pixel of the real
-    camera. Nothing is said about heights: a camera that is mounted higher sees the ground farther
-    down, which the policy has to bear.
+    camera. A camera that is mounted higher still sees the ground farther down.
 
     Args:
         geometry: The real camera.
@@ -95,9 +92,9 @@ class Rectifier:
             raise WorldError(
                 f"A camera that looks {geometry.pitch_deg:g} degrees down with a vertical field "
                 f"of view of {geometry.fovy_deg:g} degrees misses {100 * missing:.0f} % of what "
-                "policies for all vehicles look at, which is 18 degrees above the horizon to 21 "
-                f"below, and 31 to each side, in frames of {wide} x {high} pixels: turn it level, "
-                "or take wider frames, of its whole sensor, or a wider lens."
+                "policies for all vehicles look at, 18 degrees above the horizon to 21 below and "
+                f"31 to each side, in frames of {wide} x {high} pixels: turn it level, or take "
+                "wider frames, of its whole sensor, or a wider lens."
             )
         places = np.clip(row, 0, high - 1) * wide + np.clip(column, 0, wide - 1)
         shape = (rows, _SAMPLES, columns, _SAMPLES)
@@ -105,13 +102,9 @@ class Rectifier:
         self._shape = (high, wide, 3)
 
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return an image as the virtual camera would have taken it.
+        """Return an image, (height, width, 3), as the virtual camera would have taken it.
 
-        Args:
-            picture: Shape (height, width, 3).
-
-        Returns:
-            Shape (48, 80, 3). What the camera does not see repeats the nearest pixel.
+        It has the shape (48, 80, 3). What the camera does not see repeats the nearest pixel.
 
         Raises:
             WorldError: If the image has another size.
@@ -131,36 +124,31 @@ class Rectifier:
 class CanonicalView:
     """Warps images to the virtual camera of all vehicles.
 
-    Attributes:
-        camera: Pitch and vertical field of view of the camera, degrees; None for those that each
-            episode states.
-        rectifiers: Those used so far, by camera and size of its images.
-        bodies: Bodies of the episodes.
+    Args:
+        camera: The camera; None for the one that each episode states.
     """
 
     def __init__(self, camera: CameraGeometry | None = None) -> None:
-        self.camera = camera
-        self.rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = {}
-        self.bodies: set[str] = set()
+        self._camera = camera
+        self._rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = {}
+        self._bodies: set[str] = set()
 
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
-        """Return an image of an episode as the virtual camera would have taken it.
-
-        Images of episodes whose actions are waypoints are so already.
+        """Return an image of an episode, unless its actions are waypoints, as that camera's.
 
         Raises:
             DemosError: If the camera is unknown, or the episodes are of several bodies.
             WorldError: If there is no such camera, or it does not see what the virtual camera sees.
         """
-        self.bodies.add(header.body)
-        if len(self.bodies) > 1:
+        self._bodies.add(header.body)
+        if len(self._bodies) > 1:
             raise DemosError(
-                f"These demonstrations are of several bodies, {', '.join(sorted(self.bodies))}, "
+                f"These demonstrations are of several bodies, {', '.join(sorted(self._bodies))}, "
                 "which turn differently: learn from one at a time."
             )
         if Layout.from_json(header.action_layout).names[0].startswith("waypoint/"):
             return picture
-        camera, pitch, fovy = self.camera, header.camera_pitch_deg, header.camera_fovy_deg
+        camera, pitch, fovy = self._camera, header.camera_pitch_deg, header.camera_fovy_deg
         if camera is None:
             if pitch is None or fovy is None:
                 raise DemosError(
@@ -169,13 +157,13 @@ class CanonicalView:
                 )
             camera = CameraGeometry(pitch, fovy)
         key = camera, (picture.shape[1], picture.shape[0])
-        if key not in self.rectifiers:
-            self.rectifiers[key] = Rectifier(*key)
-        return self.rectifiers[key](picture)
+        if key not in self._rectifiers:
+            self._rectifiers[key] = Rectifier(*key)
+        return self._rectifiers[key](picture)
 
     def note(self) -> str:
         """Return a sentence on the cameras."""
-        cameras = sorted({(one.pitch_deg, one.fovy_deg) for one, _ in self.rectifiers})
+        cameras = sorted({(one.pitch_deg, one.fovy_deg) for one, _ in self._rectifiers})
         each = " and ".join(
             f"looks {pitch:.3g} degrees down with a vertical field of view of {fovy:.3g}"
             for pitch, fovy in cameras
@@ -209,9 +197,6 @@ def pitch_of_horizon(row: float, height: int, fovy_deg: float) -> float:
         row: Row of the horizon, pixels from the top.
         height: Height of the image, pixels.
         fovy_deg: Vertical field of view, degrees.
-
-    Raises:
-        WorldError: If the row is not in the image.
     """
     if not 0.0 <= row <= height:
         raise WorldError(f"The horizon must be in a row from 0 to {height}, got {row:g}.")
@@ -238,10 +223,22 @@ def measure_camera(
         MissingExtra: If OpenCV is not installed.
         WorldError: If there is no such board in the image, or it does not tell the geometry.
     """
-    points = _find_corners(picture, corners)
-    import cv2
-
+    try:
+        import cv2
+    except ImportError as error:
+        raise MissingExtra("cv2", "camera") from error
     height, width = picture.shape[:2]
+    if min(corners) < 3:
+        raise WorldError(f"A board needs at least 3 inner corners along each side, got {corners}.")
+    grey = np.ascontiguousarray(picture.mean(axis=2).astype(np.uint8))
+    search = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+    found, points = cv2.findChessboardCornersSB(grey, corners, flags=search)
+    if not found:
+        raise WorldError(
+            f"There is no checkerboard of {corners[0]} x {corners[1]} inner corners in this image "
+            f"of {width} x {height} pixels: show all of it, near and in even light."
+        )
+    points = np.asarray(points, np.float32)  # (n, 1, 2).
     board = np.zeros((len(points), 3), np.float32)
     board[:, :2] = np.mgrid[: corners[0], : corners[1]].T.reshape(-1, 2)
     flags = (
@@ -260,10 +257,9 @@ def measure_camera(
         focal = 0.5 * height / math.tan(0.5 * math.radians(first))
         lens = np.diag((focal, focal, 1.0))
         lens[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
+        size = (width, height)
         fits.append(
-            cv2.calibrateCameraExtended(
-                [board], [points], (width, height), lens, np.zeros(5), flags=flags
-            )
+            cv2.calibrateCameraExtended([board], [points], size, lens, np.zeros(5), flags=flags)
         )
     error, lens, _, turns, _, lens_sd, pose_sd, _ = min(fits, key=lambda fit: fit[0])
     # Corners are read to a tenth of a pixel at best in each direction, however well a model fits.
@@ -283,28 +279,24 @@ def measure_camera(
     )
     if abs(pitch) > _MOST_TILT_DEG:
         raise WorldError(
-            f"The board seems to be tilted by {abs(pitch):.0f} degrees against the camera: it must "
-            "stand upright."
+            f"The board must stand upright, and is tilted by {abs(pitch):.0f} degrees."
         )
     if pitch_sd > _PITCH_SD_DEG or fovy_sd > _FOVY_SD_DEG:
         raise WorldError(
             f"This image leaves the pitch uncertain by {pitch_sd:.1f} degrees and the field of "
-            f"view by {fovy_sd:.1f}: bring the board nearer, turn it by 30 to 45 degrees to one "
-            "side, or give the field of view of the camera's data sheet."
+            f"view by {fovy_sd:.1f}: bring the board nearer, turn it by 30 to 45 degrees, or give "
+            "the field of view of the camera's data sheet."
         )
     roll = math.degrees(math.atan2(sign * turn[0, side], sign * turn[1, side]))
     return MeasuredCamera(CameraGeometry(pitch, fovy), roll, pitch_sd, fovy_sd, error)
 
 
 def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
-    """Draw the horizon and the edge of what the virtual camera sees, in yellow.
+    """Draw the horizon and the edge of what the virtual camera sees, in yellow, on a new image.
 
     Args:
-        picture: Shape (height, width, 3); not changed.
+        picture: Shape (height, width, 3).
         geometry: The camera that took it.
-
-    Returns:
-        Shape (height, width, 3).
 
     Raises:
         WorldError: If the camera does not see what the virtual camera sees.
@@ -328,15 +320,9 @@ def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[n
 def _seen_at(
     geometry: CameraGeometry, size: tuple[int, int], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return columns and rows of a camera's pixels at places of the virtual camera's image.
+    """Return columns and rows of a camera's pixels at x and y in the virtual image, pixels.
 
-    What is behind the camera is at (-1, -1).
-
-    Args:
-        geometry: The camera.
-        size: Width and height of its images, pixels.
-        x: Places from the left of the virtual image, pixels.
-        y: Places from its top, pixels.
+    What is behind the camera is at (-1, -1). `size` is the width and height of its images.
     """
     wide, high = size
     focal = 0.5 * high / math.tan(0.5 * math.radians(geometry.fovy_deg))
@@ -349,27 +335,3 @@ def _seen_at(
     behind = depth < _NEAREST
     column[behind] = row[behind] = -1.0
     return np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
-
-
-def _find_corners(picture: NDArray[np.uint8], corners: tuple[int, int]) -> NDArray[np.float32]:
-    """Find the inner corners of a board, shape (n, 1, 2), in OpenCV's pixels."""
-    try:
-        import cv2
-    except ImportError as error:
-        raise MissingExtra("cv2", "camera") from error
-    if min(corners) < 3:
-        raise WorldError(
-            f"A board needs at least 3 inner corners along each side, got {corners[0]} x "
-            f"{corners[1]}."
-        )
-    grey = np.ascontiguousarray(picture.mean(axis=2).astype(np.uint8))
-    found, points = cv2.findChessboardCornersSB(
-        grey, corners, flags=cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
-    )
-    if not found:
-        raise WorldError(
-            f"There is no checkerboard of {corners[0]} x {corners[1]} inner corners in this "
-            f"image of {grey.shape[1]} x {grey.shape[0]} pixels: show all of it with a white "
-            "margin, near and in even light."
-        )
-    return np.asarray(points, np.float32)

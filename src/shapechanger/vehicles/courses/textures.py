@@ -56,10 +56,8 @@ def _stretch(knots: Field, size: int) -> Field:
     return knots[below % count] * (1.0 - smooth) + knots[(below + 1) % count] * smooth
 
 
-_SIZE: Final = 256
-_TALL: Final = 512
-# Height of a skirting board over the height of a wall, 2.4 m.
-_SKIRTING: Final = 0.05
+_SIZE, _TALL = 256, 512
+_SKIRTING: Final = 0.05  # Height of a skirting board over the height of a wall, 2.4 m.
 _DARK: Final = (0.24, 0.22, 0.16)
 _FRAME: Final = (0.24, 0.22, 0.19)
 _STEEL: Final = (0.75, 0.75, 0.72)
@@ -73,8 +71,7 @@ def plain(colour: ArrayLike, height: int = _SIZE, width: int = _SIZE) -> Field:
 def plaster(rng: np.random.Generator) -> Field:
     """Painted wall, 2.4 m high, with a dark skirting board, and sometimes a socket or a notice."""
     height = width = _SIZE
-    hue = np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3)
-    image = plain(hue, height, width)
+    image = plain(np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3))
     image *= 1.0 + 0.03 * clouds(rng, height, width, 2, 3)[..., None]
     up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None, None]
     image *= 0.86 + 0.14 * up  # Brighter near the lamps.
@@ -148,17 +145,12 @@ def window(rng: np.random.Generator) -> Field:
 
 
 def _stones(
-    rng: np.random.Generator,
-    rows: int,
-    columns: int,
-    low: float,
-    high: float,
+    rng: np.random.Generator, rows: int, columns: int, low: float, high: float,
     joints: Sequence[float],
-) -> tuple[Field, Field]:
-    """Brightness of stones in courses that are offset by half a stone, and mask of joints.
+) -> tuple[Field, Field]:  # fmt: skip
+    """Brightness, from `low` to `high`, of stones in courses offset by half, and mask of joints.
 
-    The brightness is drawn from `low` to `high`; `joints` are height and width over those of a
-    stone.
+    `joints` are height and width over those of a stone.
     """
     y = np.arange(_SIZE)[:, None] * rows / _SIZE
     x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)
@@ -380,8 +372,7 @@ def sky(rng: np.random.Generator) -> Field:
     return np.concatenate(faces)
 
 
-_CELL: Final = 64
-_ROWS: Final = 4
+_CELL, _ROWS = 64, 4
 _SHEETS: Final = tomllib.loads(Path(__file__).with_name("cells.toml").read_text("utf-8"))
 
 
@@ -430,11 +421,8 @@ PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingP
 )  # fmt: skip
 """Painters of the textures, keyed by name."""
 
-# Size of the cache: a texture set has at most ten textures, and each world a dozen sets.
-_KEPT: Final = 400
 
-
-@functools.lru_cache(_KEPT)
+@functools.lru_cache(400)  # A set has at most ten textures, and each world a dozen sets.
 def texture(name: str, seed: int) -> NDArray[np.uint8]:
     """Paint a texture, read-only, (H, W, 3), with the top row first, or take it from the cache."""
     if name not in PAINTERS:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Self
@@ -30,8 +29,7 @@ Each was cloned from ten minutes of its expert's driving; `clones/README.md` is 
 """
 
 _WANDER_S: Final = 0.6  # Correlation time of the wandering.
-_JERKS_PER_S: Final = 0.25  # Mean rate of jerks.
-_JERK_S: Final = (0.15, 0.5)  # Shortest and longest duration of a jerk.
+_JERKS_PER_S, _JERK_S = 0.25, (0.15, 0.5)  # Mean rate of jerks, and range of their duration.
 _THROTTLE_SD: Final = 0.1  # Standard deviation of the wandering of the throttle.
 
 
@@ -49,9 +47,6 @@ class Demonstrator:
         seed: Seed of the mistakes.
         sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
             as much.
-
-    Raises:
-        WorldError: If the seed is not a whole number from 0.
     """
 
     def __init__(
@@ -108,10 +103,7 @@ def require_rate(control_hz: float) -> None:
 
 
 class ExpertDriver:
-    """Expert that drives on the present course of a world.
-
-    It counts in periods of 1/20 s. `DriveEnv.expert` makes it for robots with this control rate.
-    """
+    """Expert that drives on the present course of a world, in periods of 1/20 s."""
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world = world
@@ -120,13 +112,12 @@ class ExpertDriver:
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
         """Return an action, (2,), steering and throttle; the observation is ignored."""
-        seen = self._world.inputs()
-        if self._world.course is not self._course:
-            self._course = self._world.course
-            world = self._world
+        world, seen = self._world, self._world.inputs()
+        if world.course is not self._course:
+            self._course = world.course
             self._expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
-        if self._world.placed != self._placed:
-            self._placed = self._world.placed
+        if world.placed != self._placed:
+            self._placed = world.placed
             self._expert.reset(seen.pose)
         return self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
 
@@ -140,16 +131,16 @@ def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
 
     def begin() -> Callable[[], NDArray[np.float32]]:
         expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
-        return partial(_point, world, expert)
+        path = expert.path
+
+        def point() -> NDArray[np.float32]:
+            pose = world.pose
+            station = path.nearest(pose.x, pose.y).station
+            x, y = path.at(station + AHEAD_M)
+            left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
+            share = expert.speeds[path.index(station)] / world.vehicle.top_speed_mps
+            return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)
+
+        return point
 
     return Demonstrator(begin, seed, _BEARING_SWAY)
-
-
-def _point(world: MujocoWorld, expert: CourseExpert) -> NDArray[np.float32]:
-    """Return the waypoint on the expert's path."""
-    pose, path = world.pose, expert.path
-    station = path.nearest(pose.x, pose.y).station
-    x, y = path.at(station + AHEAD_M)
-    left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
-    share = expert.speeds[path.index(station)] / world.vehicle.top_speed_mps
-    return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)

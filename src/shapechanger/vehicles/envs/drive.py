@@ -7,10 +7,10 @@ import functools
 import json
 import operator
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, Self, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 import gymnasium as gym
 import msgspec
@@ -79,8 +79,8 @@ class SimulatedRobot(msgspec.Struct, frozen=True):
 def lab_robots() -> dict[str, SimulatedRobot]:
     """Return the robots of the envs, keyed by the name of their profile.
 
-    `scripts/lab_robots.py` copies their numbers from the profiles, so that a simulation loads none
-    of the modules for real robots.
+    `scripts/lab_robots.py` copies their numbers from the profiles: a simulation loads no module for
+    real robots.
     """
     text = Path(__file__).with_name("lab_robots.json").read_text("utf-8")
     return msgspec.convert(json.loads(text), dict[str, SimulatedRobot])
@@ -111,11 +111,9 @@ def simulated_robot(
     plan: GuardPlan = found.plan
     if found.size == (0, 0):
         raise ProfileError(f"{found.path}: the robot has no camera, and this task needs one.")
-    if [action.name for action in plan.actions] != ["steering", "throttle"]:
-        names = ", ".join(action.name for action in plan.actions)
-        raise ProfileError(
-            f"{found.path}: a vehicle's actions must be steering and throttle, not {names}."
-        )
+    names = [action.name for action in plan.actions]
+    if names != ["steering", "throttle"]:
+        raise ProfileError(f"{found.path}: actions must be steering and throttle, not {names}.")
     if steering is not None:
         if steering not in _LEVELS:
             raise UnknownName("steering", steering, _LEVELS)
@@ -148,11 +146,10 @@ def _course_seeds(courses: Courses) -> Sequence[int]:
             raise UnknownName("kind of courses", courses, _KINDS)
         return _KINDS[courses]
     given: Any = courses  # May be a single seed where nothing checks types.
-    seeds = cast("Iterable[Any]", given if isinstance(given, Iterable) else (given,))
-    checked = tuple(_seed_of("course", seed) for seed in seeds)
-    if not checked:
+    seeds = tuple(_seed_of("course", seed) for seed in np.atleast_1d(np.array(given, object)))
+    if not seeds:
         raise WorldError("There are no courses to draw from: give at least one seed.")
-    return checked
+    return seeds
 
 
 def _seed_of(kind: str, seed: Any) -> int:
@@ -161,9 +158,6 @@ def _seed_of(kind: str, seed: Any) -> int:
 
 class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     """The driving task: a vehicle on sampled courses, within its robot's limits.
-
-    Its views are `VehicleEnv` (image and sensors), `RangesEnv` (distances) and `WaypointEnv` (an
-    image and an action that all vehicles share).
 
     Attributes:
         parts: The parts that the robot's outputs move, such as "wheels" and "steering".
@@ -202,15 +196,10 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.render_mode, self._puts_back = render_mode, put_back
         self._seeds, self._randomise = _course_seeds(courses), randomise
         self.world = MujocoWorld(
-            vehicle,
-            world,
-            self._seeds[0],
-            size=robot.size if has_camera or render_mode else None,
-            pitch_deg=robot.camera_pitch_deg,
-            fovy_deg=robot.camera_fovy_deg,
-            lenses=lenses,
+            vehicle, world, self._seeds[0], size=robot.size if has_camera or render_mode else None,
+            pitch_deg=robot.camera_pitch_deg, fovy_deg=robot.camera_fovy_deg, lenses=lenses,
             coarse=coarse,
-        )
+        )  # fmt: skip
         self.parts = frozenset(output.part for output in robot.plan.outputs)
         ends = {"collision_ends_episode": 0.0} if put_back else {}
         self._reward = DriveReward.from_weights({**reward, **ends})
@@ -257,10 +246,8 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         world.place(start)
         self._begin()
         if world.touches:
-            raise WorldError(
-                f"The {world.vehicle.name} is stuck at start {start} of course {course}: choose "
-                "another."
-            )
+            name = world.vehicle.name
+            raise WorldError(f"The {name} is stuck at start {start} of course {course}.")
         self._needs_reset = False
         return self._observe()
 
@@ -275,9 +262,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             raise gym.error.ResetNeeded("Call reset() before the first step.")
         values = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         if values.shape != (2,) or not np.isfinite(values).all():
-            raise SpaceMismatch(
-                f"An action of a vehicle is steering and throttle, got {np.asarray(action)}."
-            )
+            raise SpaceMismatch(f"An action is steering and throttle, got {np.asarray(action)}.")
         collided, terms, seen, info = self._advance(values)
         info |= terms
         info["reward_terms"] = terms

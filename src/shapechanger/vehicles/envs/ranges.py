@@ -31,12 +31,9 @@ COLLISION_REWARD: Final = -3.0
 # Nearer to something than this costs, up to the second number for each second. Teachers keep this
 # distance without a price for it, but once nearer they squeezed through where a camera that sees 31
 # degrees to each side must guess; with it they brake and back out, and a student learns that too.
-_NEAR_M: Final = 0.35
-_NEAR_COST: Final = 3.0
-_FASTEST_MPS: Final = 5.0
-_FASTEST_TURN: Final = 15.0  # rad/s
-# Courses to train on. The models of this many stay compiled (`worlds.simulation`).
-_COURSES: Final = range(48)
+_NEAR_M, _NEAR_COST = 0.35, 3.0
+_FASTEST_MPS, _FASTEST_TURN = 5.0, 15.0  # m/s and rad/s.
+_COURSES: Final = range(48)  # To train on. The models of this many stay compiled.
 
 
 class MeanOutputs:
@@ -46,9 +43,6 @@ class MeanOutputs:
 
     Args:
         plan: Plan of the guard.
-
-    Attributes:
-        applied: Value of each action at the end of the last period.
     """
 
     def __init__(self, plan: GuardPlan) -> None:
@@ -58,7 +52,7 @@ class MeanOutputs:
         self._forward = Propulsion(plan.actions).forward
         self._now_ns = 0
         self._bump = Bump(plan.limits.bump_hold_ms)
-        self.applied = tuple(action.rest for action in plan.actions)
+        self._applied = tuple(action.rest for action in plan.actions)
 
     def outputs(
         self, values: tuple[float, ...], bumped: bool, ticks: int
@@ -76,14 +70,14 @@ class MeanOutputs:
         left = ticks
         while left:
             # Once at the target, the rest of the period is the same.
-            repeats = left if self.applied == target else 1
+            repeats = left if self._applied == target else 1
             left -= repeats
-            values_now = output_values(self._plan, self.applied)
+            values_now = output_values(self._plan, self._applied)
             total = [one + repeats * now for one, now in zip(total, values_now, strict=True)]
             if repeats == 1:
-                self.applied = tuple(
+                self._applied = tuple(
                     slewed(action, now, aim, self._tick_s)
-                    for action, now, aim in zip(actions, self.applied, target, strict=True)
+                    for action, now, aim in zip(actions, self._applied, target, strict=True)
                 )
         outputs = self._plan.outputs
         return {out.part: one / ticks for out, one in zip(outputs, total, strict=True)}
@@ -103,9 +97,8 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
 def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
     """Return an action that moves a standing vehicle, unless its throttle is exactly 0.
 
-    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest.
-    The vehicle then observes the same numbers indefinitely and stands for good. In training,
-    exploration moved it, so training hardly saw this.
+    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest:
+    the vehicle would stand for good. In training, exploration moved it.
 
     Args:
         action: Steering and throttle, shape (2,).

@@ -7,7 +7,7 @@ lens that distorts nothing, or a size that nothing uses.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any
 
 import gymnasium as gym
 import msgspec
@@ -19,10 +19,7 @@ from shapechanger.vehicles.waypoints import SteeringResponse
 from shapechanger.vehicles.world import MujocoWorld
 
 # Commands of the rollout: half of the steps straight ahead, the other half to the left.
-_STEPS: Final = 40
-_HALF: Final = _STEPS // 2
-_THROTTLE: Final = 0.5
-_STEERING: Final = -0.5
+_HALF, _THROTTLE, _STEERING = 20, 0.5, -0.5
 
 
 class VehicleShift(msgspec.Struct, frozen=True):
@@ -78,8 +75,8 @@ def certify_vehicles(
     is_empty = all(map(np.array_equal, one, two))
     if is_empty and not allow_empty:
         raise EmptyShift(
-            f"{names[0]} and {names[1]} behave the same: {_STEPS} steps gave equal frames, places "
-            "and rewards, so there is nothing to transfer."
+            f"{names[0]} and {names[1]} behave the same: {2 * _HALF} steps gave equal frames, "
+            "places and rewards, so there is nothing to transfer."
         )
     changes = tuple(f"{name}: {old[name]} -> {new[name]}" for name in old if old[name] != new[name])
     return VehicleShift(*names, changes, _answers(source, one, two), is_empty)
@@ -89,7 +86,7 @@ def _drive(env: gym.Env[Any, Any], seed: int) -> tuple[NDArray[np.float64], ...]
     """Return poses, x, y and heading, (n, 3), rewards, and the first and last observation."""
     seen, info = env.reset(seed=seed)
     observations, path, rewards = [seen], [info["pose"]], list[float]()
-    for step in range(_STEPS):
+    for step in range(2 * _HALF):
         action = np.array([0.0 if step < _HALF else _STEERING, _THROTTLE], np.float32)
         seen, reward, terminated, truncated, info = env.step(action)
         path.append(info["pose"])
@@ -109,18 +106,17 @@ def _answers(
     """Return a sentence on each difference of two rollouts."""
     has_waypoints = hasattr(source.unwrapped, "response")
     aside, forward = ("bearing", "speed") if has_waypoints else ("steering", "throttle")
-    moved: list[str] = []
-    turned: list[str] = []
+    moved, turned = list[float](), list[float]()
     for path, *_ in (one, two):
         half = min(_HALF, len(path) - 1)
-        moved.append(f"{np.linalg.norm(path[half, :2] - path[0, :2]):.2f}")
+        moved.append(float(np.linalg.norm(path[half, :2] - path[0, :2])))
         heading = np.unwrap(path[half:, 2])
-        turned.append(f"{math.degrees(heading[-1] - heading[0]):.0f}")
+        turned.append(math.degrees(heading[-1] - heading[0]))
     sentences = [
-        f"straight ahead at a {forward} of {_THROTTLE:g} for {_HALF} steps: {moved[0]} m -> "
-        f"{moved[1]} m",
-        f"then a {aside} of {_STEERING:g} for as many: turned by {turned[0]} -> {turned[1]} "
-        "degrees",
+        f"straight ahead at a {forward} of {_THROTTLE:g} for {_HALF} steps: {moved[0]:.2f} m -> "
+        f"{moved[1]:.2f} m",
+        f"then a {aside} of {_STEERING:g} for as many: turned by {turned[0]:.0f} -> "
+        f"{turned[1]:.0f} degrees",
     ]
     if one[2].shape == two[2].shape:
         gaps = [np.abs(a - b).mean() for a, b in zip(one[2:], two[2:], strict=True)]
@@ -135,15 +131,12 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
     """Return the properties of a vehicle, keyed by their names."""
     inner: Any = env.unwrapped
     world: MujocoWorld = inner.world
-    model, camera = world.vehicle, world.mount
-    turning = model.turning_radius_m
+    model, camera, turning = world.vehicle, world.mount, world.vehicle.turning_radius_m
     response: SteeringResponse | None = getattr(inner, "response", None)
-    facts: dict[str, str] = {}
-    if response is not None:
-        facts["turn at full steering, the map of waypoints to this body"] = (
-            f"{response.per_metre:.2f} rad/m and {response.per_second:.2f} rad/s"
-        )
-    return facts | {
+    return {
+        "turn at full steering, the map of waypoints to this body": "none"
+        if response is None
+        else f"{response.per_metre:.2f} rad/m and {response.per_second:.2f} rad/s",
         "vehicle": model.name,
         "moves": "on water" if model.floats else "on land",
         "driven by": " and ".join(sorted(inner.parts)),

@@ -16,13 +16,7 @@ from shapechanger.errors import ProfileError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.vehicles.bodies import vehicle_model
 from shapechanger.vehicles.courses.course import FLOODED
-from shapechanger.vehicles.envs.drive import (
-    Courses,
-    DriveEnv,
-    Steering,
-    simulated_robot,
-    space_of,
-)
+from shapechanger.vehicles.envs.drive import Courses, DriveEnv, Steering, simulated_robot, space_of
 from shapechanger.vehicles.envs.ranges import RangesEnv, leave_rest, observe_ranges
 from shapechanger.vehicles.envs.sensed import SensedVehicle
 from shapechanger.vehicles.envs.shift import certify_vehicles
@@ -240,11 +234,10 @@ def _response_of(
 class WaypointEnv(WaypointView, DriveEnv):
     """The driving task with a camera and an action that are the same for all vehicles.
 
-    Networks that predict steering learn the body with it: full left is another circle in each
-    vehicle. A waypoint means the same in all of them, so a policy that learned in one vehicle
-    drives another one as it is: images are warped to one
-    virtual camera (`shapechanger.vehicles.cameras.rectify`), and the action is a waypoint, which
-    the vehicle turns into steering by its own `SteeringResponse`, measured when the env is made.
+    Full left is another circle in each vehicle. A waypoint means the same in all of them, so a
+    policy that learned in one vehicle drives another one as it is: images are warped to one virtual
+    camera (`shapechanger.vehicles.cameras.rectify`), and each vehicle turns waypoints into steering
+    by its own `SteeringResponse`, measured when the env is made.
 
     ## Action space
     `Box(-1, 1, (2,), float32)`: bearing of the free way 0.8 m ahead, where 1 is 1 rad to the right;
@@ -318,11 +311,9 @@ class WaypointEnv(WaypointView, DriveEnv):
             "world": world, "robot": robot, "courses": courses, "randomise": randomise,
             "put_back": put_back, "render_mode": render_mode,
         }  # fmt: skip
-        env = (
-            VehicleEnv(vehicle, state=True, **common)
-            if sensed
-            else RangesEnv(vehicle, camera=True, **common)
-        )
+        env: DriveEnv = VehicleEnv(vehicle, state=True, **common) if sensed else RangesEnv(
+            vehicle, camera=True, **common
+        )  # fmt: skip
         self.parts, self.world = env.parts, env.world
         self._see(
             env, profile.path, (profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size),
@@ -335,18 +326,8 @@ class WaypointEnv(WaypointView, DriveEnv):
         self._env.hold_out()
 
     def demonstrator(self, seed: int) -> Demonstrator:
-        """Return an expert that knows the whole course and recovers from its own mistakes.
+        """Return an expert that recovers from its own mistakes; see `DriveEnv.demonstrator`."""
+        from shapechanger.vehicles.envs import demonstrators  # SciPy.
 
-        Args:
-            seed: Seed of the mistakes.
-
-        Raises:
-            ProfileError: If the robot has another control rate than the expert.
-        """
-        from shapechanger.vehicles.envs.demonstrators import (
-            require_rate,
-            waypoint_demonstrator,
-        )  # SciPy.
-
-        require_rate(self.metadata["render_fps"])
-        return waypoint_demonstrator(self.world, seed)
+        demonstrators.require_rate(self.metadata["render_fps"])
+        return demonstrators.waypoint_demonstrator(self.world, seed)

@@ -13,8 +13,6 @@ from shapechanger.errors import SpaceMismatch
 FOUR_WAYS: Final = ("forward", "backward", "right", "left")
 """Meanings of the actions 0 to 3, in the order of the columns of 2017's `labels.csv`."""
 
-_STEERING_THROTTLE: Final = 2
-
 
 class DiscreteDriving(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
     """Wrapper for driving with one of four keys, as with the car of 2017.
@@ -38,28 +36,18 @@ class DiscreteDriving(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
         steering: float = 1.0,
         throttle_in_turns: float = 0.0,
     ) -> None:
-        if env.action_space.shape != (_STEERING_THROTTLE,):
+        if env.action_space.shape != (2,):
             raise SpaceMismatch(
                 f"DiscreteDriving needs an env with [steering, throttle], got {env.action_space}."
             )
         super().__init__(env)
         self.action_space = gym.spaces.Discrete(len(FOUR_WAYS))
-        self._actions = np.array(
-            [
-                (0.0, throttle),
-                (0.0, -throttle),
-                (steering, throttle_in_turns),
-                (-steering, throttle_in_turns),
-            ],
-            np.float32,
-        )
+        ways = (0.0, throttle), (0.0, -throttle)
+        turns = (steering, throttle_in_turns), (-steering, throttle_in_turns)
+        self._actions = np.array((*ways, *turns), np.float32)
 
     def action(self, action: np.int64 | int) -> NDArray[np.float32]:
-        """Return [steering, throttle] of a key, see `FOUR_WAYS`.
-
-        Raises:
-            SpaceMismatch: If the action is not 0, 1, 2 or 3.
-        """
+        """Return [steering, throttle] of a key, see `FOUR_WAYS`."""
         if not self.action_space.contains(action):
             keys = ", ".join(f"{number} ({way})" for number, way in enumerate(FOUR_WAYS))
             raise SpaceMismatch(f"The four keys are {keys}; got {action!r}.")

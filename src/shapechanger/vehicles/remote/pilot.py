@@ -41,13 +41,12 @@ def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
 
     Args:
         card: Card of the policy.
-        robot: The robot.
+        robot: Card of the robot.
         measures: Whether the vehicle's turning may be measured before it drives.
 
     Raises:
         PolicyError: If body, rate, actions or state differ.
-        RobotRefused: If the robot has no camera, or its card lacks how the camera looks or how the
-            vehicle turns.
+        RobotRefused: If the robot lacks a camera, how it looks, or how the vehicle turns.
     """
     net = clone_of(card)
     if net.body and net.body != robot.body:
@@ -109,15 +108,15 @@ def _has_waypoints(card: PolicyCard) -> bool:
 
 
 class PolicyDriver:
-    """A policy that drives between a person's permission and their next intervention.
+    """A policy that drives between a person's permission and their next intervention, or waits.
 
-    Between these it waits. It connects as a program, in the thread that calls `run`, or in one of
-    its own from `__enter__` to `__exit__`.
+    It connects as a program, in the thread that calls `run`, or in one of its own from `__enter__`
+    to `__exit__`.
 
     Args:
         policy: The policy.
         name: Displayed name.
-        robot: The robot.
+        robot: Address and credentials of the robot.
         on_note: Called with its state whenever that changes.
         waits: What to say while it waits; "" for what a person at a terminal can do.
 
@@ -133,15 +132,11 @@ class PolicyDriver:
         on_note: Callable[[str], object] = lambda _: None,
         waits: str = "",
     ) -> None:
-        self.note = ""
-        self._policy = policy
-        self._name = name
-        self._robot = robot
-        self._on_note = on_note
-        self._waits = waits
+        self.note = self._why = ""
+        self._policy, self._name, self._robot = policy, name, robot
+        self._on_note, self._waits = on_note, waits
         self._ended = threading.Event()
         self._failure: Exception | None = None
-        self._why = ""
         self._sees = policy.net.eyes != "none"
         self._feels = policy.card.observation is not None
         self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
@@ -212,8 +207,8 @@ class PolicyDriver:
                 # The robot would refuse it, too, and stop.
                 raise PolicyError(f"The policy gave {action.tolist()}, which is no command.")
             observation, _, terminated, truncated, info = env.step(action)
-            watches = "intervene_action" in info
-            self._say("you drive, and the policy watches" if watches else "it drives")
+            yields = "intervene_action" in info
+            self._say("you drive, and the policy watches" if yields else "it drives")
             if terminated or truncated:
                 self._why = info["truncated_because"] or "It collided."
                 return

@@ -10,11 +10,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import RobotRefused
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.link.messages import Welcome
-from shapechanger.vehicles.waypoints import (
-    SteeringResponse,
-    WaypointView,
-    measure_response,
-)
+from shapechanger.vehicles.waypoints import SteeringResponse, WaypointView, measure_response
 
 
 class RemoteWaypointEnv(WaypointView):
@@ -62,10 +58,9 @@ class RemoteWaypointEnv(WaypointView):
             welcome = env.welcome
             if self.response is None and welcome.turning is not None:
                 self.response = SteeringResponse(*welcome.turning)
-            if env.action_layout.names != ("steering", "throttle"):
+            if (names := env.action_layout.names) != ("steering", "throttle"):
                 raise RobotRefused(
-                    f"{welcome.robot} has the actions {', '.join(env.action_layout.names)}, and "
-                    "waypoints become steering and throttle."
+                    f"Waypoints become steering and throttle, and {welcome.robot} has {names}."
                 )
             sensors = ("speed", "yaw_rate")[: 1 + (self.response is None)]
             camera = welcome.camera_pitch_deg, welcome.camera_fovy_deg, welcome.image_size
@@ -87,10 +82,7 @@ class RemoteWaypointEnv(WaypointView):
     ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
         """Measure the response if it is unknown, and bring the robot to the start.
 
-        Raises:
-            StudyError: If the vehicle does not turn as it steers.
-            RobotRefused: If the robot was not armed in time, or refuses the client.
-            LinkError: If the robot cannot be reached in time.
+        Raises a `StudyError` if the vehicle does not turn as it steers; else as `RemoteVehicleEnv`.
         """
         if self.response is None:
             self.response = measure_response(self._env, *self._motion_at)
