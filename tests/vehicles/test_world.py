@@ -169,25 +169,6 @@ def test_running_into_a_wall_is_one_collision_and_put_back_frees_the_vehicle() -
     assert world.progress_m > progress + 0.05
 
 
-def test_acceleration_in_the_body_frame() -> None:
-    world = _world()
-    _drive(world, _AHEAD["car"], 0.05)
-    assert world.inputs().acceleration_x > 0.1
-    _drive(world, {"wheels": 0.5, "steering": -1.0}, 0.5)
-    seen = world.inputs()
-    assert seen.yaw_rate > 0.2
-    assert seen.acceleration_y == pytest.approx(seen.speed * seen.yaw_rate, rel=0.2)
-
-
-def test_a_boat_drifts_with_the_current() -> None:
-    world = _world("boat")
-    start, flow = world.pose, world.course.current_mps
-    assert math.hypot(*flow) > 0.0
-    _drive(world, {"propeller": 0.0, "rudder": 0.0}, 4.0)
-    moved = world.pose.x - start.x, world.pose.y - start.y
-    assert moved[0] * flow[0] + moved[1] * flow[1] > 0.0
-
-
 def test_picture_needs_a_camera() -> None:
     with pytest.raises(WorldError, match="has no camera: pass a `size`"):
         _world().picture()

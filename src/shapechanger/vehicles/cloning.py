@@ -127,7 +127,7 @@ def drive(
     chosen: Callable[[NDArray[np.uint8], NDArray[np.float32]], NDArray[np.float32]],
     on_steps: Callable[[int], None] = lambda steps: None,
 ) -> Dataset:
-    """Drive, and record what a demonstrator does.
+    """Drive, and record frames as a policy sees them, with what a demonstrator intended at each.
 
     Args:
         env: An env of a camera.
@@ -137,9 +137,6 @@ def drive(
         seed: Seed of the first reset.
         chosen: Returns the action to take, for a frame and the demonstrator's disturbed action.
         on_steps: Called with the number of steps driven, after each episode.
-
-    Returns:
-        Frames as a policy sees them, with the action that the demonstrator intended at each.
     """
     pictures: list[NDArray[np.uint8]] = []
     actions = np.empty((steps, 2), np.float32)

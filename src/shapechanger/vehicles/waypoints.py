@@ -82,9 +82,6 @@ def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) ->
         env: A vehicle with steering and throttle as its action. It is reset.
         speed_at: Place of the speed, m/s, in the numbers that it observes.
         yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
-
-    Raises:
-        StudyError: If it does not turn as it steers.
     """
     from scipy.optimize import nnls  # Not there on a robot, which does not measure itself.
 

@@ -197,13 +197,7 @@ class MujocoWorld:
         return _planned(self.vehicle.name, self._world, self.course.seed)
 
     def put_back(self) -> None:
-        """Put the vehicle on the nearest point of its path, at rest.
-
-        Progress and collisions keep counting.
-
-        Raises:
-            WorldError: If there is no path around the course for this vehicle.
-        """
+        """Put the vehicle on the nearest point of its path, at rest; progress keeps counting."""
         path, here = self.path(), self._motion
         i = path.index(path.nearest(here.x, here.y).station)
         x, y = path.points[i].tolist()
@@ -269,15 +263,12 @@ class MujocoWorld:
     def ranges_m(
         self, bearings: NDArray[np.float64], farthest_m: float = 6.0
     ) -> NDArray[np.float64]:
-        """Distances from the middle of the front bumper to walls and obstacles.
+        """Distances from the middle of the front bumper to walls and obstacles, m, (n,).
 
         Args:
             bearings: Directions from the heading, rad, positive to the left, (n,); each from -pi/2
                 to pi/2, where the vehicle itself is not in the way.
             farthest_m: Distance to report if nothing is nearer, m.
-
-        Returns:
-            Distances, m, (n,).
         """
         found = self._rays(self.vehicle.nose_m, bearings, farthest_m, farthest_m)
         return np.minimum(found, farthest_m, out=found)
@@ -301,11 +292,7 @@ class MujocoWorld:
         return found
 
     def picture(self) -> NDArray[np.uint8]:
-        """Image of the front camera, RGB, shape (height, width, 3).
-
-        Raises:
-            WorldError: If the world was made without a camera.
-        """
+        """Image of the front camera, RGB, shape (height, width, 3)."""
         if self._camera is None:
             raise WorldError("This world has no camera: pass a `size`.")
         image = self._camera.picture(self.model, self.data)
@@ -336,9 +323,6 @@ class MujocoWorld:
             azimuth_rad: Direction of view from its heading, counter-clockwise; 0 is from behind.
                 Of several, the first in which no wall hides the vehicle, if there is one.
             elevation_rad: Angle of view above the horizon; negative looks down.
-
-        Raises:
-            RenderError: If the size is out of range, or nothing can be drawn here.
         """
         if self._outside is None or self._outside.size != (width, height):
             from shapechanger.vehicles.cameras.camera import OutsideCamera  # OpenGL.
@@ -359,13 +343,11 @@ class MujocoWorld:
             """Return whether neither nose nor tail is behind a wall or an obstacle."""
             flat, rise = math.cos(elevation_rad), math.sin(elevation_rad)
             eye = centre - distance * np.array((flat * math.cos(view), flat * math.sin(view), rise))
-            hit = np.zeros(1, np.int32)
+            model, hit = self.model, np.zeros(1, np.int32)
             for end in ends:
-                met = mujoco.mj_ray(
-                    self.model, self.data, eye, end - eye, _SOLID, True, self._chassis, hit
-                )
-                # In lengths of the ray.
-                if 0.0 <= met < 1.0 and self.model.geom_bodyid[hit[0]] == 0:
+                away = end - eye
+                met = mujoco.mj_ray(model, self.data, eye, away, _SOLID, True, self._chassis, hit)
+                if 0.0 <= met < 1.0 and model.geom_bodyid[hit[0]] == 0:  # In lengths of the ray.
                     return False
             return True
 

@@ -57,20 +57,6 @@ def test_left_is_counter_clockwise(name: str) -> None:
     assert here.vehicle.motion().yaw_rate == pytest.approx(-left, rel=0.02)
 
 
-@pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize("value", [0.03, -0.05])
-def test_small_outputs_do_not_move_a_vehicle_and_larger_ones_move_it_their_way(
-    name: str, value: float
-) -> None:
-    here = ground(name)
-    here.drive(2.0, scaled(AHEAD[name], value))
-    assert here.pace() < 1e-3
-    here.drive(2.0, scaled(AHEAD[name], math.copysign(0.2, value)))
-    for moved in (here.vehicle.motion().speed, here.vehicle.motion().x, here.vehicle.travelled_m()):
-        assert math.copysign(moved, value) == moved
-        assert abs(moved) > 0.01
-
-
 @pytest.mark.parametrize("name", LAND)
 def test_zero_brakes_and_none_coasts(name: str) -> None:
     here = ground(name)

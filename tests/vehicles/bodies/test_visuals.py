@@ -67,31 +67,6 @@ def test_outside_a_vehicle_is_made_of_meshes(name: str) -> None:
     assert max(heights) == pytest.approx(-min(heights), abs=1e-4)
 
 
-@pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize("yaw", [0.0, 2.0])
-def test_brightness_does_not_change_with_the_heading(name: str, yaw: float) -> None:
-    """Normals have the chosen brightness in a light that shines straight up: the roof the most."""
-    model = _spec(name).compile()
-    data = mujoco.MjData(model)
-    half = 0.5 * yaw
-    if model.joint(0).type[0] == mujoco.mjtJoint.mjJNT_FREE:
-        data.qpos[3:7] = np.cos(half), 0.0, 0.0, np.sin(half)
-    else:
-        data.qpos[2] = yaw
-    mujoco.mj_forward(model, data)
-    brightest: list[float] = []
-    for i in np.flatnonzero(model.geom_group == OUTSIDE_VIEW):
-        if model.body(model.geom_bodyid[i]).name != "vehicle/chassis":
-            continue
-        mesh = model.geom_dataid[i]
-        first, count = model.mesh_normaladr[mesh], model.mesh_normalnum[mesh]
-        turn = data.geom_xmat[i].reshape(3, 3)
-        light = -(model.mesh_normal[first : first + count] @ turn.T)[:, 2]
-        assert light.min() > -1e-5
-        brightest.append(float(light.max()))
-    assert max(brightest) == pytest.approx(1.0, abs=1e-5)
-
-
 _CUBE = """# A cube, its top as two triangles.
 v 0 0 0
 v 1 0 0

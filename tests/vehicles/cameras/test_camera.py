@@ -1,18 +1,33 @@
-"""The on-board camera."""
+"""The on-board camera, errors of its pose, and its faults."""
 
 from __future__ import annotations
 
 import gc
+import math
 import os
 import weakref
 
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from shapechanger.errors import RenderError
+from shapechanger.errors import RenderError, UnknownName, WorldError
+from shapechanger.vehicles.bodies.parts import CameraJitter, move_camera
 from shapechanger.vehicles.cameras import camera as module
-from shapechanger.vehicles.cameras.camera import OnboardCamera
+from shapechanger.vehicles.cameras.camera import (
+    CORRUPTIONS,
+    Corruption,
+    OnboardCamera,
+    Picture,
+    blur,
+    dirt,
+    find_corruption,
+    glare,
+    night,
+)
 
 _MODEL = """
 <mujoco><asset><material name="m" emission="1" rgba="{colour} 1"/></asset><worldbody>
@@ -70,3 +85,127 @@ def test_rendering_after_a_fork_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     model, data = _model("1 0 0")
     with pytest.raises(RenderError, match="forked after rendering"):
         camera.picture(model, data)
+
+
+# Looks along x, with z up, as the cameras of vehicles.
+_MOUNTED = """
+<mujoco><worldbody><body><geom size="0.1"/>
+<camera name="eye" pos="0.05 0 0.12" xyaxes="0 -1 0 0 0 1"/>
+</body></worldbody></mujoco>
+"""
+
+
+def _moved(jitter: CameraJitter) -> mujoco.MjModel:
+    model = mujoco.MjModel.from_xml_string(_MOUNTED)
+    move_camera(model, "eye", jitter)
+    return model
+
+
+def _axes(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Return the axes of the camera as columns: right, up and backward."""
+    axes = np.empty(9)
+    mujoco.mju_quat2Mat(axes, model.camera("eye").quat)
+    return axes.reshape(3, 3)
+
+
+def test_offsets_are_up_and_left() -> None:
+    assert _moved(CameraJitter()).camera("eye").pos == pytest.approx([0.05, 0.0, 0.12])
+    np.testing.assert_allclose(_axes(_moved(CameraJitter()))[:, 2], [-1, 0, 0], atol=1e-9)
+    place = _moved(CameraJitter(up_m=0.01, left_m=0.02)).camera("eye").pos
+    assert place == pytest.approx([0.05, 0.02, 0.13])
+
+
+def test_directions_of_the_angles() -> None:
+    """Pitch turns down, yaw to the left, and roll clockwise."""
+    few = 0.05
+    ahead_down = -_axes(_moved(CameraJitter(pitch_rad=few)))[:, 2]
+    np.testing.assert_allclose(ahead_down, [math.cos(few), 0.0, -math.sin(few)], atol=1e-9)
+    ahead_left = -_axes(_moved(CameraJitter(yaw_rad=few)))[:, 2]
+    np.testing.assert_allclose(ahead_left, [math.cos(few), math.sin(few), 0.0], atol=1e-9)
+    up_right = _axes(_moved(CameraJitter(roll_rad=few)))[:, 1]
+    np.testing.assert_allclose(up_right, [0.0, -math.sin(few), math.cos(few)], atol=1e-9)
+
+
+_ERRORS = st.one_of(st.floats(-2.0, 2.0), st.floats())
+
+
+@given(jitter=st.builds(CameraJitter, _ERRORS, _ERRORS, _ERRORS, _ERRORS, _ERRORS))
+def test_a_refused_error_changes_nothing(jitter: CameraJitter) -> None:
+    """An error is added completely, or not at all."""
+    model = mujoco.MjModel.from_xml_string(_MOUNTED)
+    before = model.cam_pos.copy(), model.cam_quat.copy()
+    try:
+        move_camera(model, "eye", jitter)
+    except WorldError:
+        np.testing.assert_array_equal(model.cam_pos, before[0])
+        np.testing.assert_array_equal(model.cam_quat, before[1])
+    else:
+        np.testing.assert_allclose(model.cam_pos, before[0] + [0.0, jitter.left_m, jitter.up_m])
+        assert np.isfinite(model.cam_quat).all()
+
+
+@pytest.mark.parametrize("name", ["up_m", "left_m", "roll_rad"])
+@pytest.mark.parametrize("value", [-1.5, math.nan])
+def test_a_camera_stays_on_its_vehicle(name: str, value: float) -> None:
+    if name != "roll_rad" or math.isnan(value):
+        with pytest.raises(WorldError, match="would be off its vehicle or in the floor"):
+            _moved(CameraJitter(**{name: value}))
+
+
+_ALL = pytest.mark.parametrize("change", CORRUPTIONS.values(), ids=CORRUPTIONS)
+
+
+def _picture(height: int = 120, width: int = 160) -> Picture:
+    """Return an image with edges and all levels."""
+    rng = np.random.default_rng(0)
+    rough = rng.integers(0, 256, (height // 8 + 1, width // 8 + 1, 3), np.uint8)
+    return np.kron(rough, np.ones((8, 8, 1), np.uint8))[:height, :width].copy()
+
+
+@_ALL
+@pytest.mark.parametrize("size", [(120, 160), (33, 47), (1, 1), (1, 300), (300, 1), (1080, 1920)])
+def test_lenses_keep_size_and_type(change: Corruption, size: tuple[int, int]) -> None:
+    """A lens is a function of image and seed, and does not change its input."""
+    before = _picture(*size)
+    kept = before.copy()
+    after = change(before, 3)
+    assert after.shape == before.shape
+    assert after.dtype == np.uint8
+    assert not np.may_share_memory(before, after)
+    np.testing.assert_array_equal(before, kept)
+    np.testing.assert_array_equal(after, change(before, 3))
+    if before.size > 3:  # A blur of one pixel is that pixel.
+        assert not np.array_equal(before, after)
+
+
+@pytest.mark.parametrize("change", [night, glare, dirt])
+def test_another_seed_gives_another_picture(change: Corruption) -> None:
+    assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
+
+
+def test_night_halves_the_brightness_and_adds_noise() -> None:
+    """Noise varies between images."""
+    white = np.full((120, 160, 3), 255, np.uint8)
+    dark = night(white, 0)
+    assert dark.mean(axis=(0, 1)) == pytest.approx([117.3, 127.5, 168.3], abs=0.5)
+    assert dark.std(axis=(0, 1)) == pytest.approx(9.0, abs=0.3)
+    other = white.copy()
+    other[0, 0] = 254
+    assert not np.array_equal(night(other, 0)[1:], dark[1:])
+
+
+def test_blur_keeps_the_sum() -> None:
+    point = np.zeros((121, 161, 3), np.uint8)
+    point[56:65, 76:85] = 255
+    soft = blur(point, 0).astype(float)[..., 0]
+    assert soft.sum() == pytest.approx(255 * 81, rel=0.02)
+    columns = np.arange(161)
+    variance = (soft.sum(axis=0) * (columns - 80) ** 2).sum() / soft.sum()
+    assert variance == pytest.approx((81 - 1) / 12 + (0.0125 * 161) ** 2, rel=0.05)
+
+
+def test_an_unknown_lens_is_refused() -> None:
+    """The error suggests the nearest name."""
+    assert find_corruption("night") is night
+    with pytest.raises(UnknownName, match="Did you mean 'glare'"):
+        find_corruption("glair")

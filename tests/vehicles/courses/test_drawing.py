@@ -77,15 +77,6 @@ def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
     assert picture[bottom, left].argmax() == picture[bottom, right_hand].argmax() == 2
 
 
-def test_quays_have_a_rear_side() -> None:
-    quay = Wall((1.0, 1.0), (1.0, -1.0), 0.3, "quay")
-    course = with_walls(square("harbour"))
-    nothing, seen = (
-        _draw(replace(course, walls=walls), _WHITE, (0.0, 0.0), 0.0) for walls in ((), (quay,))
-    )
-    assert (nothing != seen).any(axis=2).mean() > 0.02
-
-
 def test_light_and_warmth_change_the_image() -> None:
     course, usual = square("corridor"), Look(light=0.6, warmth=0.2)
 

@@ -15,7 +15,6 @@ from shapechanger.vehicles.courses.geometry import (
     obstacle_gap,
     resample,
     scale_grid,
-    tangent_radii,
     trace_outline,
     turn_angles,
 )
@@ -39,14 +38,6 @@ def test_a_counter_clockwise_circle_turns_left() -> None:
     assert normals(circle) == pytest.approx(-circle / 3.0)
     assert turn_angles(circle).sum() == pytest.approx(2 * np.pi)
     assert turn_angles(circle[::-1]).sum() == pytest.approx(-2 * np.pi)
-
-
-def test_tangent_radii_of_bends_and_necks() -> None:
-    """Tangent radii equal a circle's radius, and half the distance between two long sides."""
-    assert tangent_radii(_ellipse(3.0, 3.0, 64)) == pytest.approx(3.0)
-    x = np.linspace(-10.0, 10.0, 201)
-    sides = np.concatenate([np.stack([x, 0 * x - 1], 1), np.stack([x[::-1], 0 * x + 1], 1)])
-    assert tangent_radii(sides)[100] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

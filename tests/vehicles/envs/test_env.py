@@ -1,4 +1,4 @@
-"""The env that sees a camera's image and a robot's sensors."""
+"""The env that sees a camera and sensors, and its courses and demonstrators."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from scripts.lab_robots import lab_robots_json
+from shapechanger.contract.env_ref import TaskDemonstrator
 from shapechanger.contract.world import Pose
 from shapechanger.errors import (
     ProfileError,
@@ -26,8 +27,8 @@ from shapechanger.errors import (
     WorldError,
 )
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.vehicles.courses.course import HOME
-from shapechanger.vehicles.envs import VehicleEnv, drive
+from shapechanger.vehicles.courses.course import HELD_OUT, HOME, TRAINING
+from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv, drive
 
 _AHEAD = np.array([0.0, 0.6], np.float32)
 
@@ -237,3 +238,121 @@ def test_a_simulation_loads_no_module_of_the_robot(env: str, most: int) -> None:
     ours = [name for name in loaded if name.partition(".")[0] == "shapechanger"]
     assert len(ours) <= most
     assert not [name for name in ours if name.startswith("shapechanger.robot")]
+
+
+def _courses(courses: Any, n: int = 6, *, held_out: bool = False) -> list[int]:
+    with closing(RangesEnv("car", courses=courses)) as env:
+        if held_out:
+            env.hold_out()
+        return [env.reset(seed=1 if i == 0 else None)[1]["course"] for i in range(n)]
+
+
+@pytest.mark.parametrize(
+    ("courses", "held_out", "seeds"),
+    [
+        ("training", False, TRAINING),
+        ("held-out", False, HELD_OUT),
+        ("training", True, HELD_OUT),
+        ((3, 4), True, HELD_OUT),
+        ((7, np.int64(9)), False, {7, 9}),
+    ],
+)
+def test_courses_are_drawn_from_their_seeds(courses: Any, held_out: bool, seeds: Any) -> None:
+    drawn = _courses(courses, held_out=held_out)
+    assert all(course in seeds for course in drawn)
+    assert len(set(drawn)) > 1
+    assert not set(TRAINING) & set(HELD_OUT)
+
+
+def test_options_do_not_change_other_draws() -> None:
+    """A given course or start leaves the other random choices unchanged."""
+    with closing(RangesEnv("car", randomise=True)) as env:
+
+        def drawn(**options: int) -> tuple[int, Any, Any]:
+            info = env.reset(seed=5, options=options)[1]
+            return info["course"], env.world.look, info["pose"]
+
+        course, look, pose = drawn()
+        assert drawn(course=course) == (course, look, pose)
+        assert drawn(start=4)[:2] == (course, look)
+        assert drawn(start=4)[2] == drawn(start=4)[2] != pose
+        other = drawn(course=course + 1)
+        assert other[:2] == (course + 1, look)
+        env.reset()
+        assert env.world.look != look
+
+
+@pytest.mark.parametrize("courses", [(-1,), (1.5,), ("a",), (None,)])
+def test_invalid_seeds_of_courses_are_refused(courses: Any) -> None:
+    with pytest.raises(WorldError, match="The seed of a course must be a whole number from 0"):
+        RangesEnv("car", courses=courses)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"curse": 1}, "No option of reset matches 'curse'. Did you mean 'course'"),
+        ({"course": "a"}, "The seed of a course must be a whole number from 0, got 'a'"),
+        ({"course": -1}, "The seed of a course must be a whole number from 0, got -1"),
+        ({"start": -1}, "The seed of a start must be a whole number from 0, got -1"),
+        ({"start": 0.5}, "The seed of a start must be a whole number from 0, got 0.5"),
+        ({"start": True}, "The seed of a start must be a whole number from 0, got True"),
+    ],
+)
+def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:
+    """Unknown or invalid options raise errors."""
+    with (
+        closing(RangesEnv("car", courses=(0,))) as env,
+        pytest.raises((UnknownName, WorldError), match=sentence),
+    ):
+        env.reset(options=options)
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
+    """The demonstrator makes mistakes and drives without collisions."""
+    with closing(VehicleEnv(vehicle, image=False)) as env:
+        driver: TaskDemonstrator = env.demonstrator(3)
+        env.reset(seed=2)
+        driver.begin()
+        mistakes = 0
+        for _ in range(100):
+            meant, done = driver.act()
+            assert env.action_space.contains(meant)
+            assert env.action_space.contains(done)
+            mistakes += not np.array_equal(meant, done)
+            _, _, terminated, _, info = env.step(done)
+            assert not terminated
+        assert info["progress"] > 1.0
+        assert mistakes > 0
+
+
+def test_put_back_it_goes_on_as_from_a_start() -> None:
+    """The demonstrator forgets the manoeuvre that would have freed the vehicle."""
+    with closing(VehicleEnv("car", image=False)) as env:
+        driver = env.demonstrator(1)
+        env.reset(options={"course": 3, "start": 1})
+        driver.begin()
+        # Without steps it drives in vain, until it backs away.
+        throttles = [driver.act()[0][1] for _ in range(20)]
+        assert throttles[0] > 0.5
+        assert throttles[-1] < 0.0
+        env.world.put_back()
+        assert driver.act()[0][1] > 0.5
+
+
+def test_another_control_rate_is_refused(tmp_path: Path) -> None:
+    """The experts count in steps of 1/20 s."""
+    text = find_profile("lab-car").read_text()
+    slow = tmp_path / "slow.toml"
+    slow.write_text(text.replace("control_hz = 20", "control_hz = 10"))
+    assert slow.read_text() != text
+    with closing(VehicleEnv("car", robot=slow, image=False)) as env:
+        with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
+            env.demonstrator(1)
+        with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
+            env.expert()
+        with pytest.raises(ProfileError, match=r"set control_hz = 20"):
+            env.taught_by(lambda seen: seen[:, :2], 1)
+    with closing(WaypointEnv("car", robot=slow)) as env, pytest.raises(ProfileError, match="20"):
+        env.demonstrator(1)

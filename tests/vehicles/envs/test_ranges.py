@@ -110,13 +110,6 @@ def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
     assert abs(waits[0] - waits[1]) <= 2
 
 
-def test_standing_still_costs() -> None:
-    with closing(RangesEnv("tank")) as env:
-        env.reset(options=_COURSE)
-        total = sum(env.step(np.zeros(2, np.float32))[1] for _ in range(20))
-        assert total == pytest.approx(-1.0, abs=0.01)
-
-
 def test_outputs_follow_the_guards_limits() -> None:
     """Outputs have the guard's caps, slew and bump block."""
     plan = GuardPlan(

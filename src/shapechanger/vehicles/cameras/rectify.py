@@ -105,9 +105,6 @@ class Rectifier:
         """Return an image, (height, width, 3), as the virtual camera would have taken it.
 
         It has the shape (48, 80, 3). What the camera does not see repeats the nearest pixel.
-
-        Raises:
-            WorldError: If the image has another size.
         """
         if picture.shape != self._shape:
             raise WorldError(
@@ -126,11 +123,14 @@ class CanonicalView:
 
     Args:
         camera: The camera; None for the one that each episode states.
+
+    Attributes:
+        rectifiers: Those used so far, by camera and size of its images.
     """
 
     def __init__(self, camera: CameraGeometry | None = None) -> None:
         self._camera = camera
-        self._rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = {}
+        self.rectifiers: dict[tuple[CameraGeometry, tuple[int, int]], Rectifier] = {}
         self._bodies: set[str] = set()
 
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
@@ -157,13 +157,13 @@ class CanonicalView:
                 )
             camera = CameraGeometry(pitch, fovy)
         key = camera, (picture.shape[1], picture.shape[0])
-        if key not in self._rectifiers:
-            self._rectifiers[key] = Rectifier(*key)
-        return self._rectifiers[key](picture)
+        if key not in self.rectifiers:
+            self.rectifiers[key] = Rectifier(*key)
+        return self.rectifiers[key](picture)
 
     def note(self) -> str:
         """Return a sentence on the cameras."""
-        cameras = sorted({(one.pitch_deg, one.fovy_deg) for one, _ in self._rectifiers})
+        cameras = sorted({(one.pitch_deg, one.fovy_deg) for one, _ in self.rectifiers})
         each = " and ".join(
             f"looks {pitch:.3g} degrees down with a vertical field of view of {fovy:.3g}"
             for pitch, fovy in cameras
@@ -297,9 +297,6 @@ def draw_view(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[n
     Args:
         picture: Shape (height, width, 3).
         geometry: The camera that took it.
-
-    Raises:
-        WorldError: If the camera does not see what the virtual camera sees.
     """
     height, width = picture.shape[:2]
     Rectifier(geometry, (width, height))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,28 +42,24 @@ class Demonstrator:
     Physical Review 36, 1930) and rare jerks of the steering.
 
     Args:
+        world: World of the vehicle.
         begin: Called at the beginning of an episode; returns the driver, whose calls return
             actions, (2,).
         seed: Seed of the mistakes.
         sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
-            as much.
+            as much. None for what the vehicle can correct.
     """
 
     def __init__(
-        self, begin: Callable[[], Callable[[], NDArray[np.float32]]], seed: int, sway: float
-    ) -> None:
+        self, world: MujocoWorld, begin: Callable[[], Callable[[], NDArray[np.float32]]], seed: int,
+        sway: float | None = None,
+    ) -> None:  # fmt: skip
         self._begin = begin
+        sway = traits_of(world.vehicle.name).sway if sway is None else sway
         self._size = np.array((sway, _THROTTLE_SD))
         kind = "The seed of a driver must be"
         self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
         self.begin()
-
-    @classmethod
-    def of(
-        cls, world: MujocoWorld, begin: Callable[[], Callable[[], NDArray[np.float32]]], seed: int
-    ) -> Self:
-        """Return one whose mistakes suit the vehicle of a world; arguments as for the class."""
-        return cls(begin, seed, traits_of(world.vehicle.name).sway)
 
     def begin(self) -> None:
         """Begin an episode."""
@@ -143,4 +139,4 @@ def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
 
         return point
 
-    return Demonstrator(begin, seed, _BEARING_SWAY)
+    return Demonstrator(world, begin, seed, _BEARING_SWAY)

@@ -283,11 +283,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         raise NotImplementedError
 
     def expert(self) -> ExpertDriver:
-        """Return the expert that knows the whole course, without mistakes.
-
-        Raises:
-            ProfileError: If the robot has another control rate than the expert.
-        """
+        """Return the expert that knows the whole course, without mistakes, for its control rate."""
         # Experts, and SciPy for their paths, are only loaded where they drive.
         from shapechanger.vehicles.envs.demonstrators import ExpertDriver, require_rate
 
@@ -306,14 +302,10 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         from shapechanger.vehicles.envs.demonstrators import Demonstrator  # SciPy.
 
         self.expert()  # Checks the control rate.
-        return Demonstrator.of(self.world, lambda: partial(self.expert(), None), seed)
+        return Demonstrator(self.world, lambda: partial(self.expert(), None), seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the camera's frame, shape (height, width, 3); None without a render mode.
-
-        Raises:
-            RenderError: If `reset` was never called.
-        """
+        """Return the camera's frame, shape (height, width, 3); None without a render mode."""
         if not self.render_mode:
             return None
         if self._needs_reset:

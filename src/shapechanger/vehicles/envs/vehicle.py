@@ -192,7 +192,7 @@ class VehicleEnv(DriveEnv):
             action = act(observe_ranges(self.world)[np.newaxis])[0].astype(np.float32)
             return leave_rest(action, self.world.inputs().stands)
 
-        return Demonstrator.of(self.world, lambda: teach, seed)
+        return Demonstrator(self.world, lambda: teach, seed)
 
     def _observe(self) -> tuple[Any, dict[str, Any]]:
         vehicle, world = self._vehicle, self.world

@@ -213,8 +213,7 @@ class _Recovery:
             self._moves.append((1.5 * longer, side, 0.5))
         seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
         # Going back, wheels and rudders turn the other way; tracks do not.
-        turn = side * min(1.0, 0.4 + abs(angle))
-        turn *= -0.5 if self._traits.drive == "tracks" else 1.0
+        turn = side * min(1.0, 0.4 + abs(angle)) * (-0.5 if self._traits.drive == "tracks" else 1.0)
         self._moves.append((min(seconds, _BACK_AT_MOST_S), turn, _BACK_THROTTLE))
         self._begin_move()
 
@@ -235,10 +234,6 @@ class CourseExpert:
     Attributes:
         path: The path that it follows.
         speeds: Speed at each point of the path, m/s, (N,).
-
-    Raises:
-        UnknownName: If the vehicle is unknown.
-        WorldError: If there is no path around the course.
     """
 
     def __init__(
@@ -259,15 +254,12 @@ class CourseExpert:
         self._recovery = _Recovery(self._traits, self._rng)
 
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
-        """Choose an action; call it once per period.
+        """Choose steering and throttle, -1 to 1, (2,); -1 steers left. Call it once per period.
 
         Args:
             pose: Pose of the vehicle.
             speed: Speed along its heading, m/s.
             yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
-
-        Returns:
-            Steering and throttle, from -1 to 1, (2,); -1 steers left.
         """
         if self._station is None:
             self.reset(pose)

@@ -260,16 +260,13 @@ class CoursePath(ClosedLine):
 def plan_path(
     course: Course, half_width_m: float, margin_m: float, *, comfort_m: float
 ) -> CoursePath:
-    """Plan a smooth path around a course.
+    """Plan a smooth path around a course, or raise a `WorldError` if there is none.
 
     Args:
         course: The course.
         half_width_m: Half width of the vehicle, m.
         margin_m: Smallest clearance to each side of it at every point of the path, m.
         comfort_m: Preferred clearance to each side of it, m.
-
-    Raises:
-        WorldError: If there is no such path.
     """
     lattice = _Lattice(course, half_width_m + margin_m, half_width_m + comfort_m)
     # Between two lattice points the line may come closer to obstacles, so ask for a spare first.

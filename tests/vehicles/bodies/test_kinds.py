@@ -1,0 +1,180 @@
+"""Each kind of vehicle: its parts and motors, its steering, and how it moves."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import pytest
+
+from shapechanger.errors import ProfileError, UnknownName
+from shapechanger.vehicles.bodies import add_vehicle, require_fit, vehicle_model
+from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR
+from tests.vehicles.bodies.grounds import AHEAD, TO_THE_LEFT, Ground, ground
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(UnknownName, match=r"Did you mean 'truck'\?"):
+        vehicle_model("truk")
+    with pytest.raises(UnknownName):
+        add_vehicle(mujoco.MjSpec(), "plane")
+
+
+@pytest.mark.parametrize(
+    ("name", "parts", "message"),
+    [
+        ("car", {"wheels"}, "The robot drives 'wheels'; a car is driven by 'steering' and"),
+        (
+            "car",
+            {"wheels", "steering", "bed"},
+            "The robot drives 'bed' and 'steering' and",
+        ),
+        ("truck", {"gear"}, "The robot drives nothing;"),
+        ("boat", {"propeller", "left propeller", "right propeller"}, ", or by 'left propeller'"),
+    ],
+)
+def test_robots_that_do_not_fit(name: str, parts: set[str], message: str) -> None:
+    with pytest.raises(ProfileError) as caught:
+        require_fit(name, parts)
+    assert message in str(caught.value)
+
+
+def test_the_motor_matches_its_data_sheet() -> None:
+    """At 6 V: 6 A and 1.2 kgf·cm when stalled, 0.5 A at 2200 turns a minute without load."""
+    free = 2200.0 * 2.0 * 3.141592653589793 / 60.0
+    assert HOBBY_MOTOR.amperes(6.0, 0.0) == pytest.approx(6.0)
+    assert HOBBY_MOTOR.amperes(6.0, free) == pytest.approx(0.5)
+    assert HOBBY_MOTOR.torque_per_current * 6.0 == pytest.approx(1.2 * 0.0980665)
+
+
+def test_a_gear_trades_speed_for_torque() -> None:
+    geared = HOBBY_MOTOR.geared(3.0)
+    assert geared.amperes(6.0, 10.0) == pytest.approx(HOBBY_MOTOR.amperes(6.0, 30.0))
+    assert geared.torque_per_current == pytest.approx(3.0 * HOBBY_MOTOR.torque_per_current)
+    assert geared.rotor_inertia == pytest.approx(9.0 * HOBBY_MOTOR.rotor_inertia)
+    assert HOBBY_MOTOR.geared(3.0, 0.5).friction == pytest.approx(1.5 * HOBBY_MOTOR.friction)
+
+
+@pytest.mark.parametrize("name", ["car", "truck"])
+@pytest.mark.parametrize("throttle", [0.25, 0.6])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_the_turning_radius_follows_from_geometry(name: str, throttle: float, side: float) -> None:
+    here = ground(name)
+    here.drive(8.0, {"wheels": throttle, "steering": side})
+    radius = here.pace() / abs(here.vehicle.motion().yaw_rate)
+    assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.15)
+
+
+def test_wheel_angles_satisfy_ackermann() -> None:
+    here = ground("car")
+    here.drive(1.0, {"steering": -1.0})
+    left, right = (
+        float(here.data.joint(f"vehicle/{s} steering").qpos[0]) for s in ("left", "right")
+    )
+    assert left > right > 0.3
+    # Ackermann: the cotangents differ by gauge over wheelbase.
+    assert 1 / math.tan(right) - 1 / math.tan(left) == pytest.approx(0.140 / 0.26, rel=0.02)
+
+
+def test_the_servo_has_a_limited_speed_and_keeps_its_angle_without_pulses() -> None:
+    here = ground("car")
+    here.drive(1.0, {"steering": -1.0})
+    joint = here.data.joint("vehicle/left steering")
+    before = float(joint.qpos[0])
+    here.drive(1.0, {"steering": None})
+    assert float(joint.qpos[0]) == pytest.approx(before)
+    here.drive(0.05, {"steering": 1.0})
+    moved = before - float(joint.qpos[0])
+    assert 0.02 < moved < 0.05 * math.radians(60.0) / 0.19
+    here.drive(0.5, {"steering": 1.0})
+    assert float(joint.qpos[0]) < -0.3
+
+
+def test_the_tank_turns_on_the_spot() -> None:
+    here = ground("tank")
+    here.drive(3.0, {"left track": -0.5, "right track": 0.5})
+    pose = here.vehicle.motion()
+    assert math.hypot(pose.x, pose.y) < 0.05
+    assert here.vehicle.motion().yaw_rate > 0.8
+    assert abs(here.vehicle.travelled_m()) < 0.05
+
+
+def _hitch(here: Ground) -> float:
+    return float(here.data.joint("vehicle/trailer yaw").qpos[0])
+
+
+def test_the_trailer_follows() -> None:
+    here = ground("truck")
+    here.drive(6.0, {"wheels": 0.4, "steering": -0.7})
+    bent = _hitch(here)
+    assert -math.radians(60.0) < bent < -math.radians(10.0)  # Right of the tractor's heading.
+    here.drive(5.0, {"wheels": 0.4, "steering": 0.0})
+    assert abs(_hitch(here)) < math.radians(2.0)
+
+
+def test_jackknife_going_backward() -> None:
+    here = ground("truck")
+    here.drive(1.0, {"wheels": 0.4, "steering": -0.3})
+    here.drive(8.0, {"wheels": -0.5, "steering": -0.3})
+    assert abs(_hitch(here)) > math.radians(45.0)
+
+
+def test_a_boat_has_no_brakes() -> None:
+    here = ground("boat")
+    here.drive(6.0, AHEAD["boat"])
+    fast = here.vehicle.motion().speed
+    here.drive(1.0, {"propeller": 0.0, "rudder": 0.0})
+    assert 0.3 * fast < here.vehicle.motion().speed < 0.95 * fast
+    assert here.vehicle.current_a() == 0.0
+
+
+def test_a_boat_slows_down_and_drifts_outwards_in_a_turn() -> None:
+    here = ground("boat")
+    here.drive(8.0, {**TO_THE_LEFT["boat"], "rudder": 0.0})
+    straight = here.vehicle.motion().speed
+    here.drive(8.0, TO_THE_LEFT["boat"])
+    assert here.vehicle.motion().speed < 0.85 * straight
+    assert here.vehicle.motion().lateral_speed < -0.1 * here.vehicle.motion().speed
+    drift = math.atan2(-here.vehicle.motion().lateral_speed, here.vehicle.motion().speed)
+    assert math.radians(8.0) < drift < math.radians(35.0)
+    radius = here.pace() / here.vehicle.motion().yaw_rate
+    assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.25)
+
+
+def test_motion_is_relative_to_the_current() -> None:
+    still, flowing = ground("boat"), ground("boat")
+    flowing.vehicle.set_current(0.2, -0.1)
+    flowing.data.qvel[0:2] = (0.2, -0.1)
+    for here in (still, flowing):
+        here.drive(5.0, TO_THE_LEFT["boat"])
+    a, b = still.vehicle.motion(), flowing.vehicle.motion()
+    assert (b.x - 1.0, b.y + 0.5, b.heading) == pytest.approx((a.x, a.y, a.heading), abs=1e-6)
+    assert flowing.vehicle.travelled_m() == pytest.approx(still.vehicle.travelled_m(), abs=1e-6)
+
+
+def test_the_rudder_needs_flow() -> None:
+    here = ground("boat")
+    here.drive(2.0, {"propeller": 0.0, "rudder": -1.0})
+    assert abs(here.vehicle.motion().yaw_rate) < 1e-3
+    here.drive(0.7, {"propeller": 0.7, "rudder": -1.0})
+    assert here.vehicle.motion().yaw_rate > 0.05
+    here.vehicle.place(0.0, 0.0, 0.0)
+    here.drive(5.0, AHEAD["boat"])
+    here.drive(1.0, {"propeller": 0.0, "rudder": -1.0})
+    assert here.vehicle.motion().yaw_rate > 0.1
+
+
+def test_two_propellers_steer() -> None:
+    here = ground("boat")
+    both = {"left propeller": 1.0, "right propeller": 1.0}
+    here.vehicle.drive(both, 7.2)
+    assert here.vehicle.current_a() == pytest.approx(14.4)
+    here.drive(8.0, both)
+    assert abs(here.vehicle.motion().y) < 0.05
+    assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
+    here.drive(4.0, {"left propeller": 0.2, "right propeller": 0.8})
+    assert here.vehicle.motion().yaw_rate > 0.2
+    here.vehicle.place(0.0, 0.0, 0.0)
+    here.drive(8.0, {"left propeller": 0.8, "right propeller": -1.0})
+    assert here.vehicle.motion().yaw_rate < -0.3
+    assert here.pace() < 0.5
