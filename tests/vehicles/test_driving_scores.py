@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from contextlib import closing
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from benchmarks.driving import DriveResult, DriveScore, drive, poisson_interval
-from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv
 
 _STRAIGHT = np.array([0.0, 0.5], np.float32)
-_STILL = np.zeros(2, np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -61,24 +57,3 @@ def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
     assert done.speed == pytest.approx(done.metres / done.seconds)
     assert done.standing < 0.1
     assert done.course == HELD_OUT[0]
-
-
-def test_a_drive_continues_after_a_collision(car: VehicleEnv) -> None:
-    """The collision counts once."""
-    pilot = car.expert()
-
-    def blind_at_first(observation: Any) -> NDArray[np.float32]:
-        return pilot(observation) if car.world.collisions else _STRAIGHT
-
-    done = drive(car, blind_at_first, course=HELD_OUT[0], metres=20.0)
-    assert done.collisions == 1
-    assert done.reached
-
-
-def test_an_env_that_ends_at_a_collision_is_refused() -> None:
-    """The error names the missing argument."""
-    with (
-        closing(VehicleEnv("car", image=False)) as env,
-        pytest.raises(WorldError, match="put_back=True"),
-    ):
-        drive(env, lambda _: _STRAIGHT, course=HELD_OUT[0])

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.contract.world import RESTING_V, Pose
+from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles import world as world_module
 from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
@@ -132,18 +132,6 @@ def test_place_restarts_at_a_seeded_pose_and_repeats_its_drive() -> None:
     world.place(5)
     assert world.progress_m == 0.0
     assert world.inputs().speed == 0.0
-
-
-def test_the_battery_sags_under_load() -> None:
-    world = _world()
-    idle = world.inputs()
-    assert RESTING_V - 0.2 < idle.battery_v < RESTING_V
-    world.advance(0.05, {"wheels": 1.0, "steering": 0.0})
-    loaded = world.inputs()
-    assert loaded.current_a > idle.current_a + 1.0
-    assert loaded.battery_v < idle.battery_v
-    world.resting_v = 6.0
-    assert world.inputs().battery_v < 6.0
 
 
 def test_running_into_a_wall_is_one_collision_and_put_back_frees_the_vehicle() -> None:

@@ -10,7 +10,7 @@ import pytest
 from shapechanger.errors import ProfileError, UnknownName
 from shapechanger.vehicles.bodies import add_vehicle, require_fit, vehicle_model
 from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR
-from tests.vehicles.bodies.grounds import AHEAD, TO_THE_LEFT, Ground, ground
+from tests.vehicles.bodies.grounds import TO_THE_LEFT, Ground, ground
 
 
 def test_an_unknown_name_is_refused() -> None:
@@ -112,22 +112,6 @@ def test_the_trailer_follows() -> None:
     assert abs(_hitch(here)) < math.radians(2.0)
 
 
-def test_jackknife_going_backward() -> None:
-    here = ground("truck")
-    here.drive(1.0, {"wheels": 0.4, "steering": -0.3})
-    here.drive(8.0, {"wheels": -0.5, "steering": -0.3})
-    assert abs(_hitch(here)) > math.radians(45.0)
-
-
-def test_a_boat_has_no_brakes() -> None:
-    here = ground("boat")
-    here.drive(6.0, AHEAD["boat"])
-    fast = here.vehicle.motion().speed
-    here.drive(1.0, {"propeller": 0.0, "rudder": 0.0})
-    assert 0.3 * fast < here.vehicle.motion().speed < 0.95 * fast
-    assert here.vehicle.current_a() == 0.0
-
-
 def test_a_boat_slows_down_and_drifts_outwards_in_a_turn() -> None:
     here = ground("boat")
     here.drive(8.0, {**TO_THE_LEFT["boat"], "rudder": 0.0})
@@ -150,18 +134,6 @@ def test_motion_is_relative_to_the_current() -> None:
     a, b = still.vehicle.motion(), flowing.vehicle.motion()
     assert (b.x - 1.0, b.y + 0.5, b.heading) == pytest.approx((a.x, a.y, a.heading), abs=1e-6)
     assert flowing.vehicle.travelled_m() == pytest.approx(still.vehicle.travelled_m(), abs=1e-6)
-
-
-def test_the_rudder_needs_flow() -> None:
-    here = ground("boat")
-    here.drive(2.0, {"propeller": 0.0, "rudder": -1.0})
-    assert abs(here.vehicle.motion().yaw_rate) < 1e-3
-    here.drive(0.7, {"propeller": 0.7, "rudder": -1.0})
-    assert here.vehicle.motion().yaw_rate > 0.05
-    here.vehicle.place(0.0, 0.0, 0.0)
-    here.drive(5.0, AHEAD["boat"])
-    here.drive(1.0, {"propeller": 0.0, "rudder": -1.0})
-    assert here.vehicle.motion().yaw_rate > 0.1
 
 
 def test_two_propellers_steer() -> None:

@@ -11,12 +11,10 @@ from shapechanger.vehicles.courses.geometry import (
     distances_from_obstacle,
     grow_cells,
     length,
-    normals,
     obstacle_gap,
     resample,
     scale_grid,
     trace_outline,
-    turn_angles,
 )
 
 
@@ -31,13 +29,6 @@ def test_resampled_points_are_evenly_spaced() -> None:
     assert chords == pytest.approx(chords[0], rel=1e-3)
     assert chords[0] == pytest.approx(0.1, rel=0.01)
     assert length(line) == pytest.approx(length(_ellipse(6.0, 2.0, 2000)), rel=1e-3)
-
-
-def test_a_counter_clockwise_circle_turns_left() -> None:
-    circle = _ellipse(3.0, 3.0, 100)
-    assert normals(circle) == pytest.approx(-circle / 3.0)
-    assert turn_angles(circle).sum() == pytest.approx(2 * np.pi)
-    assert turn_angles(circle[::-1]).sum() == pytest.approx(-2 * np.pi)
 
 
 @pytest.mark.parametrize(

@@ -171,6 +171,8 @@ def test_a_blocked_start_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         ("car", {"reward": {"speeed": 1.0}}, UnknownName, "No weight of the reward matches"),
         ("car", {"courses": "hold-out"}, UnknownName, "No kind of courses matches 'hold-out'"),
         ("car", {"courses": ()}, WorldError, "There are no courses to draw from"),
+        ("car", {"courses": (3, 1.5)}, WorldError, "The seed of a course must be .*, got 1.5"),
+        ("car", {"courses": None}, WorldError, "The seed of a course must be .*, got None"),
         ("car", {"render_mode": "human"}, UnknownName, "No render mode matches 'human'"),
         ("car", {"size": (0, 0)}, SpaceMismatch, r"each 1 to 1920 pixels, got \(0, 0\)"),
         ("car", {"size": (16.5, 12)}, SpaceMismatch, "each 1 to 1920 pixels"),
@@ -282,12 +284,6 @@ def test_options_do_not_change_other_draws() -> None:
         assert env.world.look != look
 
 
-@pytest.mark.parametrize("courses", [(-1,), (1.5,), ("a",), (None,)])
-def test_invalid_seeds_of_courses_are_refused(courses: Any) -> None:
-    with pytest.raises(WorldError, match="The seed of a course must be a whole number from 0"):
-        RangesEnv("car", courses=courses)
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
@@ -295,7 +291,6 @@ def test_invalid_seeds_of_courses_are_refused(courses: Any) -> None:
         ({"course": "a"}, "The seed of a course must be a whole number from 0, got 'a'"),
         ({"course": -1}, "The seed of a course must be a whole number from 0, got -1"),
         ({"start": -1}, "The seed of a start must be a whole number from 0, got -1"),
-        ({"start": 0.5}, "The seed of a start must be a whole number from 0, got 0.5"),
         ({"start": True}, "The seed of a start must be a whole number from 0, got True"),
     ],
 )
@@ -325,20 +320,6 @@ def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
             assert not terminated
         assert info["progress"] > 1.0
         assert mistakes > 0
-
-
-def test_put_back_it_goes_on_as_from_a_start() -> None:
-    """The demonstrator forgets the manoeuvre that would have freed the vehicle."""
-    with closing(VehicleEnv("car", image=False)) as env:
-        driver = env.demonstrator(1)
-        env.reset(options={"course": 3, "start": 1})
-        driver.begin()
-        # Without steps it drives in vain, until it backs away.
-        throttles = [driver.act()[0][1] for _ in range(20)]
-        assert throttles[0] > 0.5
-        assert throttles[-1] < 0.0
-        env.world.put_back()
-        assert driver.act()[0][1] > 0.5
 
 
 def test_another_control_rate_is_refused(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The waypoint env, and measuring a steering response."""
+"""The waypoint env, steering responses, and certificates of shifts between vehicles."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import re
 from contextlib import closing
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
-from shapechanger.errors import ProfileError, StudyError
+from shapechanger.errors import EmptyShift, MorphologyError, ProfileError, StudyError
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.vehicles.envs import RangesEnv, WaypointEnv
+from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
 from shapechanger.vehicles.waypoints import (
     AHEAD_M,
     WIDEST_RAD,
@@ -64,20 +65,6 @@ def test_commands_lead_back_to_their_waypoints(body: str, speed: float) -> None:
     # At the limit, too, the waypoint has the same command, if not the same bearing.
     again = [command(one, response, speed, on_the_spot=False) for one in found.actions]
     np.testing.assert_allclose(again, commands, atol=1e-5)
-
-
-def test_full_steering_only_bounds_the_waypoint() -> None:
-    """At full lock, and turning on the spot, the way may be farther aside."""
-    car, tank = _BODIES["wheels"], _BODIES["tracks"]
-    locked = waypoints_of(np.array([[1.0, 0.5], [-1.0, 0.5]]), car, np.ones(2))
-    assert locked.at_limit.all()
-    assert locked.usable.all()
-    aside = math.asin(0.5 * AHEAD_M * 2.0) / WIDEST_RAD
-    np.testing.assert_allclose(locked.actions[:, 0], [aside, -aside], rtol=1e-6)
-    turning = waypoints_of(np.array([[-0.8, 0.0]]), tank, np.zeros(1))
-    assert turning.usable.all()
-    assert turning.at_limit.all()
-    np.testing.assert_allclose(turning.actions, [[-1.0, -1.0]])
 
 
 def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
@@ -185,3 +172,89 @@ def test_following_true_waypoints_has_no_collisions(vehicle: str, sensed: bool) 
         assert info["collisions"] == 0
         assert info["progress"] > 2.0
         assert env.world.course.world == ("flooded-corridor" if vehicle == "boat" else "corridor")
+
+
+@pytest.fixture
+def blind() -> dict[str, bool]:
+    """Arguments of vehicles without images."""
+    return {"image": False, "put_back": True}
+
+
+def test_another_vehicle_is_a_shift(blind: dict[str, bool]) -> None:
+    """The certificate lists properties and rollouts."""
+    with closing(VehicleEnv("car", **blind)) as car, closing(VehicleEnv("tank", **blind)) as tank:
+        text = str(VehicleEnv.certify_shift(car, tank))
+    assert "length: 0.4 m -> 0.32 m" in text
+    assert "driven by: steering and wheels -> left track and right track" in text
+    assert "turns on the spot" in text
+    assert "camera's angle below the horizon: 0 degrees -> 3 degrees" in text
+    assert "straight ahead at a throttle of 0.5 for 20 steps:" in text
+    assert "then a steering of -0.5" in text
+    assert "waypoints" not in text
+    assert "place" not in text  # Both have the corridor as their default world.
+
+
+@pytest.mark.gl
+def test_the_map_of_waypoints_to_each_body_is_shown() -> None:
+    """The map shows how each body turns at full steering; actions are a bearing and a speed."""
+    with closing(WaypointEnv("car")) as car, closing(WaypointEnv("tank")) as tank:
+        text = str(WaypointEnv.certify_shift(car, tank))
+        maps = [
+            f"{body.response.per_metre:.2f} rad/m and {body.response.per_second:.2f} rad/s"
+            for body in (car, tank)
+        ]
+    assert f"the map of waypoints to this body: {maps[0]} -> {maps[1]}" in text
+    assert maps[0] != maps[1]
+    assert "straight ahead at a speed of 0.5" in text
+    assert "then a bearing of -0.5" in text
+
+
+def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:
+    """An empty shift is refused unless allowed."""
+    with closing(VehicleEnv("car", **blind)) as one, closing(VehicleEnv("car", **blind)) as two:
+        with pytest.raises(EmptyShift, match="nothing to transfer"):
+            VehicleEnv.certify_shift(one, two)
+        shift = VehicleEnv.certify_shift(one, two, allow_empty=True)
+    assert shift.is_empty
+    assert shift.changes == ()
+
+
+@pytest.mark.gl
+def test_a_lens_is_a_shift_of_observations() -> None:
+    """A lens changes no response of the vehicle."""
+    size = (40, 30)
+    with (
+        closing(VehicleEnv("car", size=size, put_back=True)) as clear,
+        closing(VehicleEnv("car", size=size, put_back=True, lenses=("night",))) as dark,
+    ):
+        shift = VehicleEnv.certify_shift(clear, dark)
+    assert shift.changes == ("lenses: none -> night",)
+    straight = shift.answers[0].partition(": ")[2].split(" -> ")
+    assert straight[0] == straight[1]
+
+
+def test_wrappers_are_included(blind: dict[str, bool]) -> None:
+    """Wrappers that change actions are a shift."""
+    with (
+        closing(VehicleEnv("car", **blind)) as car,
+        closing(gym.wrappers.TransformAction(VehicleEnv("car", **blind), _halved, None)) as lame,
+    ):
+        shift = VehicleEnv.certify_shift(car, lame)
+    assert shift.changes == ()
+    assert not shift.is_empty
+
+
+def _halved(action: np.ndarray) -> np.ndarray:
+    return 0.5 * action
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_other_envs_are_refused(order: int, blind: dict[str, bool]) -> None:
+    """Comparing with another kind of env is refused."""
+    with (
+        closing(VehicleEnv("car", **blind)) as car,
+        closing(gym.make("shapechanger/InvertedPendulum-v1")) as pole,
+    ):
+        source, target = (car, pole)[::order]
+        with pytest.raises(MorphologyError, match=r"is not a vehicle|has no model"):
+            source.unwrapped.certify_shift(source, target)  # pyright: ignore[reportAttributeAccessIssue]
