@@ -82,9 +82,14 @@ def course_place(world: str, vehicle: str, lenses: Sequence[str] = ()) -> Place:
 
 
 def open_course(
-    parts: Collection[str], camera: CameraPlan | None, seed: int, *, world: str, vehicle: str,
+    parts: Collection[str],
+    camera: CameraPlan | None,
+    seed: int,
+    *,
+    world: str,
+    vehicle: str,
     lenses: Sequence[str],
-) -> World:  # fmt: skip
+) -> World:
     """Open a course with a vehicle on it."""
     require_fit(vehicle, parts)
     seen: dict[str, Any] = {"size": None}

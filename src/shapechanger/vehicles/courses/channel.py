@@ -9,7 +9,6 @@ from typing import Final
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Surface, Wall
 from shapechanger.vehicles.courses.furniture import (
@@ -20,6 +19,7 @@ from shapechanger.vehicles.courses.furniture import (
     weighted_choice,
 )
 from shapechanger.vehicles.courses.geometry import (
+    Array,
     any_crossing,
     arc_lengths,
     even_distances,
@@ -44,16 +44,7 @@ _WIND_RAD: Final = 0.4  # Smallest sum of the turns to either side.
 
 @dataclass(frozen=True, slots=True)
 class BankKind:
-    """A kind of bank.
-
-    Attributes:
-        surface: Material of its walls.
-        share: Weight with which it is drawn.
-        run: Range of its length, m.
-        piece: Length of each straight wall, m.
-        height: Range of heights above the ground or the water, m.
-        rough: Largest distance by which its corners stand back, m.
-    """
+    """A kind of bank; `open_worlds.toml` describes its numbers."""
 
     surface: Surface
     share: float
@@ -65,23 +56,7 @@ class BankKind:
 
 @dataclass(frozen=True, slots=True)
 class OpenWorld:
-    """A kind of course in the open.
-
-    Attributes:
-        pitch: Range of the pitch of the grid that the lane follows, m.
-        cells: Range of the number of grid cells that it encloses.
-        blur: Range of the standard deviation by which its corners are smoothed, m.
-        length: Range of the length of the route, m.
-        radius: Smallest radius of a curve, m.
-        dug: Range of the half width before the lane has banks, m.
-        wall: Space for the wall between two parts of the lane, per part, m.
-        half_width: Range of the final half width, m.
-        banks: Kinds of bank.
-        obstacles: Kinds of obstacle.
-        per_m: Range of the mean number of obstacles per metre.
-        gap_m: Smallest gap next to an obstacle, m.
-        current_mps: Fastest current, m/s; 0 on land.
-    """
+    """A kind of course in the open; `open_worlds.toml` describes its numbers."""
 
     pitch: tuple[float, float]
     cells: tuple[int, int]
@@ -98,9 +73,7 @@ class OpenWorld:
     current_mps: float = 0.0
 
 
-def _dig_channel(
-    rng: np.random.Generator, world: OpenWorld
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def _dig_channel(rng: np.random.Generator, world: OpenWorld) -> tuple[Array, Array] | None:
     """Try to lay out a route: points, m, (n, 2), and distance from the banks, m, (n,).
 
     The corners of a loop on a grid are smoothed more and more until the lane fits everywhere. None
@@ -148,9 +121,7 @@ def _dig_channel(
     return route, interpolate(half[:, None], knots, s)[:, 0]
 
 
-def _bank(
-    rng: np.random.Generator, line: NDArray[np.float64], kinds: tuple[BankKind, ...]
-) -> tuple[Wall, ...]:
+def _bank(rng: np.random.Generator, line: Array, kinds: tuple[BankKind, ...]) -> tuple[Wall, ...]:
     """Walls of randomly drawn kinds along a closed line, with the lane on its left."""
     knots = arc_lengths(line)
     shares = [kind.share for kind in kinds]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from shapechanger.vehicles.courses.course import Course, Lamp, Surface, Wall
 from shapechanger.vehicles.courses.furniture import LaneObstacles, Size, weighted_choice
 from shapechanger.vehicles.courses.geometry import (
+    Array,
     arc_lengths,
     grow_cells,
     resample,
@@ -33,11 +34,9 @@ _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
 )
 _PANEL_SHARES = [share for _, share, _ in _PANELS]
 
-_Point = NDArray[np.float64]
-
 
 def panel_walls(
-    rng: np.random.Generator, corners: NDArray[np.float64], bends: NDArray[np.int64], height: float
+    rng: np.random.Generator, corners: Array, bends: NDArray[np.int64], height: float
 ) -> tuple[Wall, ...]:
     """Walls along a closed line of corners, m, (n, 2), with the lane on their left.
 
@@ -66,7 +65,7 @@ def panel_walls(
     return tuple(walls)
 
 
-def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) -> Iterator[Wall]:
+def _leg(rng: np.random.Generator, start: Array, end: Array, height: float) -> Iterator[Wall]:
     """Plaster between two points, with panels in it."""
     length = float(np.hypot(*(end - start)))
     ahead = (end - start) / length
@@ -142,7 +141,7 @@ def corridor(rng: np.random.Generator, seed: int) -> Course | None:
     )
 
 
-def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
+def _corners(rng: np.random.Generator) -> Array | None:
     """Corners of the route in driving direction, the longest leg first, m, (n, 2)."""
     loop = trace_outline(grow_cells(rng, int(rng.integers(3, 8))))
     if loop is None:
@@ -156,21 +155,19 @@ def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
     return np.roll(points, -int(np.argmax(_legs(points)[1])), axis=0)
 
 
-def _turns(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def _turns(points: Array) -> NDArray[np.int64]:
     """Turn at each point: 1 to the left, -1 to the right, 0 for none."""
     return np.sign(np.round(turn_angles(points), 6)).astype(np.int64)
 
 
-def _legs(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _legs(corners: Array) -> tuple[Array, Array]:
     """Unit vector from each corner to the next, (n, 2), and distance, m, (n,)."""
     legs = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(legs[:, 0], legs[:, 1])
     return legs / lengths[:, None], lengths
 
 
-def _route(
-    corners: NDArray[np.float64], widths: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _route(corners: Array, widths: Array) -> tuple[Array, Array]:
     """Route with rounded corners, m, (m, 2), and the distance of each corner along it, m, (n,).
 
     It starts after a third of the first leg. With half the width as the radius of a corner, its
@@ -193,10 +190,10 @@ def _route(
 def _furnish(
     rng: np.random.Generator,
     obstacles: LaneObstacles,
-    corners: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    widths: NDArray[np.float64],
-    along: NDArray[np.float64],
+    corners: Array,
+    normals: Array,
+    widths: Array,
+    along: Array,
 ) -> None:
     """Add furniture along the walls, and a few boxes in the way."""
     density = rng.uniform(0.1, 0.35)  # Obstacles per metre.
@@ -219,11 +216,7 @@ def _furnish(
 
 
 def _plant(
-    rng: np.random.Generator,
-    obstacles: LaneObstacles,
-    corners: NDArray[np.float64],
-    inward: NDArray[np.float64],
-    along: NDArray[np.float64],
+    rng: np.random.Generator, obstacles: LaneObstacles, corners: Array, inward: Array, along: Array
 ) -> None:
     """Add plants and bins in some nooks; `inward` points from a nook through its corner."""
     for corner, way, s in zip(corners, inward, along, strict=True):
@@ -235,9 +228,7 @@ def _plant(
             obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))
 
 
-def _lamps(
-    rng: np.random.Generator, corners: NDArray[np.float64], widths: NDArray[np.float64]
-) -> tuple[Lamp, ...]:
+def _lamps(rng: np.random.Generator, corners: Array, widths: Array) -> tuple[Lamp, ...]:
     """Lamps along the middle of every leg, lengthwise or across."""
     every = float(rng.uniform(2.0, 3.2))
     long, wide = float(rng.uniform(0.9, 1.3)), float(rng.uniform(0.12, 0.3))

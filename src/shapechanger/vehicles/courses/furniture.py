@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Lamp, Obstacle, ObstacleKind, Wall
 from shapechanger.vehicles.courses.geometry import (
+    Array,
     arc_lengths,
     distances_from_obstacle,
     distances_to_segments,
@@ -76,11 +76,7 @@ class LaneObstacles:
     """
 
     def __init__(
-        self,
-        route: NDArray[np.float64],
-        left: tuple[Wall, ...],
-        right: tuple[Wall, ...],
-        gap_m: float,
+        self, route: Array, left: tuple[Wall, ...], right: tuple[Wall, ...], gap_m: float
     ) -> None:
         self.route, self._lefts, self._wanted = route, len(left), gap_m
         self._walls = wall_segments((*left, *right))
@@ -153,7 +149,7 @@ def scatter_obstacles(
 
 
 def place_sun_patches(
-    rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
+    rng: np.random.Generator, route: Array, half_width: Array
 ) -> tuple[Lamp, ...]:
     """Two to eight patches of sun on a route, m, (n, 2), with a half width, m, (n,)."""
     left = normals(route)

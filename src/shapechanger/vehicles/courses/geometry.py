@@ -14,23 +14,22 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Obstacle, Wall
 
-Points = NDArray[np.float64]
+Array = NDArray[np.float64]
+"""Numbers with double precision."""
 
 
-def length(line: Points) -> float:
+def length(line: Array) -> float:
     """Length of a closed line, m."""
     return float(arc_lengths(line)[-1])
 
 
-def arc_lengths(line: Points) -> NDArray[np.float64]:
+def arc_lengths(line: Array) -> Array:
     """Distance along a closed line to each point, and its length, m, (n + 1,)."""
     steps = np.diff(line, axis=0, append=line[:1])
     return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
-def interpolate(
-    line: NDArray[np.float64], knots: NDArray[np.float64], s: NDArray[np.float64]
-) -> Points:
+def interpolate(line: Array, knots: Array, s: Array) -> Array:
     """Values, (n, k), interpolated at distances along a closed line, m, which wrap: (m, k)."""
     whole = np.concatenate([line, line[:1]])
     s = np.mod(s, knots[-1])
@@ -38,7 +37,7 @@ def interpolate(
     return np.stack(columns, axis=1)
 
 
-def resample(line: Points, spacing: float) -> Points:
+def resample(line: Array, spacing: float) -> Array:
     """Resample a closed line, m, (n, 2), to points equally far apart, about `spacing` m."""
     knots = arc_lengths(line)
     n = max(8, round(float(knots[-1]) / spacing))
@@ -50,12 +49,12 @@ def resample(line: Points, spacing: float) -> Points:
     return interpolate(line, knots, s)
 
 
-def even_distances(length_m: float, n: int) -> NDArray[np.float64]:
+def even_distances(length_m: float, n: int) -> Array:
     """Evenly spaced distances from 0 along a closed line of this length, m, (n,)."""
     return np.arange(n, dtype=np.float64) * (length_m / n)
 
 
-def smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+def smooth(values: Array, sigma: float) -> Array:
     """Values along a closed line, (n, ...), after a periodic Gaussian filter of `sigma` points."""
     n = len(values)
     waves = np.exp(-2.0 * (np.pi * sigma * np.fft.rfftfreq(n)) ** 2)
@@ -63,14 +62,14 @@ def smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
     return np.fft.irfft(spectrum * waves.reshape(-1, *[1] * (values.ndim - 1)), n=n, axis=0)
 
 
-def normals(line: Points) -> Points:
+def normals(line: Array) -> Array:
     """Unit vectors to the left of a closed line, (n, 2)."""
     ahead = np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0)
     ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
     return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
 
 
-def turn_angles(line: Points) -> NDArray[np.float64]:
+def turn_angles(line: Array) -> Array:
     """Angle by which a closed line turns left at each point, rad, (n,)."""
     ahead = np.roll(line, -1, axis=0) - line
     back = np.roll(ahead, 1, axis=0)
@@ -79,7 +78,7 @@ def turn_angles(line: Points) -> NDArray[np.float64]:
     )
 
 
-def tangent_radii(line: Points) -> NDArray[np.float64]:
+def tangent_radii(line: Array) -> Array:
     """Half width to which a lane around a closed line can grow before it overlaps itself, m, (n,).
 
     It is the radius of the smallest circle that is tangent to the line at a point and passes
@@ -137,7 +136,7 @@ def trace_outline(cells: frozenset[Cell]) -> NDArray[np.int64] | None:
 
 def scale_grid(
     rng: np.random.Generator, loop: NDArray[np.int64], shortest_m: float, longest_m: float
-) -> NDArray[np.float64]:
+) -> Array:
     """Scale a loop of grid points, (n, 2), to metres; each row and column has a random width."""
     steps = rng.uniform(shortest_m, longest_m, size=(2, int(np.ptp(loop)) + 2))
     lines = np.cumsum(steps, axis=1)
@@ -154,7 +153,7 @@ def wall_segments(walls: Iterable[Wall]) -> Segments:
     return np.array([(*wall.start, *wall.end) for wall in walls], dtype=np.float64).reshape(-1, 4)
 
 
-def distances_to_segments(points: NDArray[np.float64], pieces: Segments) -> NDArray[np.float64]:
+def distances_to_segments(points: Array, pieces: Segments) -> Array:
     """Distance of each point, m, (n, 2), from each segment: m, (n, m)."""
     x, y = points[:, 0:1] - pieces[:, 0], points[:, 1:2] - pieces[:, 1]
     dx, dy = pieces[:, 2] - pieces[:, 0], pieces[:, 3] - pieces[:, 1]
@@ -168,7 +167,7 @@ def any_crossing(pieces: Segments) -> bool:
     """Return whether any two segments cross; a common end does not count."""
     start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
 
-    def side(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def side(points: Array) -> Array:
         """Side of each segment (rows) on which each point (columns) is; left is positive."""
         x, y = points[:, 0] - start[:, :1], points[:, 1] - start[:, 1:]
         hand = along[:, :1] * y - along[:, 1:] * x
@@ -181,7 +180,7 @@ def any_crossing(pieces: Segments) -> bool:
 _CORNERS: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
-def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.float64]:
+def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> Array:
     """Distance of an obstacle from each segment, m, (m,); 0 or less if they overlap."""
     if obstacle.is_round:
         middle = np.array([[obstacle.x, obstacle.y]])
@@ -216,7 +215,7 @@ def box_sides(obstacle: Obstacle) -> Segments:
     return np.concatenate([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def _distances_from_points(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distances_from_points(obstacle: Obstacle, points: Array) -> Array:
     """Distance of points, m, (n, 2), from an obstacle, m, (n,); 0 or less inside."""
     if obstacle.is_round:
         away = points - np.array([obstacle.x, obstacle.y])
@@ -226,14 +225,14 @@ def _distances_from_points(obstacle: Obstacle, points: NDArray[np.float64]) -> N
     return np.hypot(over[:, 0], over[:, 1])
 
 
-def _axes(obstacle: Obstacle) -> NDArray[np.float64]:
+def _axes(obstacle: Obstacle) -> Array:
     """Unit vectors along its length and its width, as rows."""
     c, s = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
     return np.array([[c, s], [-s, c]])
 
 
-def _into(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points in the frame of an obstacle, along its length and its width."""
+def _into(obstacle: Obstacle, points: Array) -> Array:
+    """Array in the frame of an obstacle, along its length and its width."""
     return (points - np.array([obstacle.x, obstacle.y])) @ _axes(obstacle).T
 
 
@@ -252,7 +251,7 @@ class ClearanceField:
         self._high = np.maximum(self._walls[:, :2], self._walls[:, 2:])
         self._obstacles = course.obstacles
 
-    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance(self, points: Array) -> Array:
         """Distance of each point, m, (N, 2), from the nearest wall or obstacle, m, (N,).
 
         It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
@@ -261,7 +260,7 @@ class ClearanceField:
         parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
         return np.concatenate([np.empty(0), *parts])
 
-    def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _near(self, points: Array) -> Array:
         low, high = points.min(axis=0) - FAR_M, points.max(axis=0) + FAR_M
         near = ((self._high >= low) & (self._low <= high)).all(axis=1)
         far = distances_to_segments(points, self._walls[near])
@@ -294,7 +293,7 @@ class ClosedLine:
     """Closed polyline; the last point is joined to the first.
 
     Args:
-        points: Points, m, (N, 2); neighbours differ.
+        points: Array, m, (N, 2); neighbours differ.
 
     Attributes:
         points: The points.
@@ -302,12 +301,12 @@ class ClosedLine:
         length: Length of the line, m.
     """
 
-    def __init__(self, points: NDArray[np.float64]) -> None:
+    def __init__(self, points: Array) -> None:
         self.points = points
         self._steps = np.roll(points, -1, axis=0) - points
         self._squared = np.einsum("ij,ij->i", self._steps, self._steps)
         lengths = np.sqrt(self._squared)
-        self.stations: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
+        self.stations: Array = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
         self.length = float(lengths.sum())
         self._window = int(np.ceil(_WINDOW_M / (self.length / len(points))))
         # Extended beyond both ends by a window, so that each window is a slice.

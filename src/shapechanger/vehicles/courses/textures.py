@@ -56,6 +56,7 @@ def _stretch(knots: Field, size: int) -> Field:
     return knots[below % count] * (1.0 - smooth) + knots[(below + 1) % count] * smooth
 
 
+_Range = tuple[float, float]
 _SIZE, _TALL = 256, 512
 _SKIRTING: Final = 0.05  # Height of a skirting board over the height of a wall, 2.4 m.
 _DARK: Final = (0.24, 0.22, 0.16)
@@ -145,24 +146,23 @@ def window(rng: np.random.Generator) -> Field:
 
 
 def _stones(
-    rng: np.random.Generator, rows: int, columns: int, low: float, high: float,
-    joints: Sequence[float],
-) -> tuple[Field, Field]:  # fmt: skip
-    """Brightness, from `low` to `high`, of stones in courses offset by half, and mask of joints.
+    rng: np.random.Generator, rows: int, columns: int, shades: _Range, joints: _Range
+) -> tuple[Field, Field]:
+    """Brightness of stones in courses offset by half, in a range, and mask of joints.
 
     `joints` are height and width over those of a stone.
     """
     y = np.arange(_SIZE)[:, None] * rows / _SIZE
     x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)
     number = y.astype(int) * columns + x.astype(int) % columns
-    shade = rng.uniform(low, high, rows * columns).astype(np.float32)[number]
+    shade = rng.uniform(*shades, rows * columns).astype(np.float32)[number]
     joint = ((y % 1.0) < joints[0]) | ((x % 1.0) < joints[1])
     return shade[..., None], joint.astype(np.float32)
 
 
 def brick(rng: np.random.Generator) -> Field:
     """Courses of red brick."""
-    shade, joint = _stones(rng, 24, 5, 0.65, 1.2, (0.14, 0.05))
+    shade, joint = _stones(rng, 24, 5, (0.65, 1.2), (0.14, 0.05))
     image = np.asarray((0.58, 0.26, 0.14), np.float32) * shade
     image *= 1.0 + 0.10 * grain(rng, _SIZE, _SIZE)[..., None]
     return blend(image, (0.62, 0.55, 0.42), joint)
@@ -244,7 +244,7 @@ def shed(rng: np.random.Generator) -> Field:
 
 def quay(rng: np.random.Generator) -> Field:
     """Stone blocks, pale above, green and wet below."""
-    shade, joint = _stones(rng, 4, 3, 0.82, 1.12, (0.05, 0.03))
+    shade, joint = _stones(rng, 4, 3, (0.82, 1.12), (0.05, 0.03))
     image = np.asarray((0.60, 0.57, 0.51), np.float32) * shade
     image *= 1.0 + 0.09 * clouds(rng, _SIZE, _SIZE, 10, 10, 3)[..., None]
     image = blend(image, (0.25, 0.24, 0.21), joint)

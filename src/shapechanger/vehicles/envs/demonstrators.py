@@ -28,6 +28,9 @@ CLONES: Final[Mapping[str, Path]] = MappingProxyType(
 Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
 """
 
+Driver = Callable[[], NDArray[np.float32]]
+"""A driver, whose calls return actions, (2,)."""
+
 _WANDER_S: Final = 0.6  # Correlation time of the wandering.
 _JERKS_PER_S, _JERK_S = 0.25, (0.15, 0.5)  # Mean rate of jerks, and range of their duration.
 _THROTTLE_SD: Final = 0.1  # Standard deviation of the wandering of the throttle.
@@ -43,17 +46,19 @@ class Demonstrator:
 
     Args:
         world: World of the vehicle.
-        begin: Called at the beginning of an episode; returns the driver, whose calls return
-            actions, (2,).
+        begin: Called at the beginning of an episode; returns the driver.
         seed: Seed of the mistakes.
         sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
             as much. None for what the vehicle can correct.
     """
 
     def __init__(
-        self, world: MujocoWorld, begin: Callable[[], Callable[[], NDArray[np.float32]]], seed: int,
+        self,
+        world: MujocoWorld,
+        begin: Callable[[], Driver],
+        seed: int,
         sway: float | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._begin = begin
         sway = traits_of(world.vehicle.name).sway if sway is None else sway
         self._size = np.array((sway, _THROTTLE_SD))
@@ -125,7 +130,7 @@ _BEARING_SWAY: Final = 0.18
 def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
     """Return an expert whose actions are waypoints: the bearing of the free way, and the speed."""
 
-    def begin() -> Callable[[], NDArray[np.float32]]:
+    def begin() -> Driver:
         expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
         path = expert.path
 

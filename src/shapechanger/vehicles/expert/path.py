@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.courses.geometry import ClearanceField, ClosedLine, arc_lengths
+from shapechanger.vehicles.courses.geometry import Array, ClearanceField, ClosedLine, arc_lengths
 
 _STATION_M: Final = 0.2
 _OFFSET_M: Final = 0.1
@@ -111,9 +111,7 @@ class _Lattice:
             extra += 1.2 * need + 0.005 * (need > 0)
         return None
 
-    def _room(
-        self, way: NDArray[np.int64], extra: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _room(self, way: NDArray[np.int64], extra: Array) -> tuple[Array, Array]:
         """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
         low, high = np.empty(len(way)), np.empty(len(way))
         for i, k in enumerate(way):
@@ -142,7 +140,7 @@ class _Lattice:
 
 
 def _search(
-    cost: NDArray[np.float64], stations: NDArray[np.int64], seam: int | None, least_m: float
+    cost: Array, stations: NDArray[np.int64], seam: int | None, least_m: float
 ) -> NDArray[np.int64]:
     """The cheapest way along stations, (M,), as indices of offsets, (M,); cost is (N, K).
 
@@ -188,13 +186,7 @@ def _search(
     return way
 
 
-def _least_bent(
-    middle: NDArray[np.float64],
-    left: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    wish: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _least_bent(middle: Array, left: Array, low: Array, high: Array, wish: Array) -> Array:
     """Offsets of the least bent closed line between bounds, with preferred offsets `wish`.
 
     The alternating direction method approximates the solution, and an active-set step refines it.
@@ -238,7 +230,7 @@ class CoursePath(ClosedLine):
         clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
     """
 
-    def __init__(self, knots: NDArray[np.float64], obstacles: ClearanceField) -> None:
+    def __init__(self, knots: Array, obstacles: ClearanceField) -> None:
         chords = arc_lengths(knots)
         spline = CubicSpline(chords, np.vstack((knots, knots[:1])), bc_type="periodic")
         # Even steps of the parameter are only approximately even along the line.
@@ -252,15 +244,15 @@ class CoursePath(ClosedLine):
         super().__init__(points)
         speed = np.hypot(first[:, 0], first[:, 1])
         cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-        self.heading: NDArray[np.float64] = np.arctan2(first[:, 1], first[:, 0])
-        self.curvature: NDArray[np.float64] = cross / speed**3
+        self.heading: Array = np.arctan2(first[:, 1], first[:, 0])
+        self.curvature: Array = cross / speed**3
         self.clearance = obstacles.distance(points)
 
 
 def plan_path(
     course: Course, half_width_m: float, margin_m: float, *, comfort_m: float
 ) -> CoursePath:
-    """Plan a smooth path around a course, or raise a `WorldError` if there is none.
+    """Plan a smooth path around a course, or raise a `WorldError` without one.
 
     Args:
         course: The course.
