@@ -116,7 +116,7 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
     compiled = (type(model).__module__.partition(".")[0], type(model).__name__)
     if is_mujoco := compiled == ("mujoco", "MjModel"):
         sees = _sees(env.observation_space)
-        moved, sensed, numbers = MODELS.load("mujoco").read(model, drawn=sees)
+        moved, sensed, numbers = MODELS.load("mujoco").read_numbers(model, drawn=sees)
     files = own_modules(names) | dict(_files(arguments, _MODEL_FILES if is_mujoco else ()))
     return IdentifiedEnv(Identity(moved, sensed, files), numbers)
 

@@ -137,11 +137,9 @@ ROBOTS: Final[Registry[Any]] = Registry(
 """Readers of the numbers of a robot for its simulation, which imports no robot."""
 
 MODELS: Final[Registry[Any]] = Registry(
-    "kind of model",
-    "shapechanger.models",
-    {"mujoco": "morphology.certificate.changes:ModelNumbers"},
+    "kind of model", "shapechanger.models", {"mujoco": "morphology.certificate.changes"}
 )
-"""Readers of the numbers of a compiled model, keyed by the library that compiled it."""
+"""Modules that read the numbers of a compiled model, keyed by the library that compiled it."""
 
 MAKERS: Final[Registry[Any]] = Registry(
     "maker of vector envs", "shapechanger.makers", {"make_vec": "envs.make_vec:make_vec"}

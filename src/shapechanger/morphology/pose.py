@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.morphology.certificate.fields import kinds_of
+from shapechanger.morphology.certificate.numbers import kinds_of
 
 _Array = NDArray[np.float64]
 _J: Final = mujoco.mjtJoint

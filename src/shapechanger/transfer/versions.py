@@ -85,7 +85,7 @@ def _numbers(
             if not present and (found := identify(ref)).identity.model == after.model:
                 present = found.numbers
     with suppress(msgspec.MsgspecError):  # Only words of a message are lost.
-        return MODELS.load("mujoco").changes(old, present) if old and present else ()
+        return MODELS.load("mujoco").changed_numbers(old, present) if old and present else ()
     return ()
 
 

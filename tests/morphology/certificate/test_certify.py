@@ -17,7 +17,7 @@ from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Edit, Friction, Mass
 from shapechanger.morphology.certificate.certify import certify
 from tests.morphology.scenes import ASSETS
-from tests.morphology.swing import Noisy, Swing, Wrapper
+from tests.morphology.swing import Swing
 
 
 def test_a_longer_arm_is_certified() -> None:
@@ -46,14 +46,6 @@ def test_an_env_without_a_model_is_refused() -> None:
         certify(gymnasium.make("CartPole-v1"), Swing())
 
 
-def test_noise_alone_is_a_shift() -> None:
-    certificate = certify(Swing(), Noisy(Swing()), labels=("quiet", "noisy"))
-    assert certificate.same_model
-    assert not certificate.is_empty
-    assert certificate.verdict.startswith("The models of quiet and noisy are the same (")
-    assert certificate.verdict.endswith("only what is sensed, done or rewarded differs.")
-
-
 def test_a_difference_beyond_the_rollout_is_stated() -> None:
     """A model difference without effect in the rollout is a shift, and the verdict says so."""
     target = Swing()
@@ -73,13 +65,6 @@ def test_inconsistent_models_are_reported() -> None:
     assert "body_subtreemass" in sentences
     assert "its inertia stays" in sentences
     assert "Does not fit together in heavy:" in str(certificate)
-
-
-def test_environments_without_a_standing_height_are_certified() -> None:
-    source = Swing()
-    del source.standing_height
-    certificate = certify(Wrapper(source), Swing(gear=2.0, standing_height=1.0))
-    assert not any(item.quantity == "standing height" for item in certificate.changes)
 
 
 class _Ant(AntEnv):
@@ -106,7 +91,7 @@ def test_gymnasium_environments_and_wrappers_are_certified(tmp_path: Path) -> No
         wrapped = TransformObservation(source, lambda seen: seen + 1.0, source.observation_space)
         shifted = certify(source, wrapped, steps=3)
         assert shifted.same_model
-        assert shifted.rollout.largest_difference == pytest.approx(1.0)
+        assert ", by 1. " in str(shifted.rollout) or str(shifted.rollout).endswith(", by 1.")
         assert shifted.source == "_Ant"
 
 

@@ -95,7 +95,7 @@ def _random_geom(random: np.random.Generator, name: str) -> str:
     return f"<geom name='{name}' type='{shape}' {_SHAPES[shape]} pos='{x} {y} {z}' {written}/>"
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_random_scenes_have_the_predicted_contacts(seed: int) -> None:
     random = np.random.default_rng(seed)
     bodies = "".join(
@@ -110,7 +110,7 @@ def test_random_scenes_have_the_predicted_contacts(seed: int) -> None:
             _assert_equal(predicted[name], contact)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("flag", ["contact='enable'", "filterparent='disable'"])
 def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
     """In random trees of overlapping balls, exactly the pairs that pass the filters collide."""
@@ -141,15 +141,6 @@ def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
         if any(model.body_treeid[model.geom(geom).bodyid[0]] >= 0 for geom in name.split(" + "))
     }
     assert set(_contacts(model)) == moving
-
-
-def test_contacts_are_found_within_margin_and_gap() -> None:
-    for distance, found in ((0.049, True), (0.051, False)):
-        model = _scene(floor="gap='.02'", ball="gap='.01' margin='.02'")
-        model.qpos0[2] = 0.1 + distance
-        contact = _contacts(model)["ball + floor"]
-        assert float(contact["margin"][0]) + float(contact["gap"][0]) == pytest.approx(0.05)
-        assert ("ball + floor" in _simulated(model)) == found
 
 
 def test_friction_has_a_lower_bound() -> None:

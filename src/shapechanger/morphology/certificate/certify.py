@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.identity import modules_of_env, own_modules
 from shapechanger.morphology.certificate.changes import Change, compare, fingerprint, grouped
-from shapechanger.morphology.certificate.fields import TABLE
-from shapechanger.morphology.certificate.numbers import names_of
+from shapechanger.morphology.certificate.numbers import KINDS, TABLE, names_of
 
 if TYPE_CHECKING:
     from shapechanger.layout import Layout
@@ -42,70 +41,25 @@ class Rollout(msgspec.Struct, frozen=True):
     """Comparison of the responses of two environments to the same commands.
 
     It shows what a compiled model does not: noise and delay of sensors, another start, another
-    reward. Step 0 is the reset; step n follows the n-th command.
+    reward.
 
     Attributes:
         steps: Commands given before the first of the two ended its episode.
-        source_ended: Whether the source's episode was over by then.
-        target_ended: Whether the target's was.
-        compared: How many numbers of an observation were compared, being of the same name.
-        only_in_source: Numbers of an observation that only the source has.
-        only_in_target: Numbers of an observation that only the target has.
-        first_step: Step at which observations first differed; None if they never did.
-        first_feature: What differed most at that step.
-        largest_difference: Largest difference of all, in the feature's unit.
-        largest_feature: What differed by that much; empty if nothing did.
-        largest_step: Step at which it did.
-        reward_difference: Largest difference between the rewards of a step.
-        beyond_rounding: First step whose difference is more than rounding explains, or at which
-            only one of the two ended without one; None if there is no such step.
+        identical: Whether both gave the same numbers, the same rewards and the same end.
+        differs_by_rounding: Whether they differ by no more than rounding explains, or not at all.
+        sentences: Where the observations part, which of them only one has, and how rewards and
+            ends differ.
     """
 
     steps: int
-    source_ended: bool
-    target_ended: bool
-    compared: int
-    only_in_source: tuple[str, ...]
-    only_in_target: tuple[str, ...]
-    first_step: int | None
-    first_feature: str
-    largest_difference: float
-    largest_feature: str
-    largest_step: int | None
-    reward_difference: float
-    beyond_rounding: int | None = None
-
-    @property
-    def identical(self) -> bool:
-        """Return whether both gave the same numbers, the same rewards and the same end."""
-        apart = self.only_in_source or self.only_in_target or self.reward_difference
-        return self.first_step is None and not apart and self.source_ended == self.target_ended
-
-    @property
-    def differs_by_rounding(self) -> bool:
-        """Return whether the two differ by no more than rounding explains, or not at all."""
-        return self.beyond_rounding is None and not self.only_in_source and not self.only_in_target
+    identical: bool
+    differs_by_rounding: bool
+    sentences: tuple[str, ...]
 
     def __str__(self) -> str:
         """Return the comparison in a few sentences."""
-        sentences = [f"{self.steps} steps from the same seed with the same commands:"]
-        if self.first_step is None:
-            sentences.append(f"the {self.compared} numbers that both observe are equal throughout.")
-        else:
-            when = "at the reset" if self.first_step == 0 else f"at step {self.first_step}"
-            sentences.append(
-                f"observations part {when} in {self.first_feature}, and furthest at step "
-                f"{self.largest_step} in {self.largest_feature}, by {self.largest_difference:.4g}."
-            )
-        for whose, names in (("source", self.only_in_source), ("target", self.only_in_target)):
-            if names:
-                sentences += [f"Only the {whose} observes {len(names)} more, such as {names[0]}."]
-        if self.reward_difference > 0.0:
-            sentences.append(f"Rewards differ by up to {self.reward_difference:.4g} a step.")
-        if self.source_ended != self.target_ended:
-            ended = "source" if self.source_ended else "target"
-            sentences.append(f"Only the {ended} ended its episode.")
-        return " ".join(sentences)
+        steps = f"{self.steps} steps from the same seed with the same commands:"
+        return " ".join((steps, *self.sentences))
 
 
 class Certificate(msgspec.Struct, frozen=True):
@@ -297,43 +251,43 @@ def compare_rollouts(source: Any, target: Any, *, steps: int = 100, seed: int = 
     `steps` if it ends.
     """
     commands = matched_commands(_layout(source, "action"), _layout(target, "action"), steps, seed)
-    before, rewards, over = _drive(source, commands[0], seed)
-    after, new_rewards, new_over = _drive(target, commands[1], seed)
+    before, over = _drive(source, commands[0], seed)
+    after, new_over = _drive(target, commands[1], seed)
     old, new = (_number_names(_layout(env, "observation")) for env in (source, target))
-    sizes = before.shape[1], after.shape[1]
+    sizes = before.shape[1] - 1, after.shape[1] - 1
     if (len(old), len(new)) != sizes:  # A wrapper has changed the numbers: use their places.
         old, new = ([f"observation[{place}]" for place in range(size)] for size in sizes)
-    in_new = frozenset(new)
-    shared = [name for name in old if name in in_new]
-    done = min(len(rewards), len(new_rewards))
-    ended = over and len(rewards) == done, new_over and len(new_rewards) == done
+    shared = [name for name in old if name in frozenset(new)]
+    rows = min(len(before), len(after))
     gaps, excess = _gaps(
-        before[: done + 1, [old.index(name) for name in shared]],
-        after[: done + 1, [new.index(name) for name in shared]],
+        before[:rows, [*map(old.index, shared), -1]], after[:rows, [*map(new.index, shared), -1]]
     )
-    # The first reward belongs to the first step.
-    reward_gaps, reward_excess = _gaps(rewards[:done, None], new_rewards[:done, None])
-    parted = np.flatnonzero(gaps.any(axis=1)).tolist()
-    first = parted[0] if parted else None
-    # The first of equal differences.
-    largest, feature = np.unravel_index(int(np.argmax(gaps)), gaps.shape) if parted else (0, 0)
-    return Rollout(
-        steps=done,
-        source_ended=ended[0],
-        target_ended=ended[1],
-        compared=len(shared),
-        only_in_source=tuple(name for name in old if name not in shared),
-        only_in_target=tuple(name for name in new if name not in shared),
-        first_step=first,
-        first_feature="" if first is None else shared[int(np.argmax(gaps[first]))],
-        largest_difference=float(gaps.max(initial=0.0)),
-        largest_feature=shared[feature] if parted else "",
-        largest_step=int(largest) if parted else None,
-        reward_difference=float(reward_gaps.max(initial=0.0)),
-        beyond_rounding=_beyond_rounding(
-            np.maximum(excess, np.append(0.0, reward_excess)), ended[0] != ended[1]
-        ),
-    )
+    ended = over and len(before) == rows, new_over and len(after) == rows
+    only = [name for name in old if name not in shared], [n for n in new if n not in shared]
+    observed, reward = gaps[:, :-1], float(gaps[:, -1].max())
+    parted = np.flatnonzero(observed.any(axis=1)).tolist()
+    sentences = [f"the {len(shared)} numbers that both observe are equal throughout."]
+    if parted:
+        when = f"at step {parted[0]}" if parted[0] else "at the reset"
+        # The first of equal differences.
+        step, most = np.unravel_index(int(np.argmax(observed)), observed.shape)
+        sentences = [
+            f"observations part {when} in {shared[int(np.argmax(observed[parted[0]]))]}, and "
+            f"furthest at step {step} in {shared[most]}, by {observed.max():.4g}."
+        ]
+    for whose, names in zip(("source", "target"), only, strict=True):
+        if names:
+            sentences += [f"Only the {whose} observes {len(names)} more, such as {names[0]}."]
+    if reward > 0.0:
+        sentences += [f"Rewards differ by up to {reward:.4g} a step."]
+    if ended[0] != ended[1]:
+        sentences += [f"Only the {'source' if ended[0] else 'target'} ended its episode."]
+    # A difference that rounding does not explain is there at once, be it of the end.
+    largest_before = np.append(0.0, np.maximum.accumulate(excess)[:-1])
+    sudden = bool(np.any((excess > 1.0) & (excess > _GROWTH * largest_before)))
+    sudden |= ended[0] != ended[1] and bool(excess.max() <= 1.0)
+    apart = any(only) or ended[0] != ended[1]
+    return Rollout(rows - 1, not gaps.any() and not apart, not (sudden or any(only)), (*sentences,))
 
 
 def _layout(env: Any, side: str) -> Layout:
@@ -352,34 +306,23 @@ def _gaps(before: _Floats, after: _Floats) -> tuple[_Floats, _Floats]:
         gaps = np.where(same, 0.0, np.abs(before - after))
     gaps = np.nan_to_num(gaps, nan=_LARGEST, posinf=_LARGEST)
     known = np.nan_to_num(np.maximum(np.abs(before), np.abs(after)), nan=1.0, posinf=1.0)
-    scale = np.maximum(known.max(axis=0, initial=0.0), 1.0)
-    return gaps, (np.minimum(gaps / scale, 1.0) / _TOLERANCE).max(axis=1, initial=0.0)
+    scale = np.maximum(known.max(axis=0), 1.0)
+    return gaps, (np.minimum(gaps / scale, 1.0) / _TOLERANCE).max(axis=1)
 
 
-def _beyond_rounding(excess: _Floats, one_ended: bool) -> int | None:
-    """Return the first step whose difference does not grow from rounding; None without one.
+def _drive(env: Any, commands: NDArray[np.float32], seed: int) -> tuple[_Floats, bool]:
+    """Return observations with the reward as last number, (steps + 1, size + 1), and the end.
 
-    `excess` is the difference of each step in tolerances, (n,), the reset first; `one_ended` tells
-    whether only one of the two ended its episode at the last step.
+    The reward of the reset is 0.
     """
-    largest_before = np.append(0.0, np.maximum.accumulate(excess)[:-1])
-    sudden = np.flatnonzero((excess > 1.0) & (excess > _GROWTH * largest_before)).tolist()
-    if one_ended and excess.max() <= 1.0:
-        sudden.append(len(excess) - 1)
-    return sudden[0] if sudden else None
-
-
-def _drive(env: Any, commands: NDArray[np.float32], seed: int) -> tuple[_Floats, _Floats, bool]:
-    """Return observations, (steps + 1, size), rewards, (steps,), and whether the episode ended."""
     observation, _ = env.reset(seed=seed)
-    observations, rewards, ended = [_flat(observation)], list[float](), False
+    rows, ended = [np.append(_flat(observation), 0.0)], False
     for command in commands:
         observation, reward, terminated, truncated, _ = env.step(command)
-        observations.append(_flat(observation))
-        rewards.append(float(reward))
+        rows.append(np.append(_flat(observation), float(reward)))
         if ended := bool(terminated or truncated):
             break
-    return np.stack(observations), np.asarray(rewards), ended
+    return np.stack(rows), ended
 
 
 def _flat(observation: Any) -> _Floats:
@@ -404,18 +347,17 @@ def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None)
     """
     names, owner, found = names_of(model), model.geom_bodyid, list[str]()
     before = names_of(source)["bodies"] if source else []
-    for i in np.flatnonzero(model.body_treeid >= 0).tolist():
+    for i in np.flatnonzero((model.body_treeid >= 0) & (model.body_mass > 0.0)).tolist():
         body, mass = names["bodies"][i], float(model.body_mass[i])
         small, middle, large = sorted(model.body_inertia[i].tolist())
-        if mass > 0.0 and (small < 0.0 or (large == 0.0 and model.body_dofnum[i] > 0)):
-            found.append(f"{body}: mass {mass:.4g} kg comes with inertia {small:.3g} kg·m².")
-        elif mass > 0.0 and small + middle < large * (1.0 - _STALE):
-            moments = f"principal moments {small:.3g}, {middle:.3g}, {large:.3g} kg·m²"
+        has_none = large == 0.0 and model.body_dofnum[i] > 0
+        if small < 0.0 or has_none or small + middle < large * (1.0 - _STALE):
             found.append(
-                f"{body}: mass {mass:.4g} kg comes with {moments}, of which the largest is more "
+                f"{body}: mass {mass:.4g} kg comes with principal moments {small:.3g}, "
+                f"{middle:.3g}, {large:.3g} kg·m², which must be positive, and none of them more "
                 "than the other two together."
             )
-        if source is not None and body in before and model.body_inertia[i].any():
+        if source is not None and body in before and large:
             j = before.index(body)
             old = float(source.body_mass[j])
             if old != mass and np.array_equal(source.body_inertia[j], model.body_inertia[i]):
@@ -435,21 +377,18 @@ def inconsistencies(model: mujoco.MjModel, source: mujoco.MjModel | None = None)
         mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
     except mujoco.FatalError as error:
         return (*found, f"MuJoCo cannot derive its constants from the model: {error}.")
-    remedy = "Call mujoco.mj_setConst after writing to a compiled model."
-    owners = {TABLE.kinds[kind].prefix: found for kind, found in names.items()}
+    owners = {prefix: names[section] for section, (_, prefix, _) in KINDS.items()}
     owners["dof"] = [names["joints"][joint] for joint in model.dof_jntid.tolist()]
-    for array, consequence in TABLE.constants.items():
-        old, new = (np.asarray(getattr(each, array), np.float64) for each in (model, fresh))
-        if not old.ndim:
-            if new and not old:
-                found.append(f"{array} is not set, so {consequence}. {remedy}")
-            continue
+    for array, consequence in TABLE["constants"].items():
+        old, new = (np.atleast_1d(np.asarray(getattr(m, array), float)) for m in (model, fresh))
         scale = np.maximum(np.abs(old), np.abs(new))
         gap = np.abs(old - new) / np.where(scale > 0.0, scale, 1.0)
         if gap.max(initial=0.0) > _STALE:  # The element that changes most is named.
             at = np.unravel_index(int(np.argmax(gap)), gap.shape)
+            whose = owners.get(array.partition("_")[0])
             found.append(
-                f"{owners[array.partition('_')[0]][at[0]]}: {array} is {old[at]:.4g}, but the "
-                f"model makes it {new[at]:.4g}, so {consequence}. {remedy}"
+                f"{f'{whose[at[0]]}: ' if whose else ''}{array} is {old[at]:.4g}, but the model "
+                f"makes it {new[at]:.4g}, so {consequence}. Call mujoco.mj_setConst after writing "
+                "to a compiled model."
             )
     return tuple(found)

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Final
 
 import msgspec
 import mujoco
+import numpy as np
 
-from shapechanger.morphology.certificate.fields import KINDS, MOVED, SENSED, Field, Numbers, Values
-from shapechanger.morphology.certificate.numbers import moved_numbers, names_of, sensed_numbers
+from shapechanger.morphology.certificate.numbers import (
+    KINDS,
+    MOVED,
+    SENSED,
+    Field,
+    Numbers,
+    Values,
+    moved_numbers,
+    names_of,
+    sensed_numbers,
+)
 
-Amount = float | str | tuple[float | str, ...] | None
-"""A number, a word, some of them, or None for what is not there."""
-
+_Elements = dict[str, dict[str, Values]]
 ROUNDING: Final = 1e-9
 """Part of a field's largest number up to which two numbers are equal. Writing out a total mass,
 another order of a sum and another processor change the last bits, and constants that MuJoCo derives
@@ -27,10 +35,14 @@ _ROUNDED_TO: Final = 10  # Digits of the largest number of a field: a half of `R
 # 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
 
-_TITLES: Final = frozenset(kind.title for kind in KINDS.values())
+# What an element is called, and the quantity that describes one which only one of two models has.
+_TITLES: Final = {section: title for section, (title, _, _) in KINDS.items()} | {
+    "contacts": "contact",
+    "whole": "array",
+}
+_DESCRIBED_BY: Final = {"bodies": "mass", "actuators": "target", "contacts": "contact dimension"}
 # Quantities whose ratios mean nothing.
 _WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
-_DIGITS: Final = (4, 8, 17)
 _ROUND: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 
 
@@ -41,91 +53,74 @@ class Change(msgspec.Struct, frozen=True):
         quantity: Name of the quantity, such as "mass", "length", "contact friction" or "gear"; the
             kind of element, such as "body", if only one of the two has the element.
         element: Name of the element that it belongs to; names, with commas, in a group.
-        before: Value in the source; None if it has none.
-        after: Value in the target; None if it has none.
+        before: Numbers or words in the source; None if it has none.
+        after: The same in the target; None if it has none.
         unit: Unit of both; "1" for a dimensionless number, empty for words and for mixed units.
-        sentence: The change in words.
     """
 
     quantity: str
     element: str
-    before: Amount
-    after: Amount
-    unit: str
-    sentence: str
+    before: Values | None
+    after: Values | None
+    unit: str = ""
 
+    @property
+    def sentence(self) -> str:
+        """The change in words."""
+        return f"{self.element}: {self.quantity} {self._words()}"
 
-def change(
-    quantity: str,
-    element: str,
-    before: Sequence[float | str] | None,
-    after: Sequence[float | str] | None,
-    unit: str = "",
-) -> Change:
-    """Describe a change of a quantity of an element, which has it before, after, or both."""
-    old, new = _plain(before), _plain(after)
-    suffix = f" {unit}" if unit not in ("", "1") else ""
-    if quantity in _TITLES:
-        there, done = (old, "removed") if new is None else (new, "added")
-        words = f"{done} ({_shown(there, _DIGITS[0])}{suffix})"
-    else:
-        pairs = [(_shown(old, digits), _shown(new, digits)) for digits in _DIGITS]
-        # As many digits as it takes to tell the two apart.
-        texts = next((pair for pair in pairs if pair[0] != pair[1]), pairs[-1])
-        words = " -> ".join(text if text == "none" else f"{text}{suffix}" for text in texts)
-        words += "" if quantity in _WITHOUT_RATIO else _times(old, new)
-    return Change(quantity, element, old, new, unit, f"{element}: {quantity} {words}")
+    def _words(self) -> str:
+        """Return both values, with as many digits as it takes to tell them apart."""
+        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        if self.quantity in _TITLES.values():
+            there, done = (self.before, "removed") if self.after is None else (self.after, "added")
+            return f"{done} ({_shown(there, 4)}{unit})"
+        texts = ["", ""]
+        for digits in (4, 8, 17):
+            texts = [_shown(values, digits) for values in (self.before, self.after)]
+            if texts[0] != texts[1]:
+                break
+        words = " -> ".join(text if text == "none" else f"{text}{unit}" for text in texts)
+        if self.quantity in _WITHOUT_RATIO:
+            return words
+        return words + _times(self.before or (), self.after or ())
 
 
 def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
     """Merge changes that are the same for several elements."""
-    groups: dict[tuple[str, str], list[Change]] = {}
+    groups: dict[str, list[Change]] = {}
     for item in changes:
-        text = item.sentence.removeprefix(f"{item.element}: ")
-        groups.setdefault((item.quantity, text), []).append(item)
-    merged: list[Change] = []
-    for (_, text), members in groups.items():
-        name = ", ".join(member.element for member in members)
-        merged.append(msgspec.structs.replace(members[0], element=name, sentence=f"{name}: {text}"))
-    return tuple(merged)
-
-
-def _plain(values: Sequence[float | str] | None) -> Amount:
-    """Convert values for JSON: a single value stays scalar, infinite numbers become strings."""
-    if values is None:
-        return None
-    finite = tuple(
-        value if isinstance(value, str) or math.isfinite(value) else str(value) for value in values
+        groups.setdefault(item.sentence.removeprefix(f"{item.element}: "), []).append(item)
+    return tuple(
+        msgspec.structs.replace(members[0], element=", ".join(each.element for each in members))
+        for members in groups.values()
     )
-    return finite[0] if len(finite) == 1 else finite
 
 
-def _shown(amount: Amount, digits: int) -> str:
-    """Format an amount with so many significant digits; equal numbers of a list are shown once."""
-    if isinstance(amount, tuple):
-        texts = [_shown(value, digits) for value in amount] or ["none"]
-        if len(texts) == 1:
-            return texts[0]
-        return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
-    if amount is None:
-        return "none"
-    return amount if isinstance(amount, str) else f"{amount:.{digits}g}"
+def _shown(values: Values | None, digits: int) -> str:
+    """Format values with so many significant digits; equal numbers of a list are shown once."""
+    texts = [v if isinstance(v, str) else f"{v:.{digits}g}" for v in values or ()] or ["none"]
+    if len(texts) == 1:
+        return texts[0]
+    return f"{texts[0]} each" if len(set(texts)) == 1 else f"({', '.join(texts)})"
 
 
-def _times(before: Amount, after: Amount) -> str:
+def _times(before: Values, after: Values) -> str:
     """Format new over old, if it is the same for all numbers that are not zero in both."""
-    old, new = (each if isinstance(each, tuple) else (each,) for each in (before, after))
-    ratios: list[float] = []
-    for a, b in zip(old, new, strict=False):
-        if not isinstance(a, float) or not isinstance(b, float) or (a == 0.0) != (b == 0.0):
-            return ""
-        if a != 0.0:
-            ratios.append(b / a)
+    if len(before) != len(after) or not all(map(_is_finite, (*before, *after))):
+        return ""
+    old, new = np.array(before, float), np.array(after, float)
+    used = old != 0.0
+    ratios = new[used] / old[used]
     # Three digits are shown, so ratios that agree to four are one ratio.
-    same = ratios and all(math.isclose(ratio, ratios[0], rel_tol=1e-4) for ratio in ratios)
-    if len(old) != len(new) or not same or f"{ratios[0]:.3g}" == "1":
+    same = ratios.size and np.allclose(ratios, ratios[0], rtol=1e-4, atol=0.0)
+    if not same or np.any(used != (new != 0.0)) or f"{ratios[0]:.3g}" == "1":
         return ""
     return f" (x{ratios[0]:.3g})"
+
+
+def _is_finite(value: float | str) -> bool:
+    return not isinstance(value, str) and math.isfinite(value)
 
 
 def compare(
@@ -148,18 +143,18 @@ def compare(
     changes: list[Change] = []
     before, after = standing_height
     if before is not None and after is not None and not _equal((before,), (after,)):
-        changes.append(change("standing height", "robot", (before,), (after,), "m"))
+        changes.append(Change("standing height", "robot", (before,), (after,), "m"))
     one, two = moved_numbers(source), moved_numbers(target)
     found = differences(one, two)
     if not found:
         return tuple(changes)
     if source.nbody != target.nbody:
         old, new = float(source.nbody), float(target.nbody)
-        changes.append(change("dimensions", "nbody", (old,), (new,), "1"))
+        changes.append(Change("dimensions", "nbody", (old,), (new,), "1"))
     old, new = (math.fsum(m.body_mass[m.body_treeid >= 0].tolist()) for m in (source, target))
     # The order of the bodies may change the last digit of the sum.
     if not math.isclose(old, new, rel_tol=ROUNDING):
-        changes.append(change("total mass", "robot", (old,), (new,), "kg"))
+        changes.append(Change("total mass", "robot", (old,), (new,), "kg"))
     lengths, measured = _lengths(source, target, one, two)
     changes += lengths
     if found[0].quantity == "derived constant" and changes:
@@ -192,7 +187,7 @@ def _lengths(
         old, new = source.geom_size[i].tolist(), target.geom_size[j].tolist()
         for quantity, a, b in (("length", 2.0 * old[1], 2.0 * new[1]), ("radius", old[0], new[0])):
             if not _equal((a,), (b,)):
-                found.append(change(quantity, label, (a,), (b,), "m"))
+                found.append(Change(quantity, label, (a,), (b,), "m"))
     return found, measured
 
 
@@ -205,39 +200,37 @@ def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
     for section in one:
         if section != "derived":
             found += _section(section, one[section], two[section])
-    if not found and "derived" in one:
-        for name, fields in one["derived"].items():
-            old, new = fields["values"], two["derived"][name]["values"]
-            if not _equal(old, new):
-                found.append(change("derived constant", name, old, new))
-    return tuple(found)
+    if found:
+        return tuple(found)
+    return tuple(
+        Change("derived constant", name, fields["values"], two["derived"][name]["values"])
+        for name, fields in one.get("derived", {}).items()
+        if not _equal(fields["values"], two["derived"][name]["values"])
+    )
 
 
-def _section(
-    section: str, before: dict[str, dict[str, Values]], after: dict[str, dict[str, Values]]
-) -> list[Change]:
+def _section(section: str, before: _Elements, after: _Elements) -> list[Change]:
     """Return the differences within one section."""
     found: list[Change] = []
-    kind, fields, scales = KINDS[section], (MOVED | SENSED)[section], _scales(before, after)
+    fields, scales = (MOVED | SENSED)[section], _scales(before, after)
+    section = {"places": "geoms", "marks": "sites"}.get(section, section)
     for element in dict.fromkeys((*before, *after)):
         old, new = before.get(element), after.get(element)
         if old is None or new is None:
-            described = fields.get(kind.described_by)
-            there, then = (
-                None if values is None else values.get(kind.described_by, ("there",))
-                for values in (old, new)
-            )
-            unit = described.unit if described and isinstance(described.unit, str) else ""
-            found.append(change(kind.title, element, there, then, unit))
+            title, quantity = _TITLES[section], _DESCRIBED_BY.get(section, "type")
+            there = (old or new or {}).get(quantity, ("there",))
+            unit = "kg" if quantity == "mass" else ""
+            one, two = (None, there) if old is None else (there, None)
+            found.append(Change(title, element, one, two, unit))
             continue
         for quantity in dict.fromkeys((*old, *new)):
             if not _equal(old.get(quantity), new.get(quantity), scales[quantity]):
                 field = fields.get(quantity, Field(""))
                 found.append(_difference(quantity, field, element, old, new))
-    old_order = [name for name in before if name in after]
-    new_order = [name for name in after if name in before]
+    old_order = tuple(name for name in before if name in after)
+    new_order = tuple(name for name in after if name in before)
     if old_order != new_order:
-        found.append(change("order", section, old_order, new_order))
+        found.append(Change("order", section, old_order, new_order))
     return found
 
 
@@ -248,20 +241,15 @@ def _difference(
     old, new, unit = before.get(quantity), after.get(quantity), field.unit
     if field.padded and old is not None and new is not None:
         used = [i for values in (old, new) for i, value in enumerate(values) if value != 0.0]
-        count = max(used, default=0) + 1
-        old, new = old[:count], new[:count]
+        old, new = (values[: max(used, default=0) + 1] for values in (old, new))
     if isinstance(unit, tuple):
-        kinds = {"slide": unit[0], "hinge": unit[1], "ball": unit[1]}
-        unit = kinds.get(str(before["type"][0]), "")
+        unit = {"slide": unit[0], "free": ""}.get(str(before["type"][0]), unit[1])
     if unit == "deg":
-        old, new = (
-            None if values is None else tuple(math.degrees(float(value)) for value in values)
-            for values in (old, new)
-        )
-    return change(quantity, element, old, new, unit)
+        old, new = (v and tuple(math.degrees(float(each)) for each in v) for v in (old, new))
+    return Change(quantity, element, old, new, unit)
 
 
-def _scales(*sections: dict[str, dict[str, Values]]) -> dict[str, float]:
+def _scales(*sections: _Elements) -> dict[str, float]:
     """Return the largest finite number of each field over the elements of some sections."""
     found: dict[str, float] = {}
     for section in sections:
@@ -273,8 +261,7 @@ def _scales(*sections: dict[str, dict[str, Values]]) -> dict[str, float]:
 
 def _largest(values: Iterable[float | str]) -> float:
     """Return the largest magnitude of the finite numbers; 0 without any."""
-    numbers = [abs(v) for v in values if not isinstance(v, str) and math.isfinite(v)]
-    return max(numbers, default=0.0)
+    return max((abs(float(value)) for value in values if _is_finite(value)), default=0.0)
 
 
 def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> bool:
@@ -282,14 +269,13 @@ def _equal(before: Values | None, after: Values | None, scale: float = 0.0) -> b
     if before == after or before is None or after is None or len(before) != len(after):
         return before == after
     limit = max(ROUNDING * _largest((*before, *after)), _NOISE * scale)
-    for old, new in zip(before, after, strict=True):
+
+    def near(old: float | str, new: float | str) -> bool:
         if isinstance(old, str) or isinstance(new, str):
-            near = old == new
-        else:
-            near = old == new or abs(old - new) <= limit or (math.isnan(old) and math.isnan(new))
-        if not near:
-            return False
-    return True
+            return old == new
+        return old == new or abs(old - new) <= limit or (math.isnan(old) and math.isnan(new))
+
+    return all(map(near, before, after))
 
 
 def fingerprint(model: mujoco.MjModel) -> str:
@@ -324,25 +310,21 @@ def _rounded(values: Values, scale: float) -> Values:
     )
 
 
-class ModelNumbers:
-    """Fingerprints and differences of MuJoCo models, for `shapechanger.identity`."""
+def read_numbers(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
+    """Return the fingerprints of the motion and of other numbers, and all as MessagePack."""
+    moved, sensed = moved_numbers(model), sensed_numbers(model, drawn=drawn)
+    return _digest_of(moved), _digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
 
-    @staticmethod
-    def read(model: mujoco.MjModel, *, drawn: bool) -> tuple[str, str, bytes]:
-        """Return the fingerprints of the motion and of other numbers, and all as MessagePack."""
-        moved, sensed = moved_numbers(model), sensed_numbers(model, drawn=drawn)
-        return _digest_of(moved), _digest_of(sensed), msgspec.msgpack.encode([moved, sensed])
 
-    @staticmethod
-    def changes(old: bytes, new: bytes) -> tuple[str, ...]:
-        """Return the differences in words between the numbers of two models.
+def changed_numbers(old: bytes, new: bytes) -> tuple[str, ...]:
+    """Return the differences in words between the numbers of two models, see `read_numbers`.
 
-        Raises:
-            msgspec.MsgspecError: If they are not such numbers.
-        """
-        (moved, sensed), (new_moved, new_sensed) = (
-            msgspec.msgpack.decode(each, type=tuple[Numbers, Numbers]) for each in (old, new)
-        )
-        # A geom that moves differently also lies differently.
-        found = differences(moved, new_moved) or differences(sensed, new_sensed)
-        return tuple(item.sentence for item in grouped(found))
+    Raises:
+        msgspec.MsgspecError: If they are not such numbers.
+    """
+    (moved, sensed), (new_moved, new_sensed) = (
+        msgspec.msgpack.decode(each, type=tuple[Numbers, Numbers]) for each in (old, new)
+    )
+    # A geom that moves differently also lies differently.
+    found = differences(moved, new_moved) or differences(sensed, new_sensed)
+    return tuple(item.sentence for item in grouped(found))

@@ -1,4 +1,9 @@
-"""Numbers of a compiled model, read by the table of `fields`, and its contacts.
+"""Numbers of a compiled model, read by the table `fields.toml`, and its contacts.
+
+An array whose condition does not hold for an element has no effect on it and is left out, and so
+are elements that do nothing: geoms that neither touch nor guide a tendon, sites that nothing names,
+and bodies that carry nothing but those. Joints and actuators stand in the order of the model, which
+decides what the numbers of its state and its control mean; all else is sorted by name.
 
 A geom's friction alone decides nothing: the contact takes the larger of the two geoms'
 coefficients, so a slippery foot on a rough floor is a rough foot. `contact_arrays` follows the
@@ -17,33 +22,153 @@ Measured, and easy to get wrong:
 from __future__ import annotations
 
 import hashlib
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.morphology.certificate.fields import (
-    MOVED,
-    SENSED,
-    TABLE,
-    Field,
-    Numbers,
-    Values,
-    kinds_of,
-    made_arrays,
-)
 from shapechanger.morphology.spec import unique_namer
+
+Values = tuple[float | str, ...]
+Numbers = dict[str, dict[str, dict[str, Values]]]
+"""Numbers and words by section, element and quantity; SI units, angles in rad."""
 
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]
+_O: Final = mujoco.mjtObj
+_J: Final = mujoco.mjtJoint
+_T: Final = mujoco.mjtTrn
+_W: Final = mujoco.mjtWrap
 _DISABLE: Final = mujoco.mjtDisableBit
+_ENABLE: Final = mujoco.mjtEnableBit
 
 # For each contact dimension how many of (slide, slide, spin, roll, roll) act.
 _FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
 _SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
 _FLAT: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+# Switches that decide what is computed besides the motion, and those that contacts and limits have
+# already taken into account.
+_QUIET: Final = {
+    *("sensor", "midphase", "energy", "fwdinv"),
+    *("contact", "filterparent", "refsafe", "override"),
+}
+# Coordinates of a mesh are in single precision, and every machine rounds them in its own way.
+_STEPS: Final = 60_000.0
+
+
+class Field(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The array of a quantity; `fields.toml` explains its keys."""
+
+    array: str
+    unit: str | tuple[str, str] = ""
+    where: str = ""
+    of: str = ""
+    padded: bool = False
+
+
+TABLE: Final[dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("fields.toml").read_text(encoding="utf-8")
+)
+MOVED: Final = msgspec.convert(TABLE["moved"], dict[str, dict[str, Field]])
+"""Sections of what decides the motion; `derived` constants of `mujoco.mj_setConst` follow them."""
+SENSED: Final = {"places": MOVED["geoms"], "marks": MOVED["sites"]} | msgspec.convert(
+    TABLE["sensed"], dict[str, dict[str, Field]]
+)
+"""Sections of what an env or a task may read besides, the last two where frames are observed."""
+_IN_ORDER: Final = ("joints", "actuators", "sensors", "keyframes")
+
+KINDS: Final = {
+    "bodies": ("body", "body", _O.mjOBJ_BODY),
+    "joints": ("joint", "jnt", _O.mjOBJ_JOINT),
+    "geoms": ("geom", "geom", _O.mjOBJ_GEOM),
+    "sites": ("site", "site", _O.mjOBJ_SITE),
+    "tendons": ("tendon", "tendon", _O.mjOBJ_TENDON),
+    "actuators": ("actuator", "actuator", _O.mjOBJ_ACTUATOR),
+    "equalities": ("equality constraint", "eq", _O.mjOBJ_EQUALITY),
+    "flexes": ("flex", "flex", _O.mjOBJ_FLEX),
+    "sensors": ("sensor", "sensor", _O.mjOBJ_SENSOR),
+    "keyframes": ("keyframe", "key", _O.mjOBJ_KEY),
+    "custom": ("custom number", "numeric", _O.mjOBJ_NUMERIC),
+    "cameras": ("camera", "cam", _O.mjOBJ_CAMERA),
+}
+"""What elements with names are called, the first part of the names of their arrays, their type."""
+
+
+def kinds_of(m: mujoco.MjModel) -> dict[str, list[str]]:
+    """Return the kinds of the elements that indices of several kinds are of; "" for none."""
+    targets = {_T.mjTRN_TENDON: "tendons", _T.mjTRN_BODY: "bodies", _T.mjTRN_SITE: "sites"}
+    targets[_T.mjTRN_SLIDERCRANK] = "sites"
+    wrapped = {_W.mjWRAP_JOINT: "joints", _W.mjWRAP_SITE: "sites", _W.mjWRAP_PULLEY: ""}
+    tied = {mujoco.mjtEq.mjEQ_JOINT: "joints", mujoco.mjtEq.mjEQ_TENDON: "tendons"}
+    by_type = {kind.value: name for name, (_, _, kind) in KINDS.items()}
+    by_type[_O.mjOBJ_XBODY.value] = "bodies"
+    ends = zip(m.actuator_trntype.tolist(), m.actuator_trnid[:, 1].tolist(), strict=True)
+    ties = zip(m.eq_type.tolist(), m.eq_objtype.tolist(), strict=True)
+    return {
+        # `so3` drives a ball joint, or a site with its reference site.
+        "actuator_target_kinds": [
+            "sites" if kind == _T.mjTRN_SO3 and end >= 0 else targets.get(_T(kind), "joints")
+            for kind, end in ends
+        ],
+        "wrap_kinds": [wrapped.get(_W(kind), "geoms") for kind in m.wrap_type.tolist()],
+        "eq_kinds": [
+            tied.get(mujoco.mjtEq(kind)) or by_type.get(on, "flexes") for kind, on in ties
+        ],
+        "sensor_object_kinds": [by_type.get(kind, "") for kind in m.sensor_objtype.tolist()],
+        "sensor_reference_kinds": [by_type.get(kind, "") for kind in m.sensor_reftype.tolist()],
+    }
+
+
+def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
+    """Return the arrays of the table that MuJoCo does not have, but for contacts."""
+    option, moves, free = m.opt, m.body_treeid >= 0, m.jnt_type == _J.mjJNT_FREE
+    medium = option.density > 0.0 or option.viscosity > 0.0
+    wraps = np.isin(m.wrap_type, [_W.mjWRAP_SPHERE.value, _W.mjWRAP_CYLINDER.value])
+    sites = [_T.mjTRN_SITE.value, _T.mjTRN_SLIDERCRANK.value, _T.mjTRN_SO3.value]
+    found: dict[str, Any] = {
+        "opt_medium": np.array([medium]),
+        "opt_sleeps": np.array([bool(option.enableflags & _ENABLE.mjENBL_SLEEP)]),
+        "body_moves": moves,
+        # A free body starts from the `qpos0` of its joint.
+        "body_placed": ~np.isin(np.arange(m.nbody), m.jnt_bodyid[free]),
+        "body_floats": moves & (m.body_gravcomp != 0.0) & m.flg_gravcomp,
+        "body_mocap": m.body_mocapid >= 0,
+        "jnt_anchored": ~free,
+        "jnt_one_way": np.isin(m.jnt_type, [_J.mjJNT_SLIDE.value, _J.mjJNT_HINGE.value]),
+        "jnt_bounded": (m.jnt_limited != 0) & ~free,
+        # A plane's size is drawn, but has no effect on collisions.
+        "geom_sized": m.geom_type != mujoco.mjtGeom.mjGEOM_PLANE,
+        "geom_shape": [_shape(m, geom) for geom in range(m.ngeom)],
+        # A fluid pushes on these by the ellipsoid model.
+        "geom_in_fluid": (m.geom_fluid[:, 0] > 0.0) & medium,
+        "wrap_side": np.where(wraps, m.wrap_prm, -1.0).astype(np.int64),
+        "wrap_coefficient": np.where(wraps, 0.0, m.wrap_prm),
+        "actuator_trnid0": m.actuator_trnid[:, 0],
+        "actuator_trnid1": m.actuator_trnid[:, 1],
+        "actuator_has_sites": np.isin(m.actuator_trntype, sites),
+        "actuator_is_crank": m.actuator_trntype == _T.mjTRN_SLIDERCRANK,
+        "actuator_is_muscle": m.actuator_gaintype == mujoco.mjtGain.mjGAIN_MUSCLE,
+        # Their joint or tendon knows of their damping and armature.
+        "actuator_added": np.isin(
+            np.arange(m.nactuator), np.concatenate([m.jnt_actuatorid, m.tendon_actuatorid])
+        ),
+    }
+    for of in ("jnt", "tendon"):
+        springy = getattr(m, f"{of}_stiffness") != 0.0
+        found[f"{of}_springy"] = springy | getattr(m, f"{of}_stiffnesspoly").any(axis=1)
+    for name, prefix, bits, switches in (
+        ("opt_switched_off", "mjDSBL_", option.disableflags, _DISABLE.__members__),
+        ("opt_switched_on", "mjENBL_", option.enableflags, _ENABLE.__members__),
+    ):
+        on = [key for key, bit in switches.items() if bits & bit.value and key.startswith(prefix)]
+        words = [key.removeprefix(prefix).lower() for key in on]
+        found[name] = np.array([[word for word in words if word not in _QUIET]], np.str_)
+    return found | kinds_of(m)
 
 
 def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
@@ -182,12 +307,12 @@ def moved_numbers(model: mujoco.MjModel) -> Numbers:
     found["contacts"] = dict(sorted(zip(contacts, rows, strict=True)))
     found["whole"] = {
         name: {"type": (_digest(*(reader.array(array) for array in arrays)),)}
-        for name, (count, *arrays) in TABLE.whole.items()
-        if getattr(model, count)
+        for name, (condition, *arrays) in TABLE["whole"].items()
+        if np.any(reader.array(condition))
     }
     found["derived"] = {
         name: {"values": _plain(getattr(model, name)[reader.kept[mask] if mask else slice(None)])}
-        for name, mask in TABLE.derived.items()
+        for name, mask in TABLE["derived"].items()
     }
     found["derived"]["meaninertia"] = {"values": (float(model.stat.meaninertia),)}
     return found
@@ -198,7 +323,7 @@ def sensed_numbers(model: mujoco.MjModel, *, drawn: bool) -> Numbers:
     reader = _Reader(model)
     found = {section: reader.section(section) for section in (SENSED if drawn else [*SENSED][:-2])}
     if drawn:
-        digests = {name: _digest(getattr(model, name)) for name in TABLE.drawn}
+        digests = {name: _digest(getattr(model, name)) for name in TABLE["drawn"]}
         found["drawing"] = {name: {"digest": (digest,)} for name, digest in digests.items()}
     return found
 
@@ -209,7 +334,6 @@ class _Reader:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._made: dict[str, Any] = contact_arrays(model) | made_arrays(model)
-        self._made["geom_shape"] = [_shape(model, geom) for geom in range(model.ngeom)]
         self.names = names_of(model)
         self.kept = self._relevant()
 
@@ -219,25 +343,17 @@ class _Reader:
         rows = self.rows((MOVED | SENSED)[section], len(names))
         kept = self.kept.get(section, [True] * len(names))
         found = {name: row for name, row, keep in zip(names, rows, kept, strict=True) if keep}
-        return found if section in TABLE.in_order else dict(sorted(found.items()))
+        return found if section in _IN_ORDER else dict(sorted(found.items()))
 
     def rows(self, fields: dict[str, Field], count: int) -> list[dict[str, Values]]:
         """Return the quantities of each of so many elements."""
         rows: list[dict[str, Values]] = [{} for _ in range(count)]
         for quantity, field in fields.items() if count else ():
-            parts = self._split(field.array, self._values(field))
-            acts = (
-                self._split(field.where, self.array(field.where)) if field.where else [True] * count
-            )
-            for row, values, acting in zip(rows, parts, acts, strict=True):
-                if np.any(acting):
-                    row[quantity] = _plain(values)
+            acts = field.where and self._split(field.where, self.array(field.where))
+            for i, values in enumerate(self._split(field.array, self._values(field))):
+                if not acts or np.any(acts[i]):
+                    rows[i][quantity] = _plain(values)
         return rows
-
-    def _split(self, array: str, values: Any) -> list[Any]:
-        """Return the rows of an array that belong to each element."""
-        first = "jnt_dofadr" if array.startswith("dof_") else TABLE.first_rows.get(array, "")
-        return np.split(values, getattr(self._model, first)[1:]) if first else list(values)
 
     def array(self, name: str) -> Any:
         """Return an array of the table; of the options, with one row."""
@@ -248,6 +364,11 @@ class _Reader:
         values = getattr(self._model, name)
         return np.frombuffer(bytes(values), np.uint8) if name == "plugin_attr" else values
 
+    def _split(self, array: str, values: Any) -> list[Any]:
+        """Return the rows of an array that belong to each element."""
+        first = "jnt_dofadr" if array.startswith("dof_") else TABLE["first_rows"].get(array, "")
+        return np.split(values, getattr(self._model, first)[1:]) if first else list(values)
+
     def _values(self, field: Field) -> Any:
         """Return an array with words for enumerations, and names for indices."""
         values = self.array(field.array)
@@ -255,9 +376,9 @@ class _Reader:
             members = [getattr(mujoco, field.of)(value) for value in values.ravel().tolist()]
             return np.array([member.name.partition("_")[2].lower() for member in members])
         if field.of:
-            pairs = zip(self._kinds(field), values.tolist(), strict=True)
-            words: list[str] = [
-                "" if i < 0 else self.names[kind][i] if kind else str(i) for kind, i in pairs
+            words = [
+                "" if i < 0 else self.names[kind][i] if kind else str(i)
+                for kind, i in self._indices(field)
             ]
             return np.array(words, np.str_)
         if field.array.endswith("quat") and not field.array.startswith("key_"):
@@ -268,10 +389,11 @@ class _Reader:
             return _safe_solref(self._model, values)
         return values
 
-    def _kinds(self, field: Field) -> list[str]:
-        """Return the kind of element that each index of an array is of."""
-        several = self._made.get(field.of)
-        return [field.of] * len(self.array(field.array)) if several is None else several
+    def _indices(self, field: Field) -> list[tuple[str, int]]:
+        """Return the kind and the index of each element that an array names."""
+        values: list[int] = self.array(field.array).tolist()
+        kinds: list[str] = self._made.get(field.of, [field.of] * len(values))
+        return list(zip(kinds, values, strict=True))
 
     def _relevant(self) -> dict[str, NDArray[np.bool_]]:
         """Return masks of the bodies, geoms and sites that take part in the motion."""
@@ -280,18 +402,20 @@ class _Reader:
         for section in ("actuators", "tendons", "equalities"):
             for field in MOVED[section].values():
                 if field.of and not field.of.startswith("mjt"):
-                    values = self.array(field.array)
-                    if field.where:  # The second number of a transmission may be no site.
-                        values = np.where(self.array(field.where), values, -1)
-                    for kind, index in zip(self._kinds(field), values.tolist(), strict=True):
-                        used[kind].add(index)
-        geoms = self._made["geom_in_fluid"] | np.isin(np.arange(model.ngeom), list(used["geoms"]))
+                    acts = self.array(field.where) if field.where else None
+                    for i, (kind, index) in enumerate(self._indices(field)):
+                        if acts is None or acts[i]:  # The second number may be no site.
+                            used[kind].add(index)
+        geoms, sites, bodies = (
+            np.isin(np.arange(len(self.names[kind])), list(used[kind]))
+            for kind in ("geoms", "sites", "bodies")
+        )
+        geoms |= self._made["geom_in_fluid"]
         geoms[self._made["contact_geoms"]] = True
         if model.nflex:  # Any geom that can touch may touch a flex.
             geoms |= (model.geom_contype | model.geom_conaffinity) != 0
-        sites = np.isin(np.arange(model.nsite), list(used["sites"]))
-        bodies = np.isin(np.arange(model.nbody), list(used["bodies"])) | (model.body_jntnum > 0)
-        bodies |= (moving & (model.body_mass > 0.0)) | (model.body_mocapid >= 0)
+        bodies |= (model.body_jntnum > 0) | (moving & (model.body_mass > 0.0))
+        bodies |= model.body_mocapid >= 0
         bodies[model.geom_bodyid[geoms]] = True
         bodies[model.site_bodyid[sites]] = True
         for child in range(model.nbody - 1, 0, -1):  # A child's index is above its parent's.
@@ -321,13 +445,9 @@ def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
 
     Elements without a name get one by the rule of `shapechanger.morphology.name_elements`.
     """
-    kinds = {name: kind for name, kind in TABLE.kinds.items() if kind.object}
     names = {
-        name: [
-            mujoco.mj_id2name(model, kind.type, i) or ""
-            for i in range(getattr(model, f"n{kind.prefix}"))
-        ]
-        for name, kind in kinds.items()
+        name: [mujoco.mj_id2name(model, kind, i) or "" for i in range(getattr(model, f"n{prefix}"))]
+        for name, (_, prefix, kind) in KINDS.items()
     }
     joints = list(zip(names["joints"], model.jnt_bodyid.tolist(), strict=True))
     first_joints = {body: name for name, body in reversed(joints) if name}
@@ -339,13 +459,13 @@ def names_of(model: mujoco.MjModel) -> dict[str, list[str]]:
             return first_joints.get(i) or f"{bodies[parents[i]]}_part"
         if section == "actuators":
             return names[target_kinds[i]][model.actuator_trnid[i, 0]]
-        kind = kinds[section]
-        owners = getattr(model, f"{kind.prefix}_bodyid", None)
-        title = kind.title.partition(" ")[0]
-        return title if owners is None else f"{bodies[owners[i]]}_{title}"
+        title, prefix, _ = KINDS[section]
+        owners = getattr(model, f"{prefix}_bodyid", None)
+        owner = "" if owners is None else f"{bodies[owners[i]]}_"
+        return owner + title.partition(" ")[0]
 
     # Actuators come last, because they are called as their targets are.
-    for section in (*(kind for kind in kinds if kind != "actuators"), "actuators"):
+    for section in (*(kind for kind in KINDS if kind != "actuators"), "actuators"):
         free = unique_namer(names[section])
         for i, name in enumerate(names[section]):
             names[section][i] = name or free(default(section, i))
@@ -358,10 +478,6 @@ def _plain(values: Any) -> Values:
     if array.dtype.kind == "U":
         return tuple(word for word in array.ravel().tolist() if word or array.size > 1)
     return tuple((array.astype(np.float64) + 0.0).ravel().tolist())
-
-
-# Coordinates of a mesh are in single precision, and every machine rounds them in its own way.
-_STEPS: Final = 60_000.0
 
 
 def _digest(*arrays: NDArray[Any]) -> str:
