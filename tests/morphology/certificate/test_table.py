@@ -181,16 +181,6 @@ def test_whatever_a_number_is_made_of_counts(array: str) -> None:
     assert fingerprint(model) != fingerprint(everything())
 
 
-def test_the_mix_counts_where_there_is_something_to_mix() -> None:
-    """The weight of a geom's solver parameters is nothing between equal ones."""
-    equal, apart = everything(), everything()
-    apart.geom_solref[0, 0] *= 2.0
-    for model, counts in ((equal, False), (apart, True)):
-        nominal = fingerprint(model)
-        model.geom_solmix[0] *= 0.5
-        assert (fingerprint(model) != nominal) is counts
-
-
 def test_signs_of_zeros_and_of_quaternions_are_ignored() -> None:
     model = everything()
     nominal = moved_numbers(model)
@@ -375,22 +365,6 @@ def test_names_equal_those_of_name_elements(name: str) -> None:
     named = spec.compile()
     assert names_of(named) == names_of(asset(name))
     assert fingerprint(named) == fingerprint(asset(name))
-
-
-def test_names_that_repeat_are_numbered() -> None:
-    model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><body name='a'>"
-        "<joint/><joint axis='1 0 0'/><geom size='1'/><geom size='2'/>"
-        "<geom name='a_geom_2' size='1'/><site/>"
-        "<body><geom size='1'/></body><body/></body></worldbody>"
-        "<equality><connect body1='a' anchor='0 0 0'/></equality></mujoco>"
-    )
-    names = names_of(model)
-    assert names["bodies"] == ["world", "a", "a_part", "a_part_2"]
-    assert names["joints"] == ["a_joint", "a_joint_2"]
-    assert names["geoms"] == ["a_geom", "a_geom_3", "a_geom_2", "a_part_geom"]
-    assert names["sites"] == ["a_site"]
-    assert names["equalities"] == ["equality"]
 
 
 _PLAIN = """<mujoco>
