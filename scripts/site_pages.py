@@ -311,6 +311,7 @@ MODULES: Final = (
     "shapechanger.envs.runners",
     "shapechanger.finger.anatomy",
     "shapechanger.finger.parameters",
+    "shapechanger.finger.paths",
     "shapechanger.finger.reach",
     "shapechanger.finger.remote",
     "shapechanger.finger.track",

@@ -38,7 +38,7 @@ COVERING = tuple(
     for path in (
         *("test_architecture.py", "test_errors.py", "test_layout.py", "contract/test_drive.py"),
         *("envs/stepping/", "envs/vector/", "envs/test_own_tasks.py", "laws/", "morphology/"),
-        *("finger/identify/", "finger/paths/", "finger/task/"),
+        *("finger/identify/", "finger/test_paths.py", "finger/test_task.py"),
         *("robot/guard/", "robot/link/", "robot/profile/"),
         *("transfer/body_map/", "transfer/metrics/"),
     )

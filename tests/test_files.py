@@ -17,7 +17,7 @@ from shapechanger.files import (
     write_atomic,
     write_json,
 )
-from shapechanger.finger.paths.sources import from_csv
+from shapechanger.finger.paths import from_csv
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Remove, from_json, to_json
 from shapechanger.robot.profile.load import find_profile, load_profile

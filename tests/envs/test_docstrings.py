@@ -15,6 +15,7 @@ pytestmark = pytest.mark.sources  # The scripts.
 IDS = (
     *("InvertedPendulum", "InvertedDoublePendulum", "Ant", "ExtendedAnt", "HalfCheetah"),
     *("Hopper", "Walker2d", "Swimmer", "Humanoid", "Car", "CarRanges", "CarWaypoint"),
+    *("Finger", "FingerTrack"),
 )
 HEADINGS = (
     *("## Action space", "## Observation space", "## Reward", "## Start", "## End", "## Info"),

@@ -7,10 +7,17 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from shapechanger.finger.anatomy import JOINT_REST, JOINTS
+from shapechanger.finger.anatomy import (
+    JOINT_REST,
+    JOINTS,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+)
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
-from shapechanger.finger.tensions import DRIVES, drive_of
+from shapechanger.finger.postures import moving_torque
+from shapechanger.finger.tensions import drive_of, tensions_for_torque
 
 # With every imperfection of the model.
 STRETCHED = NOMINAL.replace(
@@ -18,9 +25,10 @@ STRETCHED = NOMINAL.replace(
 )
 
 
-def modes() -> list[str]:
-    """Return every action mode."""
-    return list(DRIVES)
+def can_hold(angles: np.ndarray) -> bool:
+    """Return whether feasible tensions hold the nominal finger at these angles, rad, (4,)."""
+    torque = moving_torque(angles, np.zeros(4), np.zeros(4))
+    return tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)[1]
 
 
 def made(

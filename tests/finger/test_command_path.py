@@ -15,7 +15,7 @@ from shapechanger.contract.limits import slewed as slewed_by_guard
 from shapechanger.contract.plan import ActionPlan
 from shapechanger.errors import FingerError, UnknownName
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
-from shapechanger.finger.plant import FingerPlant, slewed
+from shapechanger.finger.plant import FingerPlant, slewed, slews
 from shapechanger.finger.tensions import drive_of
 
 _RIG = NOMINAL.replace(tendon_stiffness=10e3, motor_kg=1.4, motor_lag=0.001)
@@ -107,7 +107,7 @@ def test_the_slew_is_the_guards(
         one_sided=True,
     )
     path = CommandPath(slew_per_s=up, slew_down_per_s=down)
-    ours = float(slewed(path, np.array([now]), np.array([aim]))[0])
+    ours = float(slewed(np.array([now]), np.array([aim]), *slews(path))[0])
     assert ours == pytest.approx(slewed_by_guard(action, now, aim, 0.01), abs=1e-12)
 
 
@@ -124,7 +124,7 @@ def test_a_path_survives_json() -> None:
         ({"slew_per_s": 0.0}, "slew_per_s of a path must be above zero and finite, got 0.0"),
         ({"control_hz": -1.0}, "control_hz of a path must be above zero"),
         ({"tick_hz": 75.0}, "tick_hz of a path must be a multiple of control_hz, got 75 and 50"),
-        ({"tension_step": -0.1}, "tension_step of a path must be zero or above"),
+        ({"tension_step": -0.1}, "tension_step of a path must be above zero"),
         ({"slew_per_s": "fast"}, "A command path is malformed: Expected"),
     ],
 )
@@ -132,10 +132,6 @@ def test_bad_values_are_refused(values: dict[str, Any], text: str) -> None:
     """The sentence names the value."""
     with pytest.raises(FingerError, match=text):
         NOMINAL.replace(path=values)
-
-
-def test_an_unknown_value_is_refused() -> None:
-    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'slew_per_s'"):
         NOMINAL.replace(path={"slew_pr_s": 2.0})
 

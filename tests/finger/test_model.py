@@ -21,8 +21,8 @@ from shapechanger.finger.gap import GAPS
 from shapechanger.finger.model import FINGERTIP, HOOD, SIM_DT
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.postures import draw_posture
-from shapechanger.finger.tensions import co_contraction, drive_of
-from tests.finger.commands import STRETCHED, at_rest, harsh_commands, made, modes
+from shapechanger.finger.tensions import DRIVES, co_contraction, drive_of
+from tests.finger.commands import STRETCHED, at_rest, harsh_commands, made
 
 # Tolerated overshoot of each joint beyond its range, degrees; measured 4.8, 1.6, 5.9 and 15.3
 # (the last phalanx weighs 3 g and hits its stop at 39 rad/s).
@@ -73,7 +73,7 @@ def test_torques_follow_from_moment_arms(tendon: str) -> None:
     np.testing.assert_allclose(np.delete(tensions, i), LEAST_TENSION_N)
 
 
-@pytest.mark.parametrize("mode", modes())
+@pytest.mark.parametrize("mode", DRIVES)
 @pytest.mark.parametrize("finger", ["nominal", "stretched", *GAPS])
 def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
     """Joints, velocities and tensions stay within their limits."""

@@ -27,32 +27,25 @@ def test_omitted_parameters_are_nominal() -> None:
     assert changed != NOMINAL
     assert FingerParameters(tendon_friction=1.0) == changed
     assert FingerParameters.from_json('{"tendon_friction": 1.0}') == changed
+    changed.arms[:] = 0.0  # A copy.
     np.testing.assert_array_equal(changed.arms, MOMENT_ARMS)
     assert not changed.gives
     assert STRETCHED.gives
 
 
-def test_arms_are_a_copy() -> None:
-    """Changing `arms` does not change the parameters."""
-    NOMINAL.arms[:] = 0.0
-    np.testing.assert_array_equal(NOMINAL.arms, MOMENT_ARMS)
-
-
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"moment_arms": ((1.0,) * 4,) * 6}, r"moment_arms: the shape must be \(7, 4\), got \(6"),
-        ({"most_tension": (25.0,)}, r"most_tension: the shape must be \(7,\), got \(1,\)."),
-        ({"joint_damping": (1.0,) * 3}, r"joint_damping: the shape must be \(4,\), got \(3,\)."),
-        ({"motor_lag": (1.0,)}, r"motor_lag: the shape must be \(\), got \(1,\)."),
-        ({"joint_noise": math.nan}, "joint_noise: the numbers must be finite, got nan."),
-        ({"tendon_stiffness": math.inf}, "tendon_stiffness: the numbers must be finite, got inf."),
-        ({"tendon_friction": -1.0}, "tendon_friction: the numbers must not be below zero, got -1"),
+        ({"moment_arms": ((1.0,) * 4,) * 6}, r"moment_arms must be of shape \(7, 4\), finite, got"),
+        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms must be of shape"),
+        ({"most_tension": (25.0,)}, r"most_tension must be of shape \(7,\)"),
+        ({"motor_lag": (1.0,)}, r"motor_lag must be of shape \(\)"),
+        ({"joint_noise": math.nan}, "joint_noise must be of shape .* finite and not below zero"),
+        ({"tendon_stiffness": math.inf}, "tendon_stiffness must be .* finite .* got inf"),
+        ({"tendon_friction": -1.0}, "tendon_friction must be .* not below zero, got -1"),
         ({"motor_lag": 0.0}, "motor_lag must be above zero, got 0.0."),
-        ({"motor_kg": 0.0}, "motor_kg must be above zero, got 0.0."),
-        ({"motor_kg": "x"}, "motor_kg must hold numbers, got 'x'."),
-        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms must hold numbers"),
-        ({"tendon_stiffness": 0.0}, "tendon_stiffness above zero."),
+        ({"motor_kg": "x"}, "motor_kg must be .*, got 'x'."),
+        ({"tendon_stiffness": 0.0}, "tendon_stiffness must be above zero"),
         ({"most_tension": (0.5,) * 7}, "most_tension must be above least_tension, 0.5 N"),
         ({"backlash": 1e-3}, "backlash needs a tendon_stiffness: a stiff tendon has none."),
     ],

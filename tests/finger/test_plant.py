@@ -1,14 +1,40 @@
-"""The simulated plant of a finger."""
+"""The simulated plant of a finger, and velocities from measured joint angles."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 
 from shapechanger.finger.anatomy import JOINT_REST
 from shapechanger.finger.parameters import NOMINAL
-from shapechanger.finger.plant import FingerPlant
+from shapechanger.finger.plant import FingerPlant, JointVelocities
 from shapechanger.finger.tensions import drive_of
+
+
+def test_velocities_have_a_lag_of_40_ms() -> None:
+    """The error of a constant speed shrinks by exp(-1/2) per period of 20 ms."""
+    velocities, angles = JointVelocities(), np.zeros(2)
+    found = []
+    for _ in range(4):
+        found.append(velocities.of(angles))
+        angles += (0.02, -0.04)  # A copy was taken.
+    left = [math.exp(-i / 2) for i in range(4)]
+    np.testing.assert_allclose(found, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
+    velocities.forget()
+    np.testing.assert_array_equal(velocities.of(np.array([9.0, 9.0])), np.zeros(2))
+
+
+def test_noisy_joints_have_filtered_velocities() -> None:
+    """Simulated fingers with joint noise use the filter of rigs."""
+    noisy = NOMINAL.replace(joint_noise=0.01)
+    plant = FingerPlant(noisy, drive_of("tension", noisy))
+    velocities, rng = JointVelocities(), np.random.default_rng(0)
+    senses = plant.place(JOINT_REST, rng)
+    for _ in range(5):
+        np.testing.assert_array_equal(senses.velocities, velocities.of(senses.angles))
+        senses = plant.act(np.full(7, -0.5), rng)
 
 
 def test_tensions_are_at_least_the_pretension() -> None:

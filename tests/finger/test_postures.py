@@ -1,29 +1,30 @@
-"""Postures for targets and starts."""
+"""Postures for targets and starts, and inverse kinematics."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
+import pytest
 
 from shapechanger.finger.anatomy import (
     DIP_BAND,
-    DIP_BY_PIP,
     JOINT_RANGE,
-    JOINT_REST,
     LEAST_TENSION_N,
     MOMENT_ARMS,
     MOST_TENSION_N,
+    PHALANX_LENGTH_M,
 )
 from shapechanger.finger.postures import (
+    angles_for,
     coupled,
     draw_posture,
     draw_start,
     inner_range,
     moving_torque,
 )
+from shapechanger.finger.task import fingertip
 from shapechanger.finger.tensions import tensions_for_torque
-from tests.finger.commands import made
-from tests.finger.holding import can_hold
+from tests.finger.commands import can_hold, made
 
 _STILL = np.zeros(4)
 _LOW, _HIGH = JOINT_RANGE.T
@@ -88,13 +89,62 @@ def test_moving_torque_gives_the_acceleration() -> None:
         np.testing.assert_allclose(data.qacc, acceleration, atol=1e-6)
 
 
-def test_nearly_every_posture_that_the_hood_allows_can_be_held() -> None:
-    """An end joint that is fully flexed alone cannot."""
+def _is_within(angles: np.ndarray) -> bool:
+    return bool(((angles >= _LOW) & (angles <= _HIGH)).all())
+
+
+def test_fingertips_of_balanced_postures_are_reached() -> None:
+    """Each point is reached within 0.01 mm, from the resting posture and from nearby ones."""
     rng = np.random.default_rng(0)
-    held = 0
-    for angles in rng.uniform(_LOW, _HIGH, (200, 4)):
-        angles[3] = DIP_BY_PIP * angles[2] + rng.uniform(-DIP_BAND, DIP_BAND)
-        held += can_hold(angles.clip(_LOW, _HIGH))
-    assert held >= 190
-    assert not can_hold(np.array([0.0, 0.0, 0.0, _HIGH[3]]))
-    assert not can_hold(JOINT_REST + np.array([20.0, 0.0, 0.0, 0.0]))
+    for _ in range(150):
+        posture = draw_posture(rng)
+        place = fingertip(posture)
+        near = np.clip(posture + rng.uniform(-0.2, 0.2, 4), _LOW, _HIGH)
+        for start in (None, near):
+            angles, off = angles_for(place, start)
+            assert _is_within(angles)
+            assert off < 1e-5
+            found = fingertip(angles)
+            assert off == pytest.approx(np.linalg.norm(place - found), abs=1e-12)
+
+
+def test_points_of_any_posture_are_reached() -> None:
+    """Fingertips of all postures within the joint limits are reached."""
+    rng = np.random.default_rng(1)
+    postures = rng.uniform(_LOW, _HIGH, (80, 4))
+    postures[::4] = np.where(rng.random((20, 4)) < 0.5, _LOW, _HIGH)
+    for posture in postures:
+        angles, off = angles_for(fingertip(posture))
+        assert _is_within(angles)
+        assert off < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("place", "least_mm"),
+    [
+        ((sum(PHALANX_LENGTH_M) + 0.001, 0.0, 0.0), 1.0),
+        ((0.5, 0.0, 0.0), 408.4),
+        ((0.05, 0.08, 0.0), 5.0),
+        ((-0.08, 0.0, 0.0), 5.0),
+        ((0.0, 0.0, 0.09), 100.0),
+    ],
+    ids=["just beyond", "far beyond", "to the side", "behind", "above"],
+)
+def test_the_error_of_unreachable_points_is_correct(
+    place: tuple[float, float, float], least_mm: float
+) -> None:
+    """The reported distance is the angles', and at least the true minimum."""
+    angles, off = angles_for(np.array(place))
+    assert _is_within(angles)
+    assert off == pytest.approx(np.linalg.norm(fingertip(angles) - place), abs=1e-12)
+    assert off >= 1e-3 * least_mm - 1e-9
+
+
+def test_angles_are_continuous() -> None:
+    """A displacement of 0.1 mm changes the angles by less than 3 degrees."""
+    rng = np.random.default_rng(1)
+    for _ in range(30):
+        posture = draw_posture(rng)
+        place = fingertip(posture)
+        angles, _ = angles_for(place + rng.uniform(-1e-4, 1e-4, 3), posture)
+        assert np.degrees(np.abs(angles - posture)).max() < 3.0

@@ -21,7 +21,7 @@ from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.postures import angles_for
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.task import fingertip
-from tests.finger.holding import can_hold
+from tests.finger.commands import can_hold
 
 _NOTHING = np.zeros(7, np.float32)
 _REST = JOINT_REST.tolist()

@@ -67,13 +67,11 @@ class FingerController:
         self._data = mujoco.MjData(self._model)
         # Fraction of a change of tension that a motor completes in one step.
         self._follows = 1.0 - math.exp(-CONTROL_DT / parameters.motor_lag)
-        names = layout.names
         # Indices of the parts of an observation that the controller uses.
-        self._angles, self._velocities, self._tensions = (
-            [i for i, name in enumerate(names) if name.endswith(end)]
-            for end in ("/angle", "/velocity", "/tension")
-        )
-        self._target = [names.index(f"target/{axis}") for axis in "xyz"]
+        self._angles = places_of(layout, JOINTS, "angle")
+        self._velocities = places_of(layout, JOINTS, "velocity")
+        self._tensions = places_of(layout, TENDONS, "tension")
+        self._target = [layout.names.index(f"target/{axis}") for axis in "xyz"]
         self._wanted: NDArray[np.float64] | None = None
 
     def reset(self) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import copy
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import msgspec
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
@@ -20,7 +21,7 @@ from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.gap import Gap, geared_around, require_balance, resolve_gap, with_gears
-from shapechanger.finger.model import FingerFigure
+from shapechanger.finger.model import TARGET, FingerFigure
 from shapechanger.finger.parameters import (
     NOMINAL,
     PARAMETER_SETS,
@@ -34,9 +35,6 @@ from shapechanger.finger.task import FingerSenses, FingertipReward
 from shapechanger.finger.tensions import drive_of
 from shapechanger.finger.visuals import tendon_legend
 from shapechanger.layout import Element, Feature, Layout
-
-if TYPE_CHECKING:
-    from gymnasium.envs.registration import EnvSpec
 
 _MODES: Final = ("human", "rgb_array", "depth_array")
 # From the thumb's side, with the workspace and the end of the hand in view.
@@ -128,20 +126,14 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if self._gap is None:
             self._use(as_finger(parameters))
         else:
-            chosen = check_seed(
-                0 if finger_seed is None else finger_seed,
-                FingerError,
-                "finger_seed must be",
-                largest=None,
-            )
-            self._use(self._gap.draw(np.random.default_rng(chosen)))
+            seed = 0 if finger_seed is None else finger_seed
+            seed = check_seed(seed, FingerError, "finger_seed must be", largest=None)
+            self._use(self._gap.draw(np.random.default_rng(seed)))
         self._senses: FingerSenses | None = None
         self._change = np.zeros(len(TENDONS))  # Of the command, in the newest step.
+        command = ("1", -1.0, 1.0)
         self.action_layout = Layout(
-            tuple(
-                Feature(f"{name}/command", "1", -1.0, 1.0, Element("tendon", name))
-                for name in TENDONS
-            )
+            tuple(Feature(f"{t}/command", *command, Element("tendon", t)) for t in TENDONS)
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (len(TENDONS),), np.float32)
 
@@ -155,10 +147,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
         """Draw the finger if each episode has another, and put it at a start."""
-        known = self._options
         for name in options or {}:
-            if name not in known:
-                raise UnknownName("option of reset", name, known)
+            if name not in self._options:
+                raise UnknownName("option of reset", name, self._options)
         if self._is_drawn_anew and self._gap is not None:
             self._use(self._gap.draw(self.np_random))
         given = (options or {}).get("posture")
@@ -310,7 +301,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             RenderError: If nothing can be drawn here.
         """
         figure = self._shown()
-        return draw(figure.without_target(), figure.data.qpos, width, height, reach or self.reach)
+        model = figure.model.__copy__()
+        model.geom_rgba[model.geom(TARGET).id, 3] = 0.0
+        return draw(model, figure.data.qpos, width, height, reach or self.reach)
 
     @property
     def individual(self) -> str:
@@ -356,9 +349,8 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
     """
     given: Any = NOMINAL if value is None else value
     if isinstance(given, str):
-        if not given.lstrip().startswith("{"):
-            return named_set(given)
-        given = FingerParameters.from_json(given)
+        is_json = given.lstrip().startswith("{")
+        given = FingerParameters.from_json(given) if is_json else named_set(given)
     elif isinstance(given, Mapping):
         named = cast("Mapping[str, Any]", given)
         known = FingerParameters.__struct_fields__

@@ -36,20 +36,26 @@ _UNITS: Final[Mapping[str, str]] = {
     "slew_down_per_s": "ranges per second",
     "tension_step": "N",
 }
-# Attributes of MJCF with the arrays of the compiled model that hold them exactly.
+# Attributes of MJCF elements with the arrays of the compiled model that hold them exactly. All
+# joints have one degree of freedom.
 _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
-    "jnt": {"range": "jnt_range"},
+    "joint": {
+        "range": "jnt_range",
+        "damping": "dof_damping",
+        "frictionloss": "dof_frictionloss",
+        "springref": "qpos_spring",
+    },
     "geom": {"size": "geom_size", "pos": "geom_pos", "quat": "geom_quat"},
     "site": {"pos": "site_pos"},
     "body": {"pos": "body_pos"},
-    "tendon": {
+    "fixed": {
         "stiffness": "tendon_stiffness",
         "damping": "tendon_damping",
         "frictionloss": "tendon_frictionloss",
         "armature": "tendon_armature",
         "springlength": "tendon_lengthspring",
     },
-    "actuator": {
+    "general": {
         "delay": "actuator_delay",
         "forcerange": "actuator_forcerange",
         "dynprm": "actuator_dynprm",
@@ -68,49 +74,29 @@ def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
     model: Any = spec.compile()
     # MuJoCo writes six digits, and leaves out the inertia of bodies without geoms.
     root = ElementTree.fromstring(spec.to_xml())
-    for joint in root.iter("joint"):
-        if name := joint.get("name"):
-            number = model.joint(name).id
-            dof, place = model.jnt_dofadr[number], model.jnt_qposadr[number]
-            _write(joint, "jnt", number, model)
-            for key, value in (
-                ("stiffness", [model.jnt_stiffness[number], *model.jnt_stiffnesspoly[number]]),
-                ("damping", model.dof_damping[dof]),
-                ("frictionloss", model.dof_frictionloss[dof]),
-                ("springref", model.qpos_spring[place]),
-            ):
-                if key in joint.attrib:
-                    joint.set(key, _text(value))
-    for kind in ("geom", "site", "body"):
-        for element in root.iter(kind):
-            if name := element.get("name"):
-                _write(element, kind, getattr(model, kind)(name).id, model)
-    for body in root.iter("body"):
-        if body.get("name", "").endswith("/motor"):
-            number = model.body(body.get("name")).id
-            inertial = ElementTree.Element("inertial", pos="0 0 0")
-            inertial.set("mass", _text(model.body_mass[number]))
-            inertial.set("diaginertia", _text(model.body_inertia[number]))
-            body.insert(0, inertial)
-    for fixed in root.iter("fixed"):
-        number = model.tendon(fixed.get("name")).id
-        _write(fixed, "tendon", number, model)
-        for i, wrapped in enumerate(fixed):
-            wrapped.set("coef", _text(model.wrap_prm[model.tendon_adr[number] + i]))
-    for motor in root.iter("general"):
-        _write(motor, "actuator", model.actuator(motor.get("name")).id, model)
+    for tag, exact in _EXACT.items():
+        find = getattr(model, {"fixed": "tendon", "general": "actuator"}.get(tag, tag))
+        for element in [one for one in root.iter(tag) if one.get("name")]:
+            number = find(element.get("name")).id
+            for key, array in exact.items():
+                if key in element.attrib:
+                    many = len(element.attrib[key].split())
+                    element.set(key, _text(np.ravel(getattr(model, array)[number])[:many]))
+            if tag == "joint" and "stiffness" in element.attrib:
+                rise = model.jnt_stiffnesspoly[number]
+                element.set("stiffness", _text([model.jnt_stiffness[number], *rise]))
+            elif tag == "body" and element.get("name", "").endswith("/motor"):
+                inertial = ElementTree.Element("inertial", pos="0 0 0")
+                inertial.set("mass", _text(model.body_mass[number]))
+                inertial.set("diaginertia", _text(model.body_inertia[number]))
+                element.insert(0, inertial)
+            elif tag == "fixed":
+                for i, wrapped in enumerate(element):
+                    wrapped.set("coef", _text(model.wrap_prm[model.tendon_adr[number] + i]))
     root.insert(0, ElementTree.Comment(_limits(parameters)))
     root.append(_custom(parameters))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _write(element: ElementTree.Element, kind: str, number: int, model: Any) -> None:
-    """Replace the numbers of an element by the compiled model's, as many as the element has."""
-    for key, array in _EXACT[kind].items():
-        if key in element.attrib:
-            many = len(element.attrib[key].split())
-            element.set(key, _text(np.ravel(getattr(model, array)[number])[:many]))
 
 
 def _text(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final, cast
 
 import msgspec
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, UnknownName
 from shapechanger.finger.anatomy import JOINTS
-from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters, converted
 from shapechanger.finger.tensions import spans_all_torques, tensions_for_torque
 
 # Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
@@ -77,9 +77,8 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def __post_init__(self) -> None:
         if not 0.0 <= self.arm_error < 1.0:
             raise FingerError(f"arm_error must be 0 to below 1, got {self.arm_error}.")
-        ranges = msgspec.structs.asdict(self)
-        del ranges["arm_error"], ranges["around"]
-        for name, value in ranges.items():
+        for name in self.__struct_fields__[1:-1]:
+            value = getattr(self, name)
             if not 0.0 <= value[0] <= value[1] < math.inf:
                 raise FingerError(f"{name}: the range {value} is empty, infinite or below zero.")
             if name in _LOGARITHMIC and not value[0] > 0.0:
@@ -91,30 +90,22 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         Raises:
             FingerError: If hardly any finger of the gap qualifies.
         """
-        arms = self._arms(rng)
+        values: dict[str, Any] = {"moment_arms": self._arms(rng)}
 
-        def joints(values: tuple[float, ...]) -> tuple[float, ...]:
-            return tuple(value * _log_uniform(rng, self.joint_factor) for value in values)
+        def drawn(name: str) -> float:
+            low, high = cast("Range", getattr(self, name))
+            if name in _LOGARITHMIC:
+                return math.exp(rng.uniform(math.log(low), math.log(high)))
+            return rng.uniform(low, high)
 
-        strength = rng.uniform(*self.strength)
-        return FingerParameters(
-            moment_arms=tuple(map(tuple, arms.tolist())),  # pyright: ignore[reportArgumentType]
-            most_tension=tuple(strength * most for most in self.around.most_tension),
-            joint_stiffness=joints(self.around.joint_stiffness),
-            joint_damping=joints(self.around.joint_damping),
-            joint_friction=joints(self.around.joint_friction),
-            tendon_friction=rng.uniform(*self.tendon_friction),
-            tendon_stiffness=_log_uniform(rng, self.tendon_stiffness),
-            backlash=rng.uniform(*self.backlash),
-            motor_kg=_log_uniform(rng, self.motor_kg),
-            motor_lag=rng.uniform(*self.motor_lag),
-            command_delay=rng.uniform(*self.command_delay),
-            joint_noise=rng.uniform(*self.joint_noise),
-            tension_noise=rng.uniform(*self.tension_noise),
-            tendon_damping=rng.uniform(*self.tendon_damping),
-            least_tension=rng.uniform(*self.least_tension),
-            path=self.around.path,
-        )
+        strength = drawn("strength")
+        values["most_tension"] = tuple(strength * most for most in self.around.most_tension)
+        for name in ("joint_stiffness", "joint_damping", "joint_friction"):
+            middle = getattr(self.around, name)
+            values[name] = tuple(value * drawn("joint_factor") for value in middle)
+        for name in self.__struct_fields__[3:-1]:
+            values[name] = drawn(name)
+        return FingerParameters(**values, path=self.around.path)
 
     def _arms(self, rng: np.random.Generator) -> NDArray[np.float64]:
         middle = self.around.arms
@@ -126,11 +117,6 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             f"With moment arms off by {self.arm_error:.0%}, hardly any finger's tendons can hold "
             "it: make arm_error smaller."
         )
-
-
-def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
-    low, high = (math.log(bound) for bound in bounds)
-    return math.exp(rng.uniform(low, high))
 
 
 _DEGREE: Final = math.radians(1.0)
@@ -242,12 +228,6 @@ def require_balance(parameters: FingerParameters) -> None:
     arms = parameters.arms
     if spans_all_torques(arms):
         return
-    for joint, own in zip(JOINTS, arms.T, strict=True):
-        for arm, way in ((own.max(), "positive"), (-own.min(), "negative")):
-            if arm <= 0.0:
-                raise FingerError(
-                    f"The tendons cannot balance {joint}: no moment arm there is {way}."
-                )
     for j, joint in enumerate(JOINTS):
         for sign, way in ((1.0, "positive"), (-1.0, "negative")):
             torque = sign * _BALANCE_NM * np.eye(len(JOINTS))[j]
@@ -272,8 +252,4 @@ def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
         if value not in GAPS:
             raise UnknownName("gap", value, GAPS)
         return GAPS[value]
-    try:
-        return msgspec.convert(value, Gap)
-    except msgspec.ValidationError as error:
-        said = str(error).rstrip(".")
-        raise FingerError(f"The ranges of a gap are malformed: {said}.") from error
+    return converted("The ranges of a gap are malformed", value, Gap)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import textwrap
 from abc import abstractmethod
 from functools import partial
 from typing import Any, Final, cast
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -28,7 +30,7 @@ from shapechanger.errors import VectorEnvError
 from shapechanger.finger.anatomy import DIP_BAND, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.env import SMOOTHNESS, FingerLike, as_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
-from shapechanger.finger.plant import CONTROL_DT, FingerPlant, slews, smoothed
+from shapechanger.finger.plant import CONTROL_DT, FingerPlant, shares, slewed, slews, smoothed
 from shapechanger.finger.postures import START_SPREAD, coupled, inner_range
 from shapechanger.finger.reach import HELD_STEPS, TOLERANCE_M, FingerReachEnv
 from shapechanger.finger.task import directions, tip_at
@@ -65,16 +67,17 @@ class DeviceFinger(DeviceTask):
         whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
         self._former = torch.as_tensor(self._former_places, dtype=torch.int64, device=device)
         drive = self._env.drive
-        arrays = {
-            name: torch.as_tensor(getattr(drive, name)) for name in ("offset", "gain", "rest")
+        arrays: dict[str, Any] = {
+            name: torch.as_tensor(getattr(drive, name)).to(device)
+            for name in ("offset", "gain", "rest")
         }
-        moved = {name: cast("Any", array.to(device)) for name, array in arrays.items()}
-        self._drive: Any = dataclasses.replace(drive, **moved)
+        self._drive: Any = dataclasses.replace(drive, **arrays)
         self._commands, self._change = zeros(count, _T), zeros(count, _T)
         self._shares = zeros(count, _T)  # Tensions on the path, of their ranges.
         self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
         self._senses = zeros(count, 2 * _J + 3 * _T)
         self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
+        self._ahead: Tensor | None = None  # Coming points of a path, m, (n, k, 3).
         self._seeds, self._episodes, self._steps = whole(), whole(), whole()
 
     @override
@@ -129,10 +132,10 @@ class DeviceFinger(DeviceTask):
             for _ in range(self._held.computations):
                 lengths, speeds = self._lengths(worlds)
                 tensions = self._drive.tension(self._commands, lengths, speeds)
-                aim = _share(constants, tensions)
+                aim = shares(tensions, constants["least"], constants["most"])
                 for _ in range(self._held.ticks):
-                    lowest = self._shares - constants["fall"]
-                    self._shares = aim.clip(lowest, self._shares + constants["rise"])
+                    slew = constants["rise"], constants["fall"]
+                    self._shares = slewed(self._shares, aim, *slew)
                     worlds.ctrl[:] = self._controls(constants)
                     worlds.simulate()
         self._steps += 1
@@ -141,18 +144,18 @@ class DeviceFinger(DeviceTask):
 
     def _controls(self, constants: dict[str, Tensor]) -> Tensor:
         """Return the controls of the present tensions on the path, as `HeldTensions` does."""
-        least, step = constants["least"], constants["step"]
-        tensions = least + self._shares * (constants["most"] - least)
-        rounded = _share(constants, torch.floor(tensions / step) * step)
+        least, most, step = constants["least"], constants["most"], constants["step"]
+        tensions = least + self._shares * (most - least)
+        rounded = shares(torch.floor(tensions / step) * step, least, most)
         return 2.0 * torch.where(step > 0.0, rounded, self._shares) - 1.0
 
     def _lengths(self, worlds: Worlds) -> tuple[Tensor, Tensor]:
         """Return lengths at the motors, m, and their rates, m/s, shape (n, 7) each."""
-        state = worlds.qpos.to(self.precision), worlds.qvel.to(self.precision)
+        qpos, qvel = worlds.qpos.to(self.precision), worlds.qvel.to(self.precision)
         if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
-            return -state[0][:, _J:], -state[1][:, _J:]
+            return -qpos[:, _J:], -qvel[:, _J:]
         arms = worlds.constants["arms"]
-        return -_turned(arms, state[0]), -_turned(arms, state[1])
+        return -_turned(arms, qpos), -_turned(arms, qvel)
 
     def _measure(self, worlds: Worlds, mask: Tensor | None) -> None:
         """Measure after a step, or where a mask is given after a start in some worlds."""
@@ -180,14 +183,11 @@ class DeviceFinger(DeviceTask):
         self._seen_tip = kept(self._seen_tip, _fingertip(angles))
         self._tip = kept(self._tip, _fingertip(true))
 
-    @property
-    def _points(self) -> Tensor:
-        """Points in the observation, of which the first is the target, m, shape (n, k, 3)."""
-        return self._target[:, None]
-
     @override
     def observations(self, worlds: Worlds) -> Tensor:
-        tip, points = self._seen_tip, self._points
+        tip = self._seen_tip
+        # Points of which the first is the target: (n, k, 3).
+        points = self._target[:, None] if self._ahead is None else self._ahead
         offsets = (points - tip[:, None]).flatten(1)
         return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(worlds.qpos.dtype)
 
@@ -200,12 +200,13 @@ class DeviceFinger(DeviceTask):
             self._change.square().mean(dim=1),
             CONTROL_DT,
         )
+        dtype = worlds.qpos.dtype
+        rewards = cast("Tensor", sum(terms.values())).to(dtype)
         terms[SMOOTHNESS.key] = 1.0 - 0.5 * self._change.abs().mean(dim=1)
-        plain = {name: term.to(worlds.qpos.dtype) for name, term in terms.items()}
-        rewards = sum(term for name, term in terms.items() if name != SMOOTHNESS.key)
+        infos = self.start_infos(worlds)
+        infos |= {name: term.to(dtype) for name, term in terms.items()}
         never = torch.zeros_like(self._steps, dtype=torch.bool)
-        infos = {**self.start_infos(worlds), **plain}
-        return DeviceOutcome(cast("Tensor", rewards).to(worlds.qpos.dtype), never, infos)
+        return DeviceOutcome(rewards, never, infos)
 
     @override
     def start_infos(self, worlds: Worlds) -> dict[str, Tensor]:
@@ -261,7 +262,6 @@ class DeviceTrack(DeviceFinger):
         super().attach(worlds)
         self._path, self._angles_there = self._env.path, self._env.start_angles
         self._times = np.zeros(worlds.count)
-        self._ahead = self._target[:, None].expand(-1, len(SEEN_S) - 1, -1).clone()
         self._squares = torch.zeros_like(self._target[:, 0])
 
     def _begin(self, mask: Tensor) -> Tensor:
@@ -291,10 +291,6 @@ class DeviceTrack(DeviceFinger):
         places = self._path.at(self._times[:, None] + SEEN_S)
         points = torch.as_tensor(places, dtype=self.precision, device=self._target.device)
         self._target, self._ahead = points[:, 0], points[:, 1:]
-
-    @property
-    def _points(self) -> Tensor:
-        return self._ahead
 
     @property
     def _rms(self) -> Tensor:
@@ -327,12 +323,6 @@ def _turned(arms: Tensor, angles: Tensor) -> Tensor:
     return torch.einsum("ntj,nj->nt", arms, angles[:, :_J])
 
 
-def _share(constants: dict[str, Tensor], tensions: Tensor) -> Tensor:
-    """Return tensions as shares of their ranges, 0 to 1, shape (n, 7)."""
-    least = constants["least"]
-    return ((tensions - least) / (constants["most"] - least)).clip(0.0, 1.0)
-
-
 def _fingertip(angles: Tensor) -> Tensor:
     """Return the fingertips of angles, rad, shape (n, 4), as m, shape (n, 3)."""
     turned = directions(angles)
@@ -342,7 +332,6 @@ def _fingertip(angles: Tensor) -> Tensor:
 
 # A delay this close to a whole number of simulation steps takes one more at some of them.
 _WHOLE: Final = 1e-6
-_LONGEST_NAME: Final = 60
 
 
 class FingerReader(BodyReader):
@@ -356,18 +345,17 @@ class FingerReader(BodyReader):
         self._env: Any = env.unwrapped
         self._task = FINGERS[type(self._env)]
         self.spec = env.spec
+        individual = self._env.individual
         if isinstance(env.observation_space, gym.spaces.Dict):
-            raise VectorEnvError(
-                "backend='warp' takes no goal: its observations are vectors, without goals."
-            )
-        if isinstance(self._env, FingerTrackEnv) and self._env.path_is_random:
+            raise VectorEnvError("backend='warp' takes no goal: its observations are vectors.")
+        if getattr(self._env, "path_is_random", False):
             raise VectorEnvError(
                 "backend='warp' takes no path='random': a reset draws no path; name one."
             )
-        if self._env.individual:
+        if individual:
             raise VectorEnvError(
-                f"backend='warp' takes a gap with a {self._env.individual} only: a reset draws no "
-                "finger by itself; hand drawn ones with bodies=[...] and options={'bodies': [...]}."
+                f"backend='warp' takes a gap with a {individual} only: a reset draws no finger by "
+                "itself; hand drawn ones with bodies=[...] and options={'bodies': [...]}."
             )
 
     @override
@@ -389,16 +377,15 @@ class FingerReader(BodyReader):
         found = device_body(_described(body), model, _numbers(plant))
         timestep = float(model.opt.timestep)
         rows = {**found.rows, "actuator_delay": np.full(model.nu, _device_delay(body, timestep))}
-        rhythm = (round(CONTROL_DT / timestep), 1, 1)
-        if held is not None:
-            rhythm = (held.steps, held.ticks, held.computations)
+        steps = round(CONTROL_DT / timestep)
+        rhythm = (steps, 1, 1) if held is None else (held.steps, held.ticks, held.computations)
         shared = {
-            "path": str(held is not None),
-            "steps of an action": str(rhythm),
-            "zeros of joint_noise": str(body.joint_noise > 0.0),
-            "zeros of tension_noise": str(body.tension_noise > 0.0),
+            "path": held is not None,
+            "steps of an action": rhythm,
+            "zeros of joint_noise": body.joint_noise > 0.0,
+            "zeros of tension_noise": body.tension_noise > 0.0,
         }
-        encoded = {name: text.encode() for name, text in shared.items()}
+        encoded = {name: str(value).encode() for name, value in shared.items()}
         found = found._replace(rows=rows, shared={**found.shared, **encoded})
         return found, self._task(env, plant, rhythm[0])
 
@@ -449,14 +436,9 @@ def _device_delay(parameters: FingerParameters, timestep: float) -> float:
 
 def _described(parameters: FingerParameters) -> str:
     """Describe how a finger differs from the nominal one, for messages."""
-    own = [
-        f"{name}={getattr(parameters, name)}"
-        for name in parameters.__struct_fields__
-        if getattr(parameters, name) != getattr(NOMINAL, name)
-    ]
-    text = ", ".join(own)
-    shortened = f"{text[:_LONGEST_NAME]}..." if len(text) > _LONGEST_NAME else text
-    return f"the finger with {shortened}" if own else "the nominal finger"
+    given, nominal = msgspec.structs.asdict(parameters), msgspec.structs.asdict(NOMINAL)
+    own = ", ".join(f"{name}={v}" for name, v in given.items() if v != nominal[name])
+    return f"the finger with {textwrap.shorten(own, 60)}" if own else "the nominal finger"
 
 
 for _env_class in FINGERS:

@@ -267,9 +267,3 @@ class FingerFigure:
         self.data.qpos[:] = angles
         self.data.mocap_pos[self._mark] = target
         mujoco.mj_forward(self.model, self.data)
-
-    def without_target(self) -> mujoco.MjModel:
-        """A copy of the model with an invisible target."""
-        model = self.model.__copy__()
-        model.geom_rgba[model.geom(TARGET).id, 3] = 0.0
-        return model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final, cast
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -38,6 +38,17 @@ def as_numbers(value: Any) -> NDArray[np.float64]:
         return np.empty(0)
 
 
+_T = TypeVar("_T")
+
+
+def converted(failure: str, value: Any, kind: type[_T]) -> _T:
+    """Convert builtin values to a struct; raise FingerError, which begins with `failure`."""
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise FingerError(f"{failure}: {str(error).rstrip('.')}.") from error
+
+
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the commands of a rig become tensions; names and units are its profile's.
 
@@ -67,14 +78,10 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     tension_step: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("control_hz", "tick_hz", "slew_per_s", "slew_down_per_s"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < math.inf:
+        for name, value in msgspec.structs.asdict(self).items():
+            is_step = name == "tension_step" and value == 0.0
+            if value is not None and not (is_step or 0.0 < value < math.inf):
                 raise FingerError(f"{name} of a path must be above zero and finite, got {value}.")
-        if not 0.0 <= self.tension_step < math.inf:
-            raise FingerError(
-                f"tension_step of a path must be zero or above and finite, got {self.tension_step}."
-            )
         ticks = self.tick_hz / self.control_hz
         if abs(ticks - round(ticks)) > _WHOLE * ticks:
             raise FingerError(
@@ -136,41 +143,32 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
             for name in cast("Mapping[str, Any]", path):
                 if name not in known:
                     raise UnknownName("parameter of a command path", str(name), known)
-            try:
-                path = msgspec.convert(path, CommandPath)
-            except msgspec.ValidationError as error:
-                reason = str(error).rstrip(".")
-                raise FingerError(f"A command path is malformed: {reason}.") from error
+            path = converted("A command path is malformed", path, CommandPath)
             msgspec.structs.force_setattr(self, "path", path)
         if self.tendon_stiffness is None:
             if self.backlash:
                 raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")
             numbers["tendon_stiffness"] = 1.0
         sizes = {"moment_arms": (len(TENDONS), len(JOINTS)), "most_tension": (len(TENDONS),)}
-        sizes |= dict.fromkeys(
-            ("joint_stiffness", "joint_damping", "joint_friction"), (len(JOINTS),)
-        )
+        joints = ("joint_stiffness", "joint_damping", "joint_friction")
+        sizes |= dict.fromkeys(joints, (len(JOINTS),))
         for name, value in numbers.items():
             given, shape = as_numbers(value), sizes.get(name, ())
-            if not given.size:
-                raise FingerError(f"{name} must hold numbers, got {value!r}.")
-            if given.shape != shape:
-                raise FingerError(f"{name}: the shape must be {shape}, got {given.shape}.")
-            if not np.isfinite(given).all():
-                raise FingerError(f"{name}: the numbers must be finite, got {value}.")
-            if name != "moment_arms" and given.min() < 0.0:
-                raise FingerError(f"{name}: the numbers must not be below zero, got {value}.")
+            least = -math.inf if name == "moment_arms" else 0.0
+            if given.shape != shape or not (np.isfinite(given) & (given >= least)).all():
+                signs = "" if name == "moment_arms" else " and not below zero"
+                raise FingerError(f"{name} must be of shape {shape}, finite{signs}, got {value!r}.")
             if shape:  # Tuples compare, and become JSON.
                 plain: list[Any] = given.tolist()
                 rows = plain if given.ndim == 1 else map(tuple, plain)
                 msgspec.structs.force_setattr(self, name, tuple(rows))
-        for name in ("motor_kg", "motor_lag"):
+        for name in ("motor_kg", "motor_lag", "tendon_stiffness"):
             if not numbers[name] > 0.0:
                 raise FingerError(f"{name} must be above zero, got {numbers[name]}.")
-        if not (min(self.most_tension) > self.least_tension and numbers["tendon_stiffness"] > 0.0):
+        if not min(self.most_tension) > self.least_tension:
             raise FingerError(
                 f"most_tension must be above least_tension, {self.least_tension} N, which keeps a "
-                "tendon from hanging slack, and tendon_stiffness above zero."
+                "tendon from hanging slack."
             )
 
     @property

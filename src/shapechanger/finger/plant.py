@@ -189,15 +189,16 @@ class HeldTensions:
                 f"second, got {path.tick_hz:g}."
             )
         self.ticks = round(path.tick_hz / path.control_hz)
-        self._path, self._drive = path, drive
+        self._rise, self._fall = slews(path)
+        self._step, self._drive = path.tension_step, drive
         self._arms, self._gives = parameters.arms, parameters.gives
         self._least = parameters.least_tension
-        self._range = np.array(parameters.most_tension) - self._least
-        self._now = np.zeros(len(self._range))
+        self._most = np.array(parameters.most_tension)
+        self._now = np.zeros(len(self._most))
 
     def start(self, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Start with these tensions, N, (7,), and return the controls that hold them, (7,)."""
-        self._now = self._share(tensions)
+        self._now = shares(tensions, self._least, self._most)
         return self._controls()
 
     def advance(
@@ -206,20 +207,18 @@ class HeldTensions:
         """Simulate one command, -1 to 1, (7,), in a model whose controls are tensions."""
         for _ in range(self.computations):
             length, speed = motor_lengths(self._gives, self._arms, data)
-            aim = self._share(self._drive.tension(command, length, speed))
+            tensions = self._drive.tension(command, length, speed)
+            aim = shares(tensions, self._least, self._most)
             for _ in range(self.ticks):
-                self._now = slewed(self._path, self._now, aim)
+                self._now = slewed(self._now, aim, self._rise, self._fall)
                 data.ctrl[:] = self._controls()
                 mujoco.mj_step(model, data, self.steps)
 
-    def _share(self, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.clip((tensions - self._least) / self._range, 0.0, 1.0)
-
     def _controls(self) -> NDArray[np.float64]:
         share = self._now
-        if self._path.tension_step > 0.0:
-            steps = np.floor((self._least + share * self._range) / self._path.tension_step)
-            share = self._share(steps * self._path.tension_step)
+        if self._step > 0.0:
+            steps = np.floor((self._least + share * (self._most - self._least)) / self._step)
+            share = shares(steps * self._step, self._least, self._most)
         return 2.0 * share - 1.0
 
 
@@ -235,18 +234,17 @@ def hold_controls(
             mujoco.mj_initCtrlHistory(model, data, i, None, samples)
 
 
-def slewed(
-    path: CommandPath, now: NDArray[np.float64], aim: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the next tick's shares of the ranges, as `contract.limits.slewed` does, (n,)."""
-    rise, fall = slews(path)
-    return np.clip(aim, now - fall, now + rise)
+def slewed(now: Any, aim: Any, rise: Any, fall: Any) -> Any:
+    """Return the next tick's shares of the ranges, as `contract.limits.slewed`; or tensors."""
+    return aim.clip(now - fall, now + rise)
+
+
+def shares(tensions: Any, least: Any, most: Any) -> Any:
+    """Return tensions, N, as shares of their ranges, 0 to 1, (..., 7); arrays or tensors."""
+    return ((tensions - least) / (most - least)).clip(0.0, 1.0)
 
 
 def slews(path: CommandPath) -> tuple[float, float]:
     """Return the largest rise and fall of a tension per tick, as shares of its range."""
-    rise, fall = (
-        math.inf if slew is None else slew / path.tick_hz
-        for slew in (path.slew_per_s, path.slew_down_per_s)
-    )
-    return rise, fall
+    rise, fall = path.slew_per_s or math.inf, path.slew_down_per_s or math.inf
+    return rise / path.tick_hz, fall / path.tick_hz

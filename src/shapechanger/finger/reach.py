@@ -27,37 +27,89 @@ HELD_STEPS: Final = 10
 class FingerReachEnv(FingerEnv):
     """Bring the fingertip to a random point that the nominal finger can reach, and keep it there.
 
+    The finger has four joints, and seven tendons that only pull: flexors, extensors and the small
+    muscles of the hand; `shapechanger.finger.anatomy` has its numbers and their sources. Tendons
+    pull several joints at once, so a posture needs most of them together.
+
     ## Action space
-    `Box(-1, 1, (7,), float32)`, one number per tendon: FDP, FDS, EIP, EDC, LUM, DI, PI. The
-    argument `actions` sets what they command: "impedance", a muscle whose pull grows with its
-    length; "tension"; or "length". An action lasts 0.02 s.
+    `Box(-1, 1, (7,), float32)`, one command per tendon, which acts for 0.02 s. The argument
+    `actions` sets its meaning: "impedance", a muscle whose pull grows with its length; "tension";
+    or "length".
+
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | `FDP/command` | -1  | 1   | 1    |
+    | 1   | `FDS/command` | -1  | 1   | 1    |
+    | 2   | `EIP/command` | -1  | 1   | 1    |
+    | 3   | `EDC/command` | -1  | 1   | 1    |
+    | 4   | `LUM/command` | -1  | 1   | 1    |
+    | 5   | `DI/command`  | -1  | 1   | 1    |
+    | 6   | `PI/command`  | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (38,), float64)`: angles (4), rad, and velocities (4), rad/s, of the joints;
-    tensions (7), N, lengths (7), m, and newest commands (7) of the tendons; fingertip (3) by those
-    angles, target (3), and the vector from fingertip to target (3), m. `observation_layout` names
-    each. With `goal=True` a Dict of `observation` (32, the same without the target),
-    `achieved_goal` (3) and `desired_goal` (3), for learners with hindsight.
+    `Box(-inf, inf, (38,), float64)`: angles and velocities of the joints; tensions, lengths beyond
+    the straight finger and newest commands of the tendons; the fingertip by those angles; the
+    target; and the vector from the fingertip to it. Places are in the finger's frame: x to the tip
+    of the straight finger, y to the thumb, z to the back of the hand.
+
+    | Num   | Observation           | Min      | Max    | Unit  |
+    | ----- | --------------------- | -------- | ------ | ----- |
+    | 0     | `MCP_flexion/angle`   | -0.3491  | 1.571  | rad   |
+    | 1     | `MCP_abduction/angle` | -0.3491  | 0.3491 | rad   |
+    | 2     | `PIP_flexion/angle`   | 0        | 1.833  | rad   |
+    | 3     | `DIP_flexion/angle`   | -0.08727 | 1.396  | rad   |
+    | 4-7   | `*/velocity`          | -inf     | inf    | rad/s |
+    | 8     | `FDP/tension`         | 0        | 25     | N     |
+    | 9     | `FDS/tension`         | 0        | 25     | N     |
+    | 10    | `EIP/tension`         | 0        | 7.056  | N     |
+    | 11    | `EDC/tension`         | 0        | 25     | N     |
+    | 12    | `LUM/tension`         | 0        | 6.48   | N     |
+    | 13    | `DI/tension`          | 0        | 25     | N     |
+    | 14    | `PI/tension`          | 0        | 25     | N     |
+    | 15-21 | `*/length`            | -inf     | inf    | m     |
+    | 22-28 | `*/command`           | -1       | 1      | 1     |
+    | 29    | `fingertip/x`         | -inf     | inf    | m     |
+    | 30    | `fingertip/y`         | -inf     | inf    | m     |
+    | 31    | `fingertip/z`         | -inf     | inf    | m     |
+    | 32    | `target/x`            | -inf     | inf    | m     |
+    | 33    | `target/y`            | -inf     | inf    | m     |
+    | 34    | `target/z`            | -inf     | inf    | m     |
+    | 35    | `target/dx`           | -inf     | inf    | m     |
+    | 36    | `target/dy`           | -inf     | inf    | m     |
+    | 37    | `target/dz`           | -inf     | inf    | m     |
+
+    With `goal=True` a Dict of `observation` (32, the same without the target), `achieved_goal` (3)
+    and `desired_goal` (3), for learners with hindsight.
 
     ## Reward
-    `FingertipReward`: nearness to the target minus effort, and minus the change of the commands
-    where `reward={"change": 5.0}` or so gives it a weight. With `goal=True` it is -1 where the
-    measured fingertip is farther than 5 mm from the target and 0 elsewhere, like
-    `compute_reward`.
+    The sum of three terms, with the distance d of the true fingertip from the target, m, and
+    dt = 0.02 s; `reward` replaces the weights 50, 1 and 0 of `FingertipReward`:
+
+    ```text
+    reward_nearness =  50 dt (0.5 / (1 + d / 0.020 m) + 0.5 / (1 + d / 0.002 m))
+    reward_effort   =  -1 dt mean over the tendons of (tension / largest tension)²
+    reward_change   =  -0 dt mean over the tendons of (change of the command)²
+    ```
+
+    With `goal=True` it is -1 where the measured fingertip is farther than 5 mm from the target and
+    0 elsewhere, like `compute_reward`.
 
     ## Start
-    At rest, near the posture of a hand at rest. The target is the fingertip of a random posture
-    that the nominal finger can hold, at least a tenth of its range away from each limit. A weaker
-    finger of a gap may not come to all of them.
+    At rest, within 0.1 rad of the posture of a hand at rest, all tendons just taut. The target is
+    the fingertip of a random posture that the nominal finger can hold, at least a tenth of its
+    range away from each limit. A weaker finger of a gap may not come to all of them.
 
     ## End
-    Never terminated; truncated after 100 steps, 2 s.
+    Never terminated. Truncated after 100 steps, 2 s.
 
     ## Info
     `is_success`, whether the fingertip has been within 5 mm for the last 0.2 s; `distance`, m, of
     the true fingertip; `target`, m; `smoothness`, 1 minus the mean change of the commands over
     their range; `reward_nearness`, `reward_effort` and `reward_change` (with `goal=True`
     `reward_goal`); `diverged` where the simulation diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         goal: Whether observations are Dicts with goals.

@@ -22,7 +22,7 @@ from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameter
 from shapechanger.finger.paths import PathSource
 from shapechanger.finger.plant import CONTROL_DT
 from shapechanger.finger.reach import FingerReachEnv
-from shapechanger.finger.rig import LengthApproach, RigSenses, StartApproach
+from shapechanger.finger.rig import RigSenses, StartApproach
 from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
 from shapechanger.robot.client.env import RemoteVehicleEnv
@@ -34,12 +34,6 @@ from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""
 
-_RIG: Final = "finger"  # Name of the shipped profile.
-_WITHOUT_A_RIG: Final = (
-    'Without a rig, give twin="real-like": the env then serves a simulated one itself.'
-)
-
-
 # Tolerance of the start posture, rad, and time limit, s. If gears stick, the episode begins where
 # the finger is.
 _START_OFF_RAD: Final = 0.03
@@ -50,6 +44,8 @@ _TIMEOUT_S: Final = 2.0
 _OWN_TIMEOUT_S: Final = 30.0
 # Prefixes of infos that concern driving only.
 _DRIVING: Final = ("reward", "frame", "captured_ns")
+# Arguments that a simulated finger has, too.
+_SHARED: Final = ("reward", "render_mode", "width", "height")
 
 
 class RigMixin(FingerEnv):
@@ -72,12 +68,9 @@ class RigMixin(FingerEnv):
         timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
             its own twin, whose clock waits for a busy machine.
         actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
-        reward: Weights that replace the default ones, keyed by name.
-        render_mode: "human", "rgb_array" or "depth_array": the finger as measured.
-        width: Width of frames, pixels.
-        height: Height of frames, pixels.
-        **access: More arguments of `RemoteVehicleEnv`: `key` and `fingerprint`, for an address;
-            `on_reset`, `on_waiting` and `reset_timeout_s`.
+        **more: `reward`, `render_mode` (of the finger as measured), `width` and `height` of
+            `FingerEnv`; `key` and `fingerprint`, for an address, `on_reset`, `on_waiting` and
+            `reset_timeout_s` of `RemoteVehicleEnv`.
 
     Raises:
         UnknownName: If no rig of this name is known, or there is no such mode of action or weight.
@@ -100,20 +93,10 @@ class RigMixin(FingerEnv):
         twin_folder: str = "",
         timeout_s: float | None = None,
         actions: str = "impedance",
-        reward: Mapping[str, float] | None = None,
-        render_mode: str | None = None,
-        width: int = 480,
-        height: int = 480,
-        **access: Any,
+        **more: Any,
     ) -> None:
-        super().__init__(
-            **task,
-            actions=actions,
-            reward=reward,
-            render_mode=render_mode,
-            width=width,
-            height=height,
-        )
+        own = {name: more.pop(name) for name in _SHARED if name in more}
+        super().__init__(**task, actions=actions, **own)
         self._twin, self._finger_seed, self._seed = twin, finger_seed, None
         self._truth: dict[str, NDArray[np.float64]] = {}
         self._rig_info: dict[str, Any] = {}
@@ -125,7 +108,7 @@ class RigMixin(FingerEnv):
                 self._own = opened.enter_context(closing(serve_twin(twin, finger_seed)))
                 known = self._own.known
                 robot = known.address
-                access |= {"key": known.key, "fingerprint": known.fingerprint}
+                more |= {"key": known.key, "fingerprint": known.fingerprint}
                 twin_folder = str(self._own.folder)
             connect = partial(
                 RemoteVehicleEnv,
@@ -133,7 +116,7 @@ class RigMixin(FingerEnv):
                 state=True,
                 image=False,
                 timeout_s=timeout_s or (_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S),
-                **access,
+                **more,
             )
             try:
                 rig = connect(pace=pace or "lockstep")
@@ -142,7 +125,8 @@ class RigMixin(FingerEnv):
                     rig = connect(pace="realtime")
             except UnknownName as error:
                 if error.kind == KNOWN_ROBOT:
-                    raise UnknownName(error.kind, error.name, error.known, _WITHOUT_A_RIG) from None
+                    hint = 'Without a rig, give twin="real-like": the env then serves one itself.'
+                    raise UnknownName(error.kind, error.name, error.known, hint) from None
                 raise
             self._rig = opened.enter_context(closing(rig))
             name = rig.welcome.robot
@@ -210,23 +194,19 @@ class RigMixin(FingerEnv):
     def motors(self) -> FingerParameters:
         """The nominal finger with the rig's range of tensions and path, on geared servos."""
         rig, welcome = self._rig_senses, self._rig.welcome
-        # The slowest of its servos stands for all.
-        slews = [
+        # Uses the slowest servo's slew rates.
+        up, down = (
             min((slew for slew in given if slew > 0.0), default=None)
             for given in (welcome.slew_per_s, welcome.slew_down_per_s)
-        ]
-        return with_gears(
-            NOMINAL.replace(
-                most_tension=tuple(rig.most.tolist()),
-                least_tension=float(rig.least.max()),
-                path=CommandPath(
-                    control_hz=welcome.control_hz,
-                    tick_hz=welcome.tick_hz,
-                    slew_per_s=slews[0],
-                    slew_down_per_s=slews[1],
-                ),
-            )
         )
+        path = CommandPath(
+            control_hz=welcome.control_hz,
+            tick_hz=welcome.tick_hz,
+            slew_per_s=up,
+            slew_down_per_s=down,
+        )
+        most, least = tuple(rig.most.tolist()), float(rig.least.max())
+        return with_gears(NOMINAL.replace(most_tension=most, least_tension=least, path=path))
 
     def _start_at(self, angles: NDArray[np.float64]) -> FingerSenses:
         """Arm the rig, and bring the finger to its start."""
@@ -241,14 +221,11 @@ class RigMixin(FingerEnv):
             senses = self._on_the_way(rig.values(rig.least))
         if misfit := rig.misfit(senses):
             raise RobotRefused(misfit)
-        way, by_length = StartApproach(angles, rig.least, rig.most), LengthApproach(angles)
+        way = StartApproach(angles, rig)
         for _ in range(round(_START_S / CONTROL_DT)):
             if way.off(senses) < _START_OFF_RAD:
                 break
-            if rig.controls_length:
-                senses = self._on_the_way(rig.length_values(by_length.lengths(senses)))
-            else:
-                senses = self._on_the_way(rig.values(way.tensions(senses)))
+            senses = self._on_the_way(way.values(senses))
         # The simulation also starts with the command for the present tensions.
         tensions = np.clip(senses.tensions, rig.least, rig.most)
         command = self.drive.command(tensions, senses.lengths, rig.speeds)
@@ -261,7 +238,7 @@ class RigMixin(FingerEnv):
         rig = self._rig_senses
         if rig.controls_length:
             # The length at which the drive pulls with nothing but the least tension.
-            still = self.drive.tension(command, np.zeros(len(command)), np.zeros(len(command)))
+            still = self.drive.tension(command, np.zeros(len(TENDONS)), np.zeros(len(TENDONS)))
             return self._send(rig.length_values((rig.least - still) / self.drive.stiffness))
         lengths = cast("FingerSenses", self._senses).lengths
         return self._send(rig.values(self.drive.tension(command, lengths, rig.speeds)))
@@ -288,8 +265,7 @@ class RigMixin(FingerEnv):
                 "angles": np.array([truth[f"{name}/angle"] for name in JOINTS]),
             }
         data = self.plant.data
-        judged = self._own is not None
-        data.qpos[:] = self._truth["angles"] if judged else senses.angles
+        data.qpos[:] = senses.angles if self._own is None else self._truth["angles"]
         data.qvel[:] = senses.velocities
         mujoco.mj_kinematics(self.plant.model, data)
         data.actuator_force[:] = -senses.tensions
@@ -308,15 +284,21 @@ class RigMixin(FingerEnv):
 class RemoteFingerEnv(RigMixin, FingerReachEnv):
     """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
-    ## Action and observation space, reward
-    Equal to `Finger-v1`'s, with the same layouts, so a script runs on both by changing the id.
-    Actions are converted to tensions here, by the newest lengths and speeds of the tendons at the
-    servos. On a rig with encoders at its joints, as the shipped one, the angles are theirs, noise
-    included, and velocities are their differences over 20 ms, smoothed over 40 ms. Otherwise angles
-    and velocities follow from lengths and speeds with the nominal moment arms, and are as accurate
-    as these. The fingertip follows from the angles; so do the distance, the reward and
-    `info["is_success"]`. With its own twin (`twin`) these three use the true state, as in
-    `Finger-v1`, while observations remain measurements.
+    ## Action space
+    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, so a script runs on both by changing the
+    id. Commands are converted to tensions here, by the newest lengths and speeds of the tendons at
+    the servos; one acts for 0.02 s.
+
+    ## Observation space
+    `Box(-inf, inf, (38,), float64)`, the table of `Finger-v1`. On a rig with encoders at its
+    joints, as the shipped one, the angles are theirs, noise included, and velocities are their
+    differences over 20 ms, smoothed over 40 ms. Otherwise angles and velocities follow from lengths
+    and speeds with the nominal moment arms, and are as accurate as these. The fingertip follows
+    from the angles.
+
+    ## Reward
+    The formulas of `Finger-v1`. Distance, reward and `info["is_success"]` follow from the measured
+    angles; with its own twin (`twin`), from the true state.
 
     ## Start
     The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
@@ -332,6 +314,9 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
     As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
     `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
     `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
+
+    ## Versions
+    v1: the first.
 
     Args:
         robot: Name of a known rig, or its address; see `RigMixin`.
@@ -350,9 +335,15 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
 class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     """Follow a point that moves along a known path with a real finger, or its twin.
 
-    ## Action and observation space, reward
-    Equal to `FingerTrack-v1`'s, with the same layouts; they are converted and measured as in
+    ## Action space
+    `Box(-1, 1, (7,), float32)`, the table of `Finger-v1`, converted as in `RemoteFinger-v1`.
+
+    ## Observation space
+    `Box(-inf, inf, (47,), float64)`, the table of `FingerTrack-v1`, measured as in
     `RemoteFinger-v1`.
+
+    ## Reward
+    The formulas of `FingerTrack-v1`, on the state that `RemoteFinger-v1` uses.
 
     ## Start
     The finger is brought to the point of the path where `FingerTrack-v1` starts for the same seed,
@@ -363,6 +354,9 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
 
     ## Info
     As `FingerTrack-v1`, and the entries of a rig as in `RemoteFinger-v1`.
+
+    ## Versions
+    v1: the first.
 
     Args:
         robot: Name of a known rig, or its address; see `RigMixin`.
@@ -400,5 +394,5 @@ def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
     )
     drawn = ("--gap", twin, "--finger-seed", str(chosen))
     return run_robot(
-        find_profile(_RIG), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
+        find_profile("finger"), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
     )

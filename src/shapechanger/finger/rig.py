@@ -30,7 +30,6 @@ class RigSenses:
     and within the joints' ranges, and velocities follow from the speeds of the tendons.
 
     Attributes:
-        has_encoders: Whether it has encoders at all four joints.
         most: Largest tension of each tendon, N, (7,).
         least: Tension of each tendon at command 0, N, (7,).
         controls_length: Whether its commands are lengths, held with at most `most`.
@@ -43,46 +42,39 @@ class RigSenses:
         self, robot: str, action_layout: Layout, state_layout: Layout, tendon_stiffness: float
     ) -> None:
         actions = {feature.name: feature for feature in action_layout}
+        measured = {q: [f"{name}/{q}" for name in TENDONS] for q in _QUANTITIES}
         lacks = [name for name in TENDONS if name not in actions]
-        lacks += [
-            f"{name}/{quantity}"
-            for quantity in _QUANTITIES
-            for name in TENDONS
-            if f"{name}/{quantity}" not in state_layout
-        ]
+        lacks += [name for names in measured.values() for name in names if name not in state_layout]
         if lacks or len(actions) != len(TENDONS):
             raise RobotRefused(
-                f"{robot} is not a finger rig, which has the commands {', '.join(TENDONS)} and "
-                "measures the length, speed and tension of each"
-                + (f"; this one lacks {', '.join(lacks[:3])}." if lacks else ".")
+                f"{robot} is not a finger rig, which has the commands {', '.join(TENDONS)} and no "
+                "other, and measures the length, speed and tension of each"
+                + (f"; it lacks {', '.join(lacks[:3])}." if lacks else ".")
             )
-        slices = state_layout.slices
-        self._starts = {name: place.start for name, place in slices.items()}
+        self._starts = {name: place.start for name, place in state_layout.slices.items()}
         self._order = [TENDONS.index(name) for name in actions]
-        self._places = {
-            quantity: [self._starts[f"{name}/{quantity}"] for name in TENDONS]
-            for quantity in _QUANTITIES
-        }
+        self._places = {q: [self._starts[name] for name in measured[q]] for q in _QUANTITIES}
         self.most = np.array([state_layout[f"{name}/tension"].high for name in TENDONS])
-        spans = [(actions[name].gain, actions[name].gain_unit) for name in TENDONS]
-        units = {unit for _, unit in spans}
+        units = {actions[name].gain_unit for name in TENDONS}
         self.controls_length = units == {"m"}
         if not (self.controls_length or units == {"N"}) or not np.isfinite(self.most).all():
             raise RobotRefused(
                 f"The profile of {robot} does not define the tension of its commands: each action "
                 "must pull a single tendon, with a weight of 1, and all have the same control."
             )
-        self._span = np.array([span for span, _ in spans])
+        self._span = np.array([actions[name].gain for name in TENDONS])
         self._longest = np.array([state_layout[f"{name}/length"].high for name in TENDONS])
-        least = np.full(len(TENDONS), LEAST_TENSION_N)
-        self.least = least if self.controls_length else self.most - self._span
+        self.least = self.most - self._span
+        if self.controls_length:
+            self.least = np.full(len(TENDONS), LEAST_TENSION_N)
         self._compliance = 1.0 / tendon_stiffness
         # Least squares; positive arms shorten the tendons.
         self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
         self._state = np.zeros(state_layout.size)
         encoders = [f"{name}/angle" for name in JOINTS]
-        self.has_encoders = all(name in state_layout for name in encoders)
-        self._encoders = [self._starts[name] for name in encoders] if self.has_encoders else []
+        # Empty unless it has one at each joint.
+        self._encoders = [self._starts[name] for name in encoders if name in self._starts]
+        self._encoders = self._encoders if len(self._encoders) == len(JOINTS) else []
         self._differences = JointVelocities()
 
     def forget(self) -> None:
@@ -120,42 +112,20 @@ class RigSenses:
         self, state: NDArray[Any], absent: tuple[str, ...], commands: NDArray[np.float64]
     ) -> FingerSenses:
         """Convert one state of the rig; numbers that are `absent` now keep their last value."""
-        fresh = np.asarray(state, np.float64)
-        missing = {self._starts[name] for name in absent if name in self._starts}
-        keep = [i for i in range(len(fresh)) if i not in missing]
-        self._state[keep] = fresh[keep]
+        missing = [self._starts[name] for name in absent if name in self._starts]
+        fresh = np.array(state, np.float64)
+        fresh[missing] = self._state[missing]
+        self._state = fresh
         lengths, speeds, tensions = (self._state[self._places[each]] for each in _QUANTITIES)
         self.speeds: NDArray[np.float64] = speeds
-        if self.has_encoders:
+        if self._encoders:
             angles = self._state[self._encoders]
             velocities = self._differences.of(angles)
         else:
             low, high = JOINT_RANGE.T
             angles = np.clip(self._angles_of @ (lengths + self._compliance * tensions), low, high)
             velocities = self._angles_of @ speeds
-        return FingerSenses(
-            angles=angles,
-            velocities=velocities,
-            tensions=tensions,
-            lengths=lengths,
-            commands=commands,
-            fingertip=fingertip(angles),
-        )
-
-
-class LengthApproach:
-    """Controller that brings a finger whose lengths are controlled to a posture, rad, (4,)."""
-
-    def __init__(self, posture: NDArray[np.float64]) -> None:
-        self._posture = posture
-        self._aim = posture.copy()
-
-    def lengths(self, senses: FingerSenses) -> NDArray[np.float64]:
-        """Return the lengths for the next control period, m, (7,)."""
-        low, high = JOINT_RANGE.T
-        lag = np.clip(self._posture - senses.angles, -_MOST_LAG_RAD, _MOST_LAG_RAD)
-        self._aim = np.clip(self._aim + _AIM_RATE * CONTROL_DT * lag, low - 0.2, high + 0.2)
-        return -MOMENT_ARMS @ self._aim - _TAUT_M
+        return FingerSenses(angles, velocities, tensions, lengths, commands, fingertip(angles))
 
 
 # Tuned on the twin of the shipped rig. Rate at which the aim corrects an error of the posture, 1/s,
@@ -180,13 +150,11 @@ _MOST_LAG: Final = 0.8
 
 
 class StartApproach:
-    """Controller that brings the finger to a posture, rad, (4,), within tensions, N, (7,)."""
+    """Controller that brings the finger of a rig to a posture, rad, (4,)."""
 
-    def __init__(
-        self, posture: NDArray[np.float64], least: NDArray[np.float64], most: NDArray[np.float64]
-    ) -> None:
-        self._posture = posture
-        self._least, self._most = least, most
+    def __init__(self, posture: NDArray[np.float64], rig: RigSenses) -> None:
+        self._posture, self._rig = posture, rig
+        self._aim = posture.copy()
         self._held = moving_torque(posture, np.zeros(4), np.zeros(4))
         self._more = np.zeros(4)
         self._inertia = _GEARED_KG * MOMENT_ARMS.T @ MOMENT_ARMS
@@ -195,14 +163,20 @@ class StartApproach:
         """Return the largest joint error, rad."""
         return float(np.abs(senses.angles - self._posture).max())
 
-    def tensions(self, senses: FingerSenses) -> NDArray[np.float64]:
-        """Return the tensions for the next control period, N, (7,)."""
-        left = self._posture - senses.angles
+    def values(self, senses: FingerSenses) -> NDArray[np.float32]:
+        """Return the rig's command for the next control period, (7,)."""
+        rig, left = self._rig, self._posture - senses.angles
+        if rig.controls_length:
+            low, high = JOINT_RANGE.T
+            lag = np.clip(left, -_MOST_LAG_RAD, _MOST_LAG_RAD)
+            self._aim = np.clip(self._aim + _AIM_RATE * CONTROL_DT * lag, low - 0.2, high + 0.2)
+            return rig.length_values(-MOMENT_ARMS @ self._aim - _TAUT_M)
         speed = np.clip(_RATE * left, -_MOST_SPEED, _MOST_SPEED)
         lag = speed - senses.velocities
         self._more += _MORE_NM * CONTROL_DT * np.clip(lag, -_MOST_LAG, _MOST_LAG)
         torque = self._held + self._inertia @ (_GAIN * lag) + self._more
         # Gears resist winding in and hold when letting out: leave room for both.
-        least, most = self._least + _GEAR_FRICTION_N, self._most - _GEAR_FRICTION_N
+        least, most = rig.least + _GEAR_FRICTION_N, rig.most - _GEAR_FRICTION_N
         pull, _ = tensions_for_torque(MOMENT_ARMS, torque, least, most)
-        return pull + _GEAR_FRICTION_N * np.tanh(MOMENT_ARMS @ speed / _CREEP_M_PER_S)
+        creep = np.tanh(MOMENT_ARMS @ speed / _CREEP_M_PER_S)
+        return rig.values(pull + _GEAR_FRICTION_N * creep)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Final, cast
 
@@ -91,31 +91,6 @@ class TendonDrive:
         return 1.0 + self.muscle_stiffness * stretch + self.muscle_damping * speed
 
 
-def _tension(most: NDArray[np.float64]) -> TendonDrive:
-    half = 0.5 * (most - LEAST_TENSION_N)
-    return TendonDrive(LEAST_TENSION_N + half, half)
-
-
-def _impedance(most: NDArray[np.float64]) -> TendonDrive:
-    return replace(
-        _tension(most),
-        muscle_stiffness=_MUSCLE_STIFFNESS,
-        muscle_damping=_MUSCLE_DAMPING,
-        rest=-MOMENT_ARMS @ JOINT_REST,
-    )
-
-
-def _length(most: NDArray[np.float64]) -> TendonDrive:
-    # The largest and smallest length of each tendon, from the ends of the joints' ranges.
-    ends = -MOMENT_ARMS[:, :, None] * JOINT_RANGE[None]
-    shortest, longest = ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)
-    # The servo winds up below the shortest length, to have its full tension there.
-    shortest = shortest - most / _SERVO_STIFFNESS
-    half, middle = 0.5 * (longest - shortest), 0.5 * (longest + shortest)
-    offset = LEAST_TENSION_N - _SERVO_STIFFNESS * middle
-    return TendonDrive(offset, _SERVO_STIFFNESS * half, _SERVO_STIFFNESS, _SERVO_DAMPING)
-
-
 DRIVES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "impedance": "a muscle: the command pulls, and the more it pulls the stiffer it is",
@@ -124,8 +99,6 @@ DRIVES: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """Modes of action, and the meaning of a command in each."""
-
-_MAKERS: Final = {"impedance": _impedance, "tension": _tension, "length": _length}
 
 
 def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
@@ -137,9 +110,22 @@ def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
     Raises:
         UnknownName: If the mode is unknown.
     """
-    if mode not in _MAKERS:
-        raise UnknownName("mode of action", str(mode), _MAKERS)
-    return _MAKERS[mode](np.array(parameters.most_tension))
+    if mode not in DRIVES:
+        raise UnknownName("mode of action", str(mode), DRIVES)
+    most = np.array(parameters.most_tension)
+    if mode == "length":
+        # The largest and smallest length of each tendon, from the ends of the joints' ranges.
+        ends = -MOMENT_ARMS[:, :, None] * JOINT_RANGE[None]
+        longest = ends.max(axis=2).sum(axis=1)
+        # The servo winds up below the shortest length, to have its full tension there.
+        shortest = ends.min(axis=2).sum(axis=1) - most / _SERVO_STIFFNESS
+        half, middle = 0.5 * (longest - shortest), 0.5 * (longest + shortest)
+        offset = LEAST_TENSION_N - _SERVO_STIFFNESS * middle
+        return TendonDrive(offset, _SERVO_STIFFNESS * half, _SERVO_STIFFNESS, _SERVO_DAMPING)
+    half = 0.5 * (most - LEAST_TENSION_N)
+    muscle = (_MUSCLE_STIFFNESS, _MUSCLE_DAMPING) if mode == "impedance" else (0.0, 0.0)
+    rest = -MOMENT_ARMS @ JOINT_REST if mode == "impedance" else np.zeros(len(TENDONS))
+    return TendonDrive(LEAST_TENSION_N + half, half, 0.0, 0.0, *muscle, rest)
 
 
 # Tolerance of a torque, N·m: a hundredth of the torque of a fingertip of 4 g about its joint.

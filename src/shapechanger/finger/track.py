@@ -14,15 +14,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import PathError
 from shapechanger.finger.anatomy import LEAST_TENSION_N, MOMENT_ARMS, MOST_TENSION_N
 from shapechanger.finger.env import FingerEnv
-from shapechanger.finger.paths import (
-    FingertipPath,
-    PathSource,
-    as_path,
-    circle,
-    figure_eight,
-    line,
-    sample,
-)
+from shapechanger.finger.paths import FingertipPath, PathSource, as_path, circle, figure_eight, line
 from shapechanger.finger.plant import CONTROL_DT
 from shapechanger.finger.postures import angles_for, draw_posture, moving_torque
 from shapechanger.finger.task import FingerSenses, features_of_senses, fingertip, place_features
@@ -45,11 +37,15 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
         PathError: If a point is out of reach, or the tendons are too weak for the motion; the
             message names the time and what is missing.
     """
-    times, points = sample(path, _CHECK_HZ, min(path.duration_s, _LOOK_S))
-    angles, left = _angles_along(points)
-    if left is not None:
+    length = min(path.duration_s, _LOOK_S)
+    # 1.1 s at 50 Hz are 55.00000000000001 steps.
+    steps = max(1, math.ceil(length * _CHECK_HZ - 1e-9))
+    times = np.linspace(0.0, length, steps + 1)
+    points = path.at(times)
+    angles = _angles_along(points)
+    if len(angles) < len(points):
         # The farthest point says more than the first one out of reach.
-        later = range(left, len(points), max(1, len(points) // _LOOKS))
+        later = range(len(angles), len(points), max(1, len(points) // _LOOKS))
         worst, k = max((angles_for(points[k])[1], k) for k in later)
         place = "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * points[k]))
         raise PathError(
@@ -57,8 +53,8 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
             f"{worst * 1e3:.1f} mm beyond. The knuckle is at (0, 0, 0); x points to the tip, y to "
             "the thumb, z to the back."
         )
-    if weakness := _weakness(times, angles):
-        t, missing = weakness
+    t, missing = _weakness(times, angles)
+    if missing > 0.0:
         raise PathError(
             f"The tendons are too weak for the path: at {t:.2f} s a joint lacks "
             f"{missing * 1e3:.1f} mN·m. Make it slower."
@@ -66,32 +62,27 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
     return angles[0]
 
 
-def _angles_along(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], int | None]:
-    """Return angles for each point, rad, (n, 4), and the index of the first one out of reach."""
-    angles = np.empty((len(points), 4))
-    near: NDArray[np.float64] | None = None
-    for i, point in enumerate(points):
-        near, off = angles_for(point, near)
-        angles[i] = near
+def _angles_along(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return angles for the points up to the first one out of reach, rad, (n, 4)."""
+    angles: list[NDArray[np.float64]] = []
+    for point in points:
+        near, off = angles_for(point, angles[-1] if angles else None)
         if off > _OFF_M:
-            return angles, i
-    return angles, None
+            break
+        angles.append(near)
+    return np.array(angles)
 
 
-def _weakness(
-    times: NDArray[np.float64], angles: NDArray[np.float64]
-) -> tuple[float, float] | None:
-    """Return when the tendons are too weak, s, and the missing torque, N·m; None if never."""
-    speeds: NDArray[np.float64] = np.asarray(np.gradient(angles, times, axis=0))
-    accelerations: NDArray[np.float64] = np.asarray(np.gradient(speeds, times, axis=0))
+def _weakness(times: NDArray[np.float64], angles: NDArray[np.float64]) -> tuple[float, float]:
+    """Return when the tendons are too weak, s, and the missing torque, N·m; 0 if never."""
+    speeds = np.asarray(np.gradient(angles, times, axis=0), np.float64)
+    accelerations = np.asarray(np.gradient(speeds, times, axis=0), np.float64)
     for t, q, speed, acceleration in zip(times, angles, speeds, accelerations, strict=True):
         torque = moving_torque(q, speed, acceleration)
-        tensions, is_enough = tensions_for_torque(
-            MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N
-        )
+        given, is_enough = tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)
         if not is_enough:
-            return float(t), float(np.abs(torque - MOMENT_ARMS.T @ tensions).max())
-    return None
+            return float(t), float(np.abs(torque - MOMENT_ARMS.T @ given).max())
+    return 0.0, 0.0
 
 
 # Ranges of random paths: radius, m, and speed, m/s, up to a circle of 12 mm once a second.
@@ -113,17 +104,17 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
         normal = rng.standard_normal(3)
         normal /= np.linalg.norm(normal)
         kind = rng.integers(3)
-        if kind == 0:
-            path = circle(size, tuple(centre), hz, tuple(normal))
-        elif kind == 1:
-            path = figure_eight(size, tuple(centre), hz, tuple(normal))
-        else:
+        if kind == 2:
             path = line(tuple(centre - size * normal), tuple(centre + size * normal), hz)
+        else:
+            make = circle if kind == 0 else figure_eight
+            path = make(size, tuple(centre), hz, tuple(normal))
         # The number of points does not depend on the speed: paths are smooth, and each reset
         # draws one.
-        times, points = sample(path, _RANDOM_PATHS_LOOKS / path.duration_s)
-        angles, left = _angles_along(points)
-        if left is None and _weakness(times, angles) is None:
+        times = np.linspace(0.0, path.duration_s, _RANDOM_PATHS_LOOKS + 1)
+        points = path.at(times)
+        angles = _angles_along(points)
+        if len(angles) == len(points) and _weakness(times, angles)[1] == 0.0:
             return path, angles[0]
 
 
@@ -153,28 +144,77 @@ class FingerTrackEnv(FingerEnv):
     """Follow a point that moves along a known path.
 
     ## Action space
-    As in `Finger-v1`: `Box(-1, 1, (7,), float32)`.
+    `Box(-1, 1, (7,), float32)`, one command per tendon, as in `Finger-v1`.
+
+    | Num | Action        | Min | Max | Unit |
+    | --- | ------------- | --- | --- | ---- |
+    | 0   | `FDP/command` | -1  | 1   | 1    |
+    | 1   | `FDS/command` | -1  | 1   | 1    |
+    | 2   | `EIP/command` | -1  | 1   | 1    |
+    | 3   | `EDC/command` | -1  | 1   | 1    |
+    | 4   | `LUM/command` | -1  | 1   | 1    |
+    | 5   | `DI/command`  | -1  | 1   | 1    |
+    | 6   | `PI/command`  | -1  | 1   | 1    |
 
     ## Observation space
-    `Box(-inf, inf, (47,), float64)`: the measurements of `Finger-v1` (32); the place of the point
-    at the end of the step (3) and the vector from the fingertip to it (3), m; and the vectors from
-    the fingertip to its places 0.06, 0.12 and 0.20 s from now (9), m.
+    `Box(-inf, inf, (47,), float64)`: the measurements of `Finger-v1`; the place of the point at the
+    end of the step, and the vectors from the fingertip to it and to its places 0.06, 0.12 and
+    0.20 s from now.
+
+    | Num   | Observation           | Min      | Max    | Unit  |
+    | ----- | --------------------- | -------- | ------ | ----- |
+    | 0     | `MCP_flexion/angle`   | -0.3491  | 1.571  | rad   |
+    | 1     | `MCP_abduction/angle` | -0.3491  | 0.3491 | rad   |
+    | 2     | `PIP_flexion/angle`   | 0        | 1.833  | rad   |
+    | 3     | `DIP_flexion/angle`   | -0.08727 | 1.396  | rad   |
+    | 4-7   | `*/velocity`          | -inf     | inf    | rad/s |
+    | 8     | `FDP/tension`         | 0        | 25     | N     |
+    | 9     | `FDS/tension`         | 0        | 25     | N     |
+    | 10    | `EIP/tension`         | 0        | 7.056  | N     |
+    | 11    | `EDC/tension`         | 0        | 25     | N     |
+    | 12    | `LUM/tension`         | 0        | 6.48   | N     |
+    | 13    | `DI/tension`          | 0        | 25     | N     |
+    | 14    | `PI/tension`          | 0        | 25     | N     |
+    | 15-21 | `*/length`            | -inf     | inf    | m     |
+    | 22-28 | `*/command`           | -1       | 1      | 1     |
+    | 29    | `fingertip/x`         | -inf     | inf    | m     |
+    | 30    | `fingertip/y`         | -inf     | inf    | m     |
+    | 31    | `fingertip/z`         | -inf     | inf    | m     |
+    | 32    | `target/x`            | -inf     | inf    | m     |
+    | 33    | `target/y`            | -inf     | inf    | m     |
+    | 34    | `target/z`            | -inf     | inf    | m     |
+    | 35    | `target/dx`           | -inf     | inf    | m     |
+    | 36    | `target/dy`           | -inf     | inf    | m     |
+    | 37    | `target/dz`           | -inf     | inf    | m     |
+    | 38    | `ahead_60ms/dx`       | -inf     | inf    | m     |
+    | 39    | `ahead_60ms/dy`       | -inf     | inf    | m     |
+    | 40    | `ahead_60ms/dz`       | -inf     | inf    | m     |
+    | 41    | `ahead_120ms/dx`      | -inf     | inf    | m     |
+    | 42    | `ahead_120ms/dy`      | -inf     | inf    | m     |
+    | 43    | `ahead_120ms/dz`      | -inf     | inf    | m     |
+    | 44    | `ahead_200ms/dx`      | -inf     | inf    | m     |
+    | 45    | `ahead_200ms/dy`      | -inf     | inf    | m     |
+    | 46    | `ahead_200ms/dz`      | -inf     | inf    | m     |
 
     ## Reward
-    As in `Finger-v1`, with the moving point as target.
+    As in `Finger-v1`, with the moving point as target: 50 dt (0.5 / (1 + d / 0.020 m)
+    + 0.5 / (1 + d / 0.002 m)) minus effort and change.
 
     ## Start
     At rest, with the fingertip at a point of the path: a random one of a closed path, else its
     beginning.
 
     ## End
-    Never terminated; truncated after 250 steps, 5 s.
+    Never terminated. Truncated after 250 steps, 5 s.
 
     ## Info
     `distance`, m, of the true fingertip from the point; `rms`, m, its root mean square since 0.5 s
-    after the start; `is_success`, whether that is below 3 mm; `target`, m;
-    `smoothness`, `reward_nearness`, `reward_effort` and `reward_change`; `diverged` where the
-    simulation diverged.
+    after the start; `is_success`, whether that is below 3 mm; `target`, m; `smoothness`,
+    `reward_nearness`, `reward_effort` and `reward_change`; `diverged` where the simulation
+    diverged.
+
+    ## Versions
+    v1: the first.
 
     Args:
         path: A path of `shapechanger.finger.paths`; its name, "circle", "figure-eight", "line" or
@@ -201,17 +241,11 @@ class FingerTrackEnv(FingerEnv):
         # Places of the fingertip, m, for frames.
         self._trail = deque([self.plant.fingertip], _TRAIL_STEPS)
         self._squares, self._steps = 0.0, 0
-        ahead = [
-            Feature(f"ahead_{round(1e3 * s)}ms/d{axis}", "m", element=_TARGET)
-            for s in PREVIEW_S
-            for axis in "xyz"
+        ahead = ("target", *(f"ahead_{round(1e3 * s)}ms" for s in PREVIEW_S))
+        offsets = [
+            Feature(f"{name}/d{axis}", "m", element=_TARGET) for name in ahead for axis in "xyz"
         ]
-        features = [
-            *features_of_senses(),
-            *place_features("target", _TARGET),
-            *(Feature(f"target/d{axis}", "m", element=_TARGET) for axis in "xyz"),
-            *ahead,
-        ]
+        features = [*features_of_senses(), *place_features("target", _TARGET), *offsets]
         self.observation_layout = Layout(tuple(features))
         self.observation_space = gym.spaces.Box(-np.inf, np.inf, (len(features),), np.float64)
 

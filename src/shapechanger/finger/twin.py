@@ -14,6 +14,7 @@ from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.gap import resolve_gap
 from shapechanger.finger.model import FINGERTIP, build_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.postures import START_SPREAD
 from shapechanger.finger.tensions import drive_of
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.simulation import Rig
@@ -25,8 +26,6 @@ _CABLE_STIFFNESS: Final = 20e3
 # kg, mass of the end of a cable: enough for steps of 1 ms to follow the cable's spring.
 _CABLE_KG: Final = 0.010
 _MAX_STEP_S: Final = 0.001
-# Distance of starts from the rest posture, rad, as in simulation.
-_START_SPREAD: Final = 0.1
 
 
 def rig_place(profile: Profile, gap: str = "", seed: int | None = None) -> Place | None:
@@ -145,7 +144,7 @@ class FingerWorld(World):
         """Place the finger near its rest posture, at rest, with all tendons just taut."""
         rng = np.random.default_rng(seed)
         low, high = JOINT_RANGE.T
-        posture = JOINT_REST + rng.uniform(-_START_SPREAD, _START_SPREAD, len(JOINTS))
+        posture = JOINT_REST + rng.uniform(-START_SPREAD, START_SPREAD, len(JOINTS))
         mujoco.mj_resetData(self._model, self._data)
         # A separate generator, so that the number of readings does not change the starts.
         self._noise = np.random.default_rng([seed, 1])

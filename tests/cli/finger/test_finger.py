@@ -45,7 +45,7 @@ def test_invalid_recordings_are_refused(tmp_path: Path, finger: Cli) -> None:
 def test_invalid_logs_are_refused(tmp_path: Path, finger: Cli) -> None:
     """Missing and short logs, and outputs that would overwrite the log."""
     log = tmp_path / "log.npz"
-    assert "There is no file" in finger.refused("identify", log)
+    assert "cannot be read: No such file" in finger.refused("identify", log)
     finger.output("record", "Finger", "--out", log, "--seconds", "1")
     assert "1.0 s long" in finger.refused("identify", log)
     assert "it is the log" in finger.refused("identify", log, "--report", log)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
-import msgspec
 import numpy as np
 import pytest
 
@@ -14,9 +12,7 @@ import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.errors import FingerError, LayoutError, UnknownName
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINTS
 from shapechanger.finger.controller import FingerBabble
-from shapechanger.finger.identify import FingerLog
 from shapechanger.finger.identify.log import record_babble
-from shapechanger.finger.parameters import NOMINAL
 from shapechanger.layout import Feature, Layout
 from tests.finger.identify.logs import recorded
 
@@ -71,18 +67,3 @@ def test_envs_that_give_no_log_are_refused(
     """Goals, an env without names and one that ends too early are refused with the reason."""
     with gym.make(env[0], **env[1]) as made, pytest.raises(error, match=text):
         record_babble(made, 3.0)
-
-
-def test_an_env_is_identified_by_ten_seconds_of_its_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An env records with the seed and its mode of action, and takes over the parameters."""
-    taken: list[FingerLog] = []
-
-    def identified(log: FingerLog) -> SimpleNamespace:
-        taken.append(log)
-        return SimpleNamespace(parameters=NOMINAL)
-
-    monkeypatch.setattr("shapechanger.finger.identify.identify", identified)
-    with gym.make("shapechanger/Finger-v1", max_episode_steps=-1, actions="tension") as env:
-        source = env.unwrapped.identified_source(0)
-    assert source == {"parameters": msgspec.to_builtins(NOMINAL)}
-    assert [(log.seconds, log.actions) for log in taken] == [(pytest.approx(10.0), "tension")]

@@ -19,17 +19,6 @@ from tests.finger.identify.logs import changed, recorded, swings, synthetic
 LARGE_M = 2e-3
 
 
-def test_without_noise_the_arms_are_exact() -> None:
-    """Arms of a finger that is not nominal are found to 1 %."""
-    rng = np.random.default_rng(5)
-    arms = NOMINAL.arms * (1.0 + rng.uniform(-0.1, 0.1, NOMINAL.arms.shape))
-    parameters = NOMINAL.replace(moment_arms=tuple(map(tuple, arms.tolist())))
-    log, _ = recorded(6.0, parameters=parameters)
-    found = fit_kinematics(log)
-    np.testing.assert_allclose(found.arms, arms, rtol=0.01)
-    assert abs(found.compliance) < 1e-7
-
-
 def test_synthetic_logs_give_their_parameters() -> None:
     """Arms, compliance and noise are found, and noise of the angles does not bias the arms."""
     arms, noise = 1.15 * NOMINAL.arms, np.radians(1.5)

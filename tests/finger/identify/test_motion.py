@@ -66,11 +66,11 @@ def test_joints_and_friction_are_found() -> None:
     log, truth = short()
     found = fit_dynamics(log, exact(), motors())
     for name in ("joint_stiffness", "joint_damping"):
-        values = [found.values[f"{name}/{joint}"] for joint in JOINTS]
+        values = [found[f"{name}/{joint}"][0] for joint in JOINTS]
         np.testing.assert_allclose(values, getattr(truth, name), rtol=0.05)
-    assert found.values["tendon_friction"] == pytest.approx(0.3, rel=0.15)
-    assert set(found.sd) == set(FACTORS)
-    assert all(1e-3 < sd < 0.2 for sd in found.sd.values())
+    assert found["tendon_friction"][0] == pytest.approx(0.3, rel=0.15)
+    assert set(found) == set(FACTORS)
+    assert all(1e-3 < sd < 0.2 for _, sd in found.values())
 
 
 def test_the_covariance_has_the_correction_for_few_windows(

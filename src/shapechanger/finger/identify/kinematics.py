@@ -82,7 +82,7 @@ class Kinematics:
 def fit_kinematics(log: FingerLog) -> Kinematics:
     """Fit moment arms and stretch to a log in which every joint moves."""
     data = _Regression.of(log)
-    settled = data.from_row(round(_SETTLES_S / log.control_dt))
+    settled = _Regression.of(log, round(_SETTLES_S / log.control_dt))
     noise = settled.joint_noise()
     x = settled.start()
     solved: Any = None
@@ -91,14 +91,8 @@ def fit_kinematics(log: FingerLog) -> Kinematics:
         length_noise = settled.length_noise(x)
         variance = settled.variance(x, noise, length_noise)
 
-        def residual(
-            x: NDArray[np.float64], variance: NDArray[np.float64] = variance
-        ) -> NDArray[np.float64]:
-            factor = np.linalg.cholesky(_total(x, noise, variance))
-            whitened: Any = np.linalg.solve(factor, settled.residuals(x)[..., None])
-            return np.asarray(whitened[..., 0].ravel(), np.float64)
-
-        solved = cast("Any", least_squares(residual, x, x_scale="jac", max_nfev=8))
+        arguments = settled, noise, variance
+        solved = cast("Any", least_squares(_whitened, x, x_scale="jac", max_nfev=8, args=arguments))
         x = np.asarray(solved.x, np.float64)
     times = len(settled.lengths)
     jacobian = np.asarray(solved.jac).reshape(times, _N_TENDONS, -1)
@@ -170,14 +164,11 @@ class _Regression:
     directions: NDArray[np.float64]
 
     @classmethod
-    def of(cls, log: FingerLog) -> _Regression:
+    def of(cls, log: FingerLog, first: int = 0) -> _Regression:
+        """Return the rows of a log from `first` on."""
         speeds = np.gradient(log.lengths, log.control_dt, axis=0)
-        return cls(log.lengths, log.angles, log.tensions, speeds, np.tanh(speeds / _SLIDES_AT))
-
-    def from_row(self, first: int) -> _Regression:
-        """Rows from `first` on."""
-        columns = (self.lengths, self.angles, self.tensions, self.speeds, self.directions)
-        return _Regression(*(column[first:] for column in columns))
+        columns = (log.lengths, log.angles, log.tensions, speeds, np.tanh(speeds / _SLIDES_AT))
+        return cls(*(column[first:] for column in columns))
 
     def joint_noise(self) -> NDArray[np.float64]:
         """Standard deviation of each angle given all other columns, rad, (4,)."""
@@ -240,6 +231,18 @@ class _Regression:
 
     def _forces(self) -> NDArray[np.float64]:
         return np.column_stack([self.tensions, self.directions, self.speeds])
+
+
+def _whitened(
+    x: NDArray[np.float64],
+    data: _Regression,
+    noise: NDArray[np.float64],
+    variance: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the residuals over their standard deviations, uncorrelated, (n * 7,)."""
+    factor = np.linalg.cholesky(_total(x, noise, variance))
+    whitened: Any = np.linalg.solve(factor, data.residuals(x)[..., None])
+    return np.asarray(whitened[..., 0].ravel(), np.float64)
 
 
 def _lags(control_dt: float) -> int:

@@ -8,12 +8,11 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, Literal
 
 import gymnasium as gym
 import msgspec
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, LayoutError, OutputError, UnknownName
@@ -25,21 +24,17 @@ from shapechanger.finger.tensions import DRIVES
 from shapechanger.layout import Layout
 
 SIGNALS: Final = {
-    "t": 0,
-    "commands": len(TENDONS),
-    "angles": len(JOINTS),
-    "tensions": len(TENDONS),
-    "lengths": len(TENDONS),
+    "t": (),
+    "commands": (len(TENDONS),),
+    "angles": (len(JOINTS),),
+    "tensions": (len(TENDONS),),
+    "lengths": (len(TENDONS),),
 }
-"""Arrays of a log and their numbers of columns; 0 marks a one-dimensional array."""
+"""Arrays of a log and the shapes of their rows."""
 _SETTINGS: Final = ("actions", "control_dt", "source", "motors")
 
 # Longest step between two rows, in control periods. Clocks jitter; a missing row is a gap.
 _LONGEST_STEP: Final = 1.5
-# Tolerance of a ratio that must be whole.
-_WHOLE: Final = 1e-6
-_FORMAT: Final = "shapechanger finger log"
-_VERSION: Final = 1
 _MAX_BYTES: Final = 256 << 20  # An hour at 50 Hz has about 30 MB.
 # Shortest log, s. The intervals rest on how errors repeat within half a second.
 _SHORTEST_S: Final = 4.0
@@ -88,9 +83,8 @@ class FingerLog:
             raise UnknownName("mode of action", self.actions, DRIVES)
         if not 0.0 < self.control_dt < float("inf"):
             raise FingerError(f"control_dt must be above 0 s and finite, got {self.control_dt}.")
-        for name, columns in SIGNALS.items():
-            given = getattr(self, name)
-            shape = (len(self.t), columns) if columns else (len(self.t),)
+        for name, row in SIGNALS.items():
+            given, shape = getattr(self, name), (self.t.size, *row)
             if given.shape != shape:
                 raise FingerError(f"{name} must have the shape {shape}, got {given.shape}.")
             rows = ~np.isfinite(given).all(axis=tuple(range(1, given.ndim)))
@@ -125,18 +119,8 @@ def require_informative(log: FingerLog) -> None:
     """Check that every joint moves far enough and independently of the others.
 
     Raises:
-        FingerError: If the log is too short, a joint hardly moves or only along with others, or its
-            rows do not fit the path of its rig.
+        FingerError: If the log is too short, or a joint hardly moves or only along with others.
     """
-    path = None if log.motors is None else log.motors.path
-    if path is not None:
-        computations = log.control_dt * path.control_hz
-        if round(computations) < 1 or abs(computations - round(computations)) > _WHOLE:
-            raise FingerError(
-                f"The rig's path computes tensions at control_hz={path.control_hz:g}, but the log "
-                f"has {1.0 / log.control_dt:g} commands per second (control_dt={log.control_dt:g} "
-                "s), and the first must be a multiple of the second."
-            )
     if log.seconds < _SHORTEST_S - 0.5 * log.control_dt:
         raise FingerError(
             f"The log is {log.seconds:.1f} s long; identification needs at least "
@@ -164,8 +148,8 @@ def require_informative(log: FingerLog) -> None:
 class _Header(msgspec.Struct, frozen=True, kw_only=True):
     """Fields of a log that are not arrays, stored as JSON."""
 
-    format: str
-    version: int
+    format: Literal["shapechanger finger log"]
+    version: Literal[1]
     actions: str
     control_dt: float
     joints: tuple[str, ...]
@@ -185,7 +169,9 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
         OutputError: If the file cannot be written.
     """
     own: dict[str, Any] = {key: getattr(log, key) for key in _SETTINGS}
-    header = _Header(format=_FORMAT, version=_VERSION, joints=JOINTS, tendons=TENDONS, **own)
+    header = _Header(
+        format="shapechanger finger log", version=1, joints=JOINTS, tendons=TENDONS, **own
+    )
     arrays = {name: getattr(log, name) for name in SIGNALS}
     encoded = np.frombuffer(msgspec.json.encode(header), np.uint8)
     try:
@@ -204,72 +190,35 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         UnknownName: If its mode of action is unknown.
     """
     place = Path(path)
-    name, is_archive = place.name, None
     # Opening a pipe waits for a writer, and a device may never end.
     if place.exists() and not (place.is_file() or place.is_dir()):
-        raise FingerError(f"{name} cannot be read: it is not a regular file.")
+        raise FingerError(f"{place.name} cannot be read: it is not a regular file.")
     try:
-        with place.open("rb") as raw:  # NumPy leaves a damaged file open.
-            is_archive = raw.read(2) == b"PK"
-            raw.seek(0)
-            loaded: Any = np.load(raw, allow_pickle=False)
-            if not isinstance(loaded, NpzFile):
-                raise ValueError("one array, not an archive of arrays")
-            archive = cast("zipfile.ZipFile", loaded.zip)
+        # NumPy leaves a damaged file open.
+        with place.open("rb") as raw, zipfile.ZipFile(raw) as archive:
             claimed = sum(info.file_size for info in archive.infolist())
             if claimed > _MAX_BYTES:  # A few bytes of an archive can unpack to any size.
-                raise FingerError(
-                    f"{name} unpacks to {claimed} bytes, more than the limit of {_MAX_BYTES}."
-                )
-            read: dict[str, Any] = {key: loaded[key] for key in loaded.files}
-    except FileNotFoundError as error:
-        raise FingerError(f"There is no file {path}.") from error
-    except FingerError:  # A ValueError, too.
-        raise
-    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
-        if is_archive is None:
-            reason = f"cannot be read: {getattr(error, 'strerror', error)}."
-        elif is_archive:
-            reason = "is cut short or damaged; record it again."
-        else:
-            reason = "is not a finger log; `shapechanger finger record` writes one."
-        raise FingerError(f"{name} {reason}") from error
-    header = _read_header(name, read)
-    missing = [key for key in SIGNALS if key not in read]
-    if missing:
-        raise FingerError(f"{name} is not a complete log: it lacks {', '.join(missing)}.")
-    try:
-        arrays = {key: np.asarray(read[key], np.float64) for key in SIGNALS}
-    except ValueError as error:
-        raise FingerError(f"{name} is not a finger log: its arrays must hold numbers.") from error
-    if arrays["t"].ndim != 1:
-        raise FingerError(f"{name} is not a finger log: t must have one dimension.")
-    return FingerLog(**arrays, **{key: getattr(header, key) for key in _SETTINGS})
-
-
-def _read_header(name: str, read: dict[str, Any]) -> _Header:
-    if "header" not in read:
-        raise FingerError(f"{name} is not a finger log: it has no header.")
-    try:
-        header = msgspec.json.decode(bytes(read["header"]), type=_Header)
-    except (msgspec.MsgspecError, TypeError, ValueError) as error:
-        raise FingerError(f"{name} is not a finger log: its header is invalid: {error}.") from error
-    if header.format != _FORMAT:
-        raise FingerError(f"{name} is not a finger log: its format is {header.format!r}.")
-    if header.version > _VERSION:
-        raise FingerError(
-            f"{name} has version {header.version}; this Shapechanger reads up to {_VERSION}."
-        )
-    for kind, given, known in (
-        ("joints", header.joints, JOINTS),
-        ("tendons", header.tendons, TENDONS),
-    ):
-        if given != known:
-            raise FingerError(
-                f"{name} has the {kind} {', '.join(given) or 'none'}, "
-                f"but the finger has {', '.join(known)}."
+                raise ValueError(f"it unpacks to {claimed} bytes, more than {_MAX_BYTES}")
+            raw.seek(0)
+            loaded: Any = np.load(raw, allow_pickle=False)
+            header = msgspec.json.decode(loaded["header"].tobytes(), type=_Header)
+            arrays = {key: np.asarray(loaded[key], np.float64) for key in SIGNALS}
+        if (header.joints, header.tendons) != (JOINTS, TENDONS):
+            given = ", ".join((*header.joints, *header.tendons)) or "none"
+            raise ValueError(
+                f"its joints and tendons are {given}, not {', '.join(JOINTS)} and so on"
             )
-    return header
+    except OSError as error:
+        raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except (
+        *(EOFError, KeyError, MemoryError, RuntimeError, TypeError, ValueError),
+        *(zipfile.BadZipFile, zlib.error, msgspec.MsgspecError),
+    ) as error:
+        raise FingerError(
+            f"{place.name} is damaged, or not a finger log; `shapechanger finger record` writes "
+            f"one: {str(error).rstrip('.')}."
+        ) from error
+    return FingerLog(**arrays, **{key: getattr(header, key) for key in _SETTINGS})
 
 
 def record_babble(

@@ -127,36 +127,25 @@ def with_motors(motors: Motors, known: FingerParameters | None) -> FingerParamet
     if known is None:
         most = motors.strength * np.array(NOMINAL.most_tension)
         return nominal.replace(most_tension=tuple(most.tolist()), motor_kg=MOTOR_KG)
-    return nominal.replace(
-        most_tension=known.most_tension,
-        least_tension=known.least_tension,
-        motor_kg=known.motor_kg,
-        tendon_damping=known.tendon_damping,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Dynamics:
-    """Joint and friction parameters of a finger, with their standard errors.
-
-    Attributes:
-        values: Parameters by the names of `FACTORS`, in SI units.
-        sd: Standard errors of their logarithms, keyed by name, if the model is right.
-    """
-
-    values: dict[str, float]
-    sd: dict[str, float]
+    kept = ("most_tension", "least_tension", "motor_kg", "tendon_damping")
+    return nominal.replace(**{name: getattr(known, name) for name in kept})
 
 
 def fit_dynamics(
     log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None = None
-) -> Dynamics:
+) -> dict[str, tuple[float, float]]:
     """Fit joint and friction parameters to a log, up to the row `last`, or to its end for None.
+
+    Returns each value, in SI units, and the standard error of its logarithm if the model is right,
+    by the names of `FACTORS`.
 
     Raises:
         MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
-    sysid = _load_sysid()
+    sysid: Any = importlib.import_module("mujoco.sysid")  # It has no type annotations.
+    # Without its dependencies it can be imported all the same, but is empty.
+    if not hasattr(sysid, "build_residual_fn"):
+        raise MissingExtra("mujoco[sysid]", "identify")
     fit = _MotionFit(sysid, log, kinematics, motors, last)
     found, result = sysid.optimize(
         fit.parameters(),
@@ -170,19 +159,10 @@ def fit_dynamics(
     )
     x = np.asarray(found.as_vector(), np.float64)
     sd = np.sqrt(np.diag(fit.covariance(x, np.asarray(result.jac, np.float64))))
-    return Dynamics(
-        values={name: begin * math.exp(x[i]) for i, (name, begin) in enumerate(FACTORS.items())},
-        sd={name: float(sd[i]) for i, name in enumerate(FACTORS)},
-    )
-
-
-def _load_sysid() -> Any:
-    """The module `mujoco.sysid`, which has no type annotations."""
-    module = importlib.import_module("mujoco.sysid")
-    # Without its dependencies it can be imported all the same, but is empty.
-    if not hasattr(module, "build_residual_fn"):
-        raise MissingExtra("mujoco[sysid]", "identify")
-    return module
+    return {
+        name: (begin * math.exp(x[i]), float(sd[i]))
+        for i, (name, begin) in enumerate(FACTORS.items())
+    }
 
 
 class _MotionFit:
@@ -201,13 +181,9 @@ class _MotionFit:
         self._least, most = moved.least_tension, np.array(moved.most_tension)
         self._range = most - self._least
         spec = build_finger(moved, drive_of(log.actions, NOMINAL))
+        angle, of = mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtObj.mjOBJ_JOINT
         for name in JOINTS:
-            spec.add_sensor(
-                name=name,
-                type=mujoco.mjtSensor.mjSENS_JOINTPOS,
-                objtype=mujoco.mjtObj.mjOBJ_JOINT,
-                objname=name,
-            )
+            spec.add_sensor(name=name, type=angle, objtype=of, objname=name)
         self._skip = steps_per_period(log.control_dt, spec.option.timestep)
         spec.option.timestep = log.control_dt / self._skip
         self._model: mujoco.MjModel = spec.compile()
@@ -275,9 +251,7 @@ class _MotionFit:
         sensor = self._sysid.SignalType.MjSensor
         columns = {name: (sensor, np.array([j])) for j, name in enumerate(JOINTS)}
         series = self._sysid.TimeSeries
-        starts: list[Any] = []
-        controls: list[Any] = []
-        measured: list[Any] = []
+        starts, controls, measured = list[Any](), list[Any](), list[Any]()
         for window in windows:
             begun = window.activations if self._path is None else measured_at(window.start)
             state = (window.angles[0], window.velocities, begun)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,7 +26,6 @@ from shapechanger.finger.identify.log import FingerLog, require_informative
 from shapechanger.finger.identify.motion import (
     FACTORS,
     MOTOR_KG,
-    Dynamics,
     Window,
     cut_windows,
     fit_dynamics,
@@ -123,10 +122,8 @@ class HeldOut:
     @property
     def off(self) -> tuple[float, float]:
         """Root mean square errors of the identified and of the nominal finger, rad."""
-        identified, nominal = (
-            float(np.sqrt(np.mean((simulated - self.measured) ** 2)))
-            for simulated in (self.identified, self.nominal)
-        )
+        off = (one - self.measured for one in (self.identified, self.nominal))
+        identified, nominal = (float(np.sqrt(np.mean(one**2))) for one in off)
         return identified, nominal
 
 
@@ -277,7 +274,10 @@ def _delay(log: FingerLog, parameters: FingerParameters, windows: list[Window]) 
 
 
 def _estimates(
-    kinematics: Kinematics, motors: Motors, dynamics: Dynamics, log: FingerLog
+    kinematics: Kinematics,
+    motors: Motors,
+    dynamics: Mapping[str, tuple[float, float]],
+    log: FingerLog,
 ) -> tuple[ParameterEstimate, ...]:
     """All identified parameters with their intervals, the moment arms first."""
     reach = interval_quantile(len(log), log.control_dt)
@@ -291,12 +291,12 @@ def _estimates(
         found.append(_around(name, "m", value, reach * sd, NOMINAL.moment_arms[i][j]))
     found.append(_stiffness_estimate(kinematics, reach))
     nominal = {**FACTORS, "tendon_friction": NOMINAL.tendon_friction}
-    for name, value in dynamics.values.items():
+    for name, (value, sd) in dynamics.items():
         kind = name.split("/")[0]
         error = _MODEL_ERROR.get(name, _MODEL_ERROR[kind])
         if on_rig and name == "tendon_friction":
             error = _RIG_FRICTION_ERROR
-        by = math.exp(_NORMAL * math.hypot(dynamics.sd[name], error))
+        by = math.exp(_NORMAL * math.hypot(sd, error))
         unit = _UNITS[kind]
         found.append(ParameterEstimate(name, unit, value, value / by, value * by, nominal[name]))
     if on_rig:
@@ -314,24 +314,28 @@ def _estimates(
 
 
 def _parameters(
-    kinematics: Kinematics, motors: Motors, dynamics: Dynamics, known: FingerParameters | None
+    kinematics: Kinematics,
+    motors: Motors,
+    dynamics: Mapping[str, tuple[float, float]],
+    known: FingerParameters | None,
 ) -> FingerParameters:
     """The identified finger; parameters that cannot be determined are known or nominal."""
     noise = float(np.sqrt(np.mean(kinematics.joint_noise**2)))
-    values = dynamics.values
-    arms: list[list[float]] = kinematics.arms.tolist()
     plain = with_motors(motors, known)
     if known is not None and known.path is not None:
         plain = plain.replace(path=known.path, motor_lag=known.motor_lag)
+    joints = {
+        kind: tuple(dynamics[f"{kind}/{joint}"][0] for joint in JOINTS)
+        for kind in ("joint_stiffness", "joint_damping")
+    }
     return plain.replace(
-        moment_arms=tuple(tuple(row) for row in arms),
-        joint_stiffness=tuple(values[f"joint_stiffness/{joint}"] for joint in JOINTS),
-        joint_damping=tuple(values[f"joint_damping/{joint}"] for joint in JOINTS),
-        tendon_friction=values["tendon_friction"],
+        moment_arms=kinematics.arms,
+        tendon_friction=dynamics["tendon_friction"][0],
         tendon_stiffness=_stiffness(kinematics),
         command_delay=motors.delay,
         joint_noise=noise if noise > _NO_NOISE else 0.0,
         tension_noise=motors.tension_noise,
+        **joints,
     )
 
 
@@ -339,20 +343,18 @@ def _undetermined(motors: Motors, known: FingerParameters | None) -> tuple[tuple
     """Names of the parameters that the log cannot determine, each with a sentence for people."""
     kg = MOTOR_KG if known is None else known.motor_kg
     damping = "nominal" if known is None else f"{known.tendon_damping:g} N·s/m"
-    undetermined = [
-        ("joint_friction", "Acts like friction in the tendons; assumed nominal."),
-        ("tendon_damping", f"Acts like friction in the tendons; assumed {damping}."),
-        ("motor_kg", f"Masked by stretch and damping; assumed {1e3 * kg:.0f} g."),
-        ("backlash", "Acts like an offset of a motor's zero; assumed none."),
-    ]
+    undetermined = {
+        "joint_friction": "Acts like friction in the tendons; assumed nominal.",
+        "tendon_damping": f"Acts like friction in the tendons; assumed {damping}.",
+        "motor_kg": f"Masked by stretch and damping; assumed {1e3 * kg:.0f} g.",
+        "backlash": "Acts like an offset of a motor's zero; assumed none.",
+    }
     if known is not None and known.path is not None:
         lag = f"Hidden by the control period; assumed {1e3 * known.motor_lag:g} ms."
-        undetermined.append(("motor_lag", lag))
+        undetermined["motor_lag"] = lag
     if known is None and not motors.saturates:
-        undetermined.append(
-            ("most_tension", "No tendon reached its largest tension; assumed nominal.")
-        )
-    return tuple(undetermined)
+        undetermined["most_tension"] = "No tendon reached its largest tension; assumed nominal."
+    return tuple(undetermined.items())
 
 
 def _stiffness(kinematics: Kinematics) -> float | None:

@@ -1,40 +1,43 @@
-"""Tensions that balance a torque."""
+"""Tensions that balance a torque, and the drives of the modes of action."""
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog, lsq_linear
 
+from shapechanger.errors import UnknownName
 from shapechanger.finger.anatomy import (
-    JOINTS,
+    AN_1983_ARMS,
+    JOINT_RANGE,
+    JOINT_REST,
     LEAST_TENSION_N,
     MOMENT_ARMS,
     MOST_TENSION_N,
     TENDONS,
 )
+from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.tensions import (
+    DRIVES,
     co_contraction,
+    drive_of,
     spans_all_torques,
     tensions_for_torque,
 )
+from tests.finger.commands import made
 
+_STILL = np.zeros(7)
+_REST = -MOMENT_ARMS @ JOINT_REST
 _MICRO = 1e-6
-
-
-def test_the_nominal_finger_spans_all_torques() -> None:
-    assert spans_all_torques(MOMENT_ARMS)
-    for j in range(len(JOINTS)):
-        for sign in (1.0, -1.0):
-            torque = sign * 0.002 * np.eye(4)[j]
-            assert tensions_for_torque(MOMENT_ARMS, torque, 0.0, 1e3)[1]
 
 
 def test_co_contraction_has_no_torque() -> None:
     tensions = co_contraction(MOMENT_ARMS)
     assert tensions is not None
+    assert spans_all_torques(MOMENT_ARMS)
     assert tensions.min() == pytest.approx(1.0)
     np.testing.assert_allclose(MOMENT_ARMS.T @ tensions, 0.0, atol=1e-12)
 
@@ -58,19 +61,8 @@ def test_arms_that_do_not_span_are_detected() -> None:
     assert co_contraction(numb) is not None
     assert not spans_all_torques(numb)
     assert not spans_all_torques(np.zeros((7, 4)))
-    # Values often quoted: they extend the middle and last joints too strongly to be balanced.
-    quoted = np.array(
-        [
-            (11.1, 1.1, 7.9, 4.1),
-            (11.9, 1.7, 6.2, 0.0),
-            (-9.0, -1.3, -2.6, -1.9),
-            (-8.6, 0.2, -2.8, -2.2),
-            (9.3, 4.8, -1.8, -0.7),
-            (3.7, 6.1, 0.0, 0.0),
-            (6.6, -5.8, -2.6, -1.6),
-        ]
-    )
-    assert not spans_all_torques(quoted * 1e-3)
+    # They extend the middle and last joints too strongly to be balanced.
+    assert not spans_all_torques(AN_1983_ARMS)
 
 
 @given(seed=st.integers(0, 10_000))
@@ -126,15 +118,6 @@ def test_tensions_are_minimal(seed: int) -> None:
     assert np.linalg.norm(tensions - low) <= np.linalg.norm(other.x) * (1.0 + 1e-3)
 
 
-def test_the_torque_of_the_least_tensions_gives_them() -> None:
-    least = np.full(7, LEAST_TENSION_N)
-    tensions, is_enough = tensions_for_torque(
-        MOMENT_ARMS, MOMENT_ARMS.T @ least, LEAST_TENSION_N, MOST_TENSION_N
-    )
-    assert is_enough
-    np.testing.assert_allclose(tensions, least, atol=1e-6)
-
-
 def test_an_impossible_torque_is_reported() -> None:
     """The flag is false, and the tensions stay within bounds."""
     tensions, is_enough = tensions_for_torque(
@@ -142,3 +125,65 @@ def test_an_impossible_torque_is_reported() -> None:
     )
     assert not is_enough
     assert (tensions <= MOST_TENSION_N + 1e-6).all()
+
+
+@pytest.mark.parametrize("mode", DRIVES)
+def test_command_inverts_tension(mode: str) -> None:
+    rng = np.random.default_rng(0)
+    drive = drive_of(mode, NOMINAL)
+    command, length, speed = rng.uniform(-1, 1, (3, 7)) * [[1.0], [0.01], [0.2]]
+    tension = drive.tension(command, length, speed)
+    np.testing.assert_allclose(drive.command(tension, length, speed), command, atol=1e-12)
+    assert (drive.tension(command + 0.1, length, speed) > tension).all()
+
+
+@pytest.mark.parametrize("mode", ["tension", "impedance"])
+def test_commands_span_the_tensions(mode: str) -> None:
+    """At the resting length, -1 and 1 give the least and the largest tension."""
+    drive = drive_of(mode, NOMINAL)
+    np.testing.assert_allclose(drive.tension(-np.ones(7), _REST, _STILL), LEAST_TENSION_N)
+    np.testing.assert_allclose(drive.tension(np.ones(7), _REST, _STILL), MOST_TENSION_N)
+
+
+def test_impedance_stiffens_with_tension() -> None:
+    """Stiffness and damping are proportional to tension; the mode "tension" has neither."""
+    longer = _REST + 0.01
+    muscle, plain = drive_of("impedance", NOMINAL), drive_of("tension", NOMINAL)
+    more = muscle.tension(_STILL, longer, _STILL) - muscle.tension(_STILL, _REST, _STILL)
+    np.testing.assert_allclose(more, 0.25 * muscle.tension(_STILL, _REST, _STILL))
+    faster = muscle.tension(_STILL, _REST, _STILL + 0.1)
+    np.testing.assert_allclose(faster, 1.1 * muscle.tension(_STILL, _REST, _STILL))
+    np.testing.assert_array_equal(
+        plain.tension(_STILL, longer, _STILL), plain.tension(_STILL, _REST, _STILL)
+    )
+
+
+@pytest.mark.parametrize("mode", DRIVES)
+def test_the_model_pulls_as_the_drive(mode: str) -> None:
+    """For any command, posture and speed, the forces of MuJoCo's actuators are its tensions."""
+    model, drive = made(mode=mode), drive_of(mode, NOMINAL)
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    for _ in range(20):
+        data.qpos[:] = JOINT_REST + rng.uniform(-0.2, 0.2, 4)
+        data.qvel[:] = rng.uniform(-3.0, 3.0, 4)
+        data.act[:] = rng.uniform(-1.0, 1.0, 7)
+        mujoco.mj_forward(model, data)
+        asked = drive.tension(data.act, -MOMENT_ARMS @ data.qpos, -MOMENT_ARMS @ data.qvel)
+        expected = np.clip(asked, LEAST_TENSION_N, MOST_TENSION_N)
+        np.testing.assert_allclose(-data.actuator_force, expected, atol=1e-9)
+
+
+def test_length_commands_span_all_postures() -> None:
+    """In any posture, -1 gives the least and 1 the largest tension."""
+    drive = drive_of("length", NOMINAL)
+    rng = np.random.default_rng(0)
+    for angles in rng.uniform(JOINT_RANGE[:, 0], JOINT_RANGE[:, 1], (50, 4)):
+        length = -MOMENT_ARMS @ angles
+        assert (drive.tension(-np.ones(7), length, _STILL) <= LEAST_TENSION_N + 1e-9).all()
+        assert (drive.tension(np.ones(7), length, _STILL) >= MOST_TENSION_N).all()
+
+
+def test_an_unknown_mode_is_refused() -> None:
+    """The error suggests the nearest name."""
+    with pytest.raises(UnknownName, match=r"'tensions'. Did you mean 'tension'\? There are: imped"):
+        drive_of("tensions", NOMINAL)

@@ -1,0 +1,497 @@
+"""Paths that a fingertip follows: shapes, functions of time, and recorded tables.
+
+The frame is the finger's: x distal, y radial, z dorsal, in metres from the knuckle (the MCP joint);
+time is in seconds. The env checks whether a finger reaches a path.
+
+>>> from shapechanger.finger.paths import as_path
+>>> path = as_path({"kind": "circle", "radius": 0.01, "hz": 1.0})
+>>> path.at([0.0, 0.5]).round(3).tolist()
+[[0.06, 0.0, -0.045], [0.04, 0.0, -0.045]]
+"""
+
+from __future__ import annotations
+
+import csv
+import inspect
+import io
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from numbers import Real
+from pathlib import Path, PurePath
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from shapechanger.errors import PathError, UnknownName
+from shapechanger.files import read_text
+from shapechanger.finger.parameters import as_numbers
+
+Vector = tuple[float, float, float]
+"""x, y and z."""
+
+Array = NDArray[np.float64]
+
+CLOSED_M: Final = 1e-4
+"""Largest distance between the two ends of a closed path, m."""
+
+
+@dataclass(frozen=True, slots=True)
+class FingertipPath:
+    """Path that a fingertip follows; create it with the functions of this module.
+
+    A closed path is periodic, also before 0 s. An open path begins at 0 s and ends at `duration_s`;
+    before and after, the point rests at its ends.
+
+    Attributes:
+        position: Positions, m, shape (n, 3), at times from 0 to `duration_s`, s, shape (n,).
+        duration_s: Period of a closed path, or duration of an open one, s, above 0; infinite for an
+            endless function.
+        closed: Whether it is periodic.
+    """
+
+    position: Callable[[Array], Array]
+    duration_s: float
+    closed: bool
+
+    def at(self, t: ArrayLike) -> Array:
+        """Return the position of the point.
+
+        Args:
+            t: Array, s, finite, of any shape and sign.
+
+        Returns:
+            Positions in the finger's frame, m, shape (..., 3).
+
+        Raises:
+            PathError: If a time is not finite, or a function returns no position for it.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        if not np.isfinite(times).all():
+            raise PathError("Times of a path must be finite, got NaN or infinity.")
+        flat = times.ravel()
+        within = np.mod(flat, self.duration_s) if self.closed else flat.clip(0.0, self.duration_s)
+        return self.position(within).reshape(*times.shape, 3)
+
+
+FASTEST_MPS: Final = 2.0
+"""Speed limit of paths, m/s, 20 rad/s at 0.1 m; a faster one is a jump, or has wrong units."""
+
+
+def _require_slow(where: str, first: Array, last: Array, seconds: float) -> None:
+    """Refuse a jump between two points."""
+    distance = math.dist(first, last)
+    if distance > FASTEST_MPS * seconds:
+        raise PathError(
+            f"{where}: the point moves {distance:.3g} m in {seconds:.3g} s, and no fingertip is "
+            f"faster than {FASTEST_MPS:g} m/s; t must be in s, and x, y, z in m."
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Harmonics:
+    """Motion as a Fourier series.
+
+    At the angle a = 2π `hz` t + `phase`, rad, the point is at, m,
+    `centre` + Σ (cos(k a) `cosines[k - 1]` + sin(k a) `sines[k - 1]`), with k = 1, 2, …
+    """
+
+    hz: float
+    phase: float
+    centre: Vector
+    cosines: tuple[Vector, ...]
+    sines: tuple[Vector, ...]
+
+    def __call__(self, t: Array, order: int = 0) -> Array:
+        """Return the positions, or their derivative of an order, at times, s, shape (n,)."""
+        multiples = np.arange(1.0, len(self.cosines) + 1.0)
+        rates = math.tau * self.hz * multiples  # rad/s, shape (k,).
+        # Each derivative of a sine or cosine is a quarter turn ahead, times the rate.
+        angles = rates * t[:, None] + self.phase * multiples + order * math.pi / 2.0
+        grown = rates**order
+        points = (grown * np.cos(angles)) @ np.array(self.cosines)
+        points += (grown * np.sin(angles)) @ np.array(self.sines)
+        if order == 0:
+            points += self.centre
+        return points
+
+
+_CENTRE: Final = (0.050, 0.0, -0.045)
+_RADIAL: Final = (0.0, 1.0, 0.0)
+
+
+def circle(
+    radius: float = 0.012,
+    centre: Vector = _CENTRE,
+    hz: float = 0.5,
+    normal: Vector = _RADIAL,
+    phase: float = 0.0,
+) -> FingertipPath:
+    """Return a circle at constant speed.
+
+    It begins on its distal side (on its dorsal side if `normal` points along x) and turns around
+    `normal` by the right-hand rule: by default towards the palm first.
+
+    Args:
+        radius: m, above 0.
+        centre: m, in the frame of the finger.
+        hz: Turns per second, above 0.
+        normal: Normal of its plane, of any length except 0.
+        phase: Phase at 0 s, rad.
+
+    Raises:
+        PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
+    """
+    radius = _number("The radius of a circle", radius, 0.0)
+    along, across, _ = _axes(normal)
+    return _closed("circle", hz, phase, centre, [radius * along], [radius * across])
+
+
+def figure_eight(
+    size: float = 0.024,
+    centre: Vector = _CENTRE,
+    hz: float = 0.5,
+    normal: Vector = _RADIAL,
+    phase: float = 0.0,
+) -> FingertipPath:
+    """Return a horizontal figure eight: the lemniscate of Gerono.
+
+    It begins at its crossing, towards its distal loop. Seen against `normal`, it runs clockwise
+    around the distal loop and counter-clockwise around the other.
+
+    Args:
+        size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
+            wide.
+        centre: Place of the crossing, m, in the finger's frame.
+        hz: Periods per second, above 0; one period covers both loops.
+        normal: Normal of its plane, of any length except 0.
+        phase: Phase at 0 s, rad.
+
+    Raises:
+        PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
+    """
+    size = _number("The size of a figure eight", size, 0.0)
+    along, across, _ = _axes(normal)
+    sines = [size / 2.0 * along, size / 4.0 * across]
+    return _closed("figure eight", hz, phase, centre, [np.zeros(3)] * 2, sines)
+
+
+def line(
+    start: Vector = (0.060, 0.0, -0.040),
+    end: Vector = (0.040, 0.0, -0.050),
+    hz: float = 0.5,
+) -> FingertipPath:
+    """Return a straight line, traversed back and forth in harmonic motion.
+
+    Args:
+        start: First end, m, in the frame of the finger.
+        end: Other end, m; elsewhere than `start`.
+        hz: Periods per second, above 0; one period covers both directions.
+
+    Raises:
+        PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
+    """
+    first = np.array(_vector("The start of a line", start))
+    last = np.array(_vector("The end of a line", end))
+    if np.array_equal(first, last):
+        raise PathError(f"A line must end elsewhere than it starts, got {start!r} twice.")
+    middle = first / 2.0 + last / 2.0
+    return _closed("line", hz, 0.0, tuple(middle), [first - middle], [np.zeros(3)])
+
+
+def curve_3d(
+    size: float = 0.024,
+    depth: float = 0.008,
+    centre: Vector = _CENTRE,
+    hz: float = 0.5,
+    normal: Vector = _RADIAL,
+    phase: float = 0.0,
+) -> FingertipPath:
+    """Return a figure eight bent out of its plane: a three-dimensional Lissajous curve.
+
+    Compared with `figure_eight`, both loops are bent towards `normal`, and the crossing away.
+
+    Args:
+        size: Its length along x, or as near to x as its plane allows, m, above 0; it is half as
+            wide.
+        depth: Its extent along `normal`, m, above 0: half of it to each side.
+        centre: The middle, m, in the finger's frame.
+        hz: Periods per second, above 0; one period covers both loops.
+        normal: Normal of the plane out of which it is bent, of any length except 0.
+        phase: Phase at 0 s, rad.
+
+    Raises:
+        PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
+    """
+    size = _number("The size of a curve", size, 0.0)
+    depth = _number("The depth of a curve", depth, 0.0)
+    along, across, out = _axes(normal)
+    sines = [size / 2.0 * along, size / 4.0 * across]
+    cosines = [np.zeros(3), -depth / 2.0 * out]
+    return _closed("curve", hz, phase, centre, cosines, sines)
+
+
+def _number(name: str, value: Any, above: float = -math.inf) -> float:
+    """Return a finite number; raise PathError, with its name, for anything else."""
+    found = float(value) if isinstance(value, Real) else math.nan
+    if isinstance(value, bool) or not above < found < math.inf:
+        beyond = " above 0" if above == 0.0 else ""
+        raise PathError(f"{name} must be a finite number{beyond}, got {value!r}.")
+    return found
+
+
+def _vector(name: str, value: Any) -> Array:
+    """Return three finite numbers; raise PathError, with their name, for anything else."""
+    numbers = as_numbers(value)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise PathError(f"{name} must be three finite numbers (x, y, z), got {value!r}.")
+    return numbers
+
+
+def _axes(normal: Vector) -> list[Array]:
+    """Return unit vectors along, across and out of a plane: right-handed, the first close to x."""
+    out = _vector("The normal of a plane", normal).copy()
+    if not out.any():
+        raise PathError("The normal of a plane must not be (0, 0, 0): it has no direction.")
+    out /= np.abs(out).max()  # First, because the square of a small number may be 0.
+    out /= np.linalg.norm(out)
+    along = np.eye(3)[0] - out[0] * out
+    if np.linalg.norm(along) < 1e-6:
+        along = np.eye(3)[2] - out[2] * out
+    along /= np.linalg.norm(along)
+    return [along, np.cross(out, along), out]
+
+
+def _closed(
+    kind: str,
+    hz: float,
+    phase: float,
+    centre: Vector,
+    cosines: list[Array],
+    sines: list[Array],
+) -> FingertipPath:
+    """Return a closed path as `Harmonics`; `kind` names the shape in messages."""
+    hz = _number(f"The hz of a {kind}", hz, 0.0)
+    plain: list[Any] = [_vector(f"The centre of a {kind}", centre), *cosines, *sines]
+    middle, *rows = (tuple(row.tolist()) for row in plain)
+    n = len(cosines)
+    phase = _number(f"The phase of a {kind}", phase)
+    motion = Harmonics(hz, phase, middle, tuple(rows[:n]), tuple(rows[n:]))
+    path = FingertipPath(motion, duration_s=1.0 / hz, closed=True)
+    with np.errstate(over="ignore", invalid="ignore"):
+        around = motion(np.linspace(0.0, path.duration_s, 721), 1)
+        fastest = np.hypot(np.hypot(around[:, 0], around[:, 1]), around[:, 2]).max()
+    if not fastest <= FASTEST_MPS:
+        raise PathError(
+            f"This {kind} is as fast as {fastest:.3g} m/s, and no fingertip is faster than "
+            f"{FASTEST_MPS:g} m/s: make it smaller, or hz lower."
+        )
+    return path
+
+
+def from_callable(
+    function: Callable[[float], ArrayLike],
+    duration_s: float | None = None,
+    period_s: float | None = None,
+) -> FingertipPath:
+    """Create a path from a function of time.
+
+    The function is sampled 500 times per second, at most 10 000 times, and more densely where it is
+    least smooth. This finds jumps of 0.01 mm, except in rough functions.
+
+    Args:
+        function: Maps a time in s, from 0 to the end, to x, y and z in the finger's frame, m. It
+            must be deterministic.
+        duration_s: End of the path, s, above 0; the point rests there afterwards.
+        period_s: Period, s, above 0; the point must be back after it, within 0.1 mm. Give only one
+            of the two; without either, the path is endless, and its first 10 s are checked.
+
+    Raises:
+        PathError: If the function does not return three finite numbers, jumps, is faster than
+            `FASTEST_MPS`, or is not back after `period_s`; if a time is not a finite number above
+            0, or both are given.
+    """
+    if duration_s is not None and period_s is not None:
+        raise PathError(
+            "A path ends after duration_s or repeats after period_s; give only one of them."
+        )
+    length = math.inf
+    for name, given in (("duration_s", duration_s), ("period_s", period_s)):
+        length = length if given is None else _number(name, given, 0.0)
+    _require_continuous(function, 10.0 if math.isinf(length) else length)
+    if period_s is not None:
+        apart = math.dist(_point(function, 0.0), _point(function, length))
+        if apart > CLOSED_M:
+            raise PathError(
+                f"After its period of {length:.6g} s the path is {apart * 1e3:.3g} mm from its "
+                f"beginning, and {CLOSED_M * 1e3:g} mm are allowed: give another period_s, or "
+                "duration_s for an open path."
+            )
+    return FingertipPath(partial(_points, function), length, closed=period_s is not None)
+
+
+def _points(function: Callable[[float], ArrayLike], t: Array) -> Array:
+    """Return the positions of a function of one time."""
+    return np.array([_point(function, float(now)) for now in t]).reshape(-1, 3)
+
+
+def _point(function: Callable[[float], ArrayLike], t: float) -> Array:
+    given = function(t)
+    point = as_numbers(given)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise PathError(
+            "The function of a path must return three finite numbers (x, y, z) in m, and at "
+            f"{t:.6g} s it returned {given!r}."
+        )
+    return point
+
+
+def _require_continuous(function: Callable[[float], ArrayLike], length: float) -> None:
+    """Check the first seconds of a function for jumps: only a jump does not shrink by bisection."""
+    n = round(min(max(length * 500.0, 200), 10_000))
+    times = np.linspace(0.0, length, n + 1)
+    points = _points(function, times)
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.diff(points, axis=0)
+        around = np.vstack([steps[:1], steps, steps[-1:]])
+        roughness = np.linalg.norm(steps - (around[:-2] + around[2:]) / 2.0, axis=1)
+        fastest = int(np.argmax(np.linalg.norm(steps, axis=1)))
+    # Bisect the fastest and the roughest intervals, down to a microsecond.
+    for i in (fastest, *np.argsort(roughness)[-16:].tolist()):
+        start, end = float(times[i]), float(times[i + 1])
+        first, last = _point(function, start), _point(function, end)
+        while True:
+            _require_slow(f"At {start:.6g} s the path jumps", first, last, end - start)
+            middle = start / 2.0 + end / 2.0
+            if end - start < 1e-6 or not start < middle < end:
+                break
+            between = _point(function, middle)
+            if math.dist(first, between) > math.dist(between, last):
+                end, last = middle, between
+            else:
+                start, first = middle, between
+
+
+def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
+    """Read a path from a CSV file.
+
+    The first line names the columns `t`, `x`, `y` and `z`, in any order: time in s, position in the
+    finger's frame in m. Time steps may vary. A cubic spline connects the rows, with continuous
+    velocity and acceleration. Time counts from the first row. A path that ends within 0.1 mm of its
+    beginning is closed: its spline is periodic, and passes through the middle of the first and last
+    point. An open path ends with its last row.
+
+    Args:
+        path: The file, in UTF-8; empty lines are skipped.
+
+    Raises:
+        PathError: If the file cannot be read, has missing, unknown or repeated columns, or fewer
+            than three rows; if a cell is not a finite number; if time does not increase; if a time
+            step is more than five times the median; or if the point is faster than `FASTEST_MPS`.
+            The message names the line.
+    """
+    name = os.fspath(path)
+    where, table = _rows(name)
+    times, points = table[:, 0] - table[0, 0], table[:, 1:]
+    steps = np.diff(table[:, 0])
+    median = float(np.median(steps))
+    for i, (step, place) in enumerate(zip(steps.tolist(), where[1:], strict=True)):
+        if step <= 0.0:
+            raise PathError(
+                f"{place}: time must increase, from {table[i, 0]!s} s to {table[i + 1, 0]!s} s."
+            )
+        if step > 5.0 * median:
+            raise PathError(
+                f"{place}: the time step of {step:.3g} s is a gap: the median is {median:.3g} s, "
+                "and 5 times as much is allowed."
+            )
+        _require_slow(place, points[i], points[i + 1], float(times[i + 1] - times[i]))
+    closed = math.dist(points[0], points[-1]) <= CLOSED_M
+    if closed:
+        points[[0, -1]] = (points[0] + points[-1]) / 2.0
+    spline = CubicSpline(times, points, bc_type="periodic" if closed else "natural")
+    return FingertipPath(cast("Any", spline), float(times[-1]), closed)
+
+
+def _rows(name: str) -> tuple[list[str], Array]:
+    """Return the file and line of each row, and the rows of t, x, y and z, (n, 4)."""
+    try:
+        text = read_text(Path(name))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", error)
+        raise PathError(f"{name} cannot be read: {reason}.") from error
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        found = [(f"{name}, line {reader.line_num}", cells) for cells in reader if cells]
+    except csv.Error as error:
+        raise PathError(f"{name}, line {reader.line_num}, is not valid CSV: {error}.") from error
+    header = [cell.strip() for cell in found[0][1]] if found else []
+    if sorted(header) != ["t", "x", "y", "z"]:
+        raise PathError(
+            f"{name} names the columns {', '.join(header) or 'none'} in its first line: they must "
+            "be t, x, y and z."
+        )
+    for where, cells in found[1:]:
+        numbers = as_numbers(cells)
+        if numbers.shape != (4,) or not np.isfinite(numbers).all():
+            raise PathError(f"{where}: four finite numbers are due, got {','.join(cells)!r}.")
+    if len(found) < 4:  # A spline of two rows would be a line.
+        raise PathError(f"{name} has too few rows: {len(found) - 1}, and a path needs 3.")
+    table = np.array([cells for _, cells in found[1:]], np.float64)
+    return [where for where, _ in found[1:]], table[:, [header.index(c) for c in "txyz"]]
+
+
+PathSource = FingertipPath | str | PurePath | Mapping[str, Any] | Callable[[float], ArrayLike]
+"""A path, the name of a shape, a CSV file, a name with settings, or a function of time."""
+
+_SHAPES: Final[dict[str, Callable[..., FingertipPath]]] = {
+    "circle": circle,
+    "figure-eight": figure_eight,
+    "line": line,
+    "curve": curve_3d,
+}
+
+KINDS: Final = tuple(_SHAPES)
+"""Names of the shapes."""
+
+
+def as_path(value: PathSource) -> FingertipPath:
+    """Return a path from any of its sources.
+
+    Args:
+        value: A path; the name of a shape, one of `KINDS`; a mapping with that name as "kind" and
+            with arguments of the function that makes the shape, such as
+            `{"kind": "circle", "radius": 0.01, "hz": 1.0}`; the name of a file that ends in .csv,
+            as `from_csv` reads it; or a function for `from_callable`, endless.
+
+    Raises:
+        UnknownName: If there is no such shape, or it has no such setting.
+        PathError: If it is not one of these, or the path is invalid.
+    """
+    given: Any = value  # May be anything where nothing checks types.
+    if isinstance(given, FingertipPath):
+        return given
+    if isinstance(given, (str, PurePath)) and str(given).lower().endswith(".csv"):
+        return from_csv(given)
+    if isinstance(given, str):
+        given = {"kind": given}
+    if isinstance(given, Mapping) and "kind" in given:
+        settings = dict(cast("Mapping[str, Any]", given))
+        kind = str(settings.pop("kind"))
+        if kind not in _SHAPES:
+            raise UnknownName("path", kind, KINDS)
+        known = tuple(inspect.signature(_SHAPES[kind]).parameters)
+        for name in settings:
+            if name not in known:
+                raise UnknownName(f"setting of {kind!r}", str(name), known)
+        return _SHAPES[kind](**settings)
+    if callable(cast("Any", given)):
+        return from_callable(cast("Callable[[float], ArrayLike]", given))
+    raise PathError(
+        f'A path must be one of {", ".join(KINDS)}, a mapping with such a name as "kind", a .csv '
+        f"file or a function of time, got {given!r}."
+    )

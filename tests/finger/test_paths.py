@@ -1,0 +1,481 @@
+"""Paths: shapes, functions, CSV files, and the laws of all of them."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import pickle
+from collections.abc import Callable, Sequence
+from pathlib import Path as File
+from typing import Any
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from scipy.interpolate import CubicSpline
+
+from shapechanger.errors import PathError, UnknownName
+from shapechanger.finger.paths import (
+    FASTEST_MPS,
+    KINDS,
+    FingertipPath,
+    as_path,
+    circle,
+    curve_3d,
+    figure_eight,
+    from_callable,
+    from_csv,
+    line,
+)
+
+law = settings(max_examples=40)
+
+SIZES = st.floats(0.002, 0.04)
+RATES = st.floats(0.1, 2.0)
+PHASES = st.floats(-7.0, 7.0)
+PLACES = st.tuples(*[st.floats(-0.1, 0.1)] * 3)
+NORMALS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda n: math.hypot(*n) > 1e-3)
+CENTRE = np.array([0.05, 0.0, -0.045])
+DISTAL, RADIAL, DORSAL = np.eye(3)
+Point = tuple[float, float, float]
+
+
+def wave(t: float) -> Point:
+    """Return a point that repeats after 2 s."""
+    return 0.05 + 0.01 * math.sin(math.pi * t), 0.003 * math.cos(2 * math.pi * t), -0.04
+
+
+def recording(closed: bool, seed: int) -> FingertipPath:
+    """Return a random walk with uneven steps of 8 to 30 ms."""
+    rng = np.random.default_rng(seed)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.008, 0.03, 40))])
+    points = np.cumsum(rng.normal(0.0, 1e-3, (41, 3)), axis=0)
+    if closed:
+        points[-1] = points[0]
+    spline = CubicSpline(times, points, bc_type="periodic" if closed else "natural")
+    return FingertipPath(spline, float(times[-1]), closed)
+
+
+shapes = st.one_of(
+    st.builds(circle, SIZES, PLACES, RATES, NORMALS, PHASES),
+    st.builds(figure_eight, SIZES, PLACES, RATES, NORMALS, PHASES),
+    st.builds(curve_3d, SIZES, SIZES, PLACES, RATES, NORMALS, PHASES),
+    st.builds(
+        lambda start, way, hz: line(start, tuple(np.add(start, way)), hz),
+        PLACES,
+        st.tuples(*[SIZES] * 3),
+        RATES,
+    ),
+)
+closed_paths = st.one_of(
+    shapes,
+    st.just(from_callable(wave, period_s=2.0)),
+    st.builds(recording, st.just(True), st.integers(0, 20)),
+)
+ending_paths = st.one_of(
+    st.builds(lambda s: from_callable(wave, duration_s=s), st.floats(0.5, 3.0)),
+    st.builds(recording, st.just(False), st.integers(0, 20)),
+)
+
+
+@law
+@given(path=closed_paths, part=st.floats(0.0, 1.0), rounds=st.integers(-3, 50))
+def test_a_closed_path_repeats_without_a_seam(
+    path: FingertipPath, part: float, rounds: int
+) -> None:
+    """Positions are periodic, before 0 s too, and position and velocity are continuous."""
+    t = part * path.duration_s
+    np.testing.assert_allclose(path.at(t + rounds * path.duration_s), path.at(t), atol=1e-9)
+    h = 1e-6
+    before, at, after = path.at([path.duration_s - h, path.duration_s, path.duration_s + h])
+    np.testing.assert_allclose(before, after, atol=1e-5)
+    np.testing.assert_allclose(at - before, after - at, atol=1e-9)
+
+
+@law
+@given(path=ending_paths, later=st.floats(0.01, 100.0))
+def test_an_open_path_is_constant_outside(path: FingertipPath, later: float) -> None:
+    """Before its start and after its end, an open path stays at the end points."""
+    assert not path.closed
+    for t, end in ((path.duration_s + later, path.duration_s), (-later, 0.0)):
+        np.testing.assert_array_equal(path.at(t), path.at(end))
+
+
+@law
+@given(
+    path=st.one_of(closed_paths, ending_paths),
+    times=st.lists(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), max_size=4),
+)
+def test_times_are_batched(path: FingertipPath, times: Sequence[Sequence[float]]) -> None:
+    """Times of any shape give the same positions as single times."""
+    t = np.reshape(np.array(times, dtype=np.float64), (-1, 3))
+    answer = path.at(t)
+    assert (answer.shape, answer.dtype) == ((*t.shape, 3), np.float64)
+    for place in np.ndindex(t.shape):
+        alone = path.at(float(t[place]))
+        assert alone.shape == (3,)
+        np.testing.assert_allclose(answer[place], alone, rtol=1e-12, atol=1e-12)
+
+
+@law
+@given(path=shapes, digits=st.sampled_from([6, 12]))
+def test_a_shape_round_trips_through_csv(
+    path: Any, digits: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """A shape is not too fast; with six digits and read back, it is within 0.01 mm."""
+    times = np.linspace(0.0, path.duration_s, 1 + math.ceil(100.0 * path.duration_s))
+    points = path.at(times)
+    assert np.linalg.norm(path.position(times, 1), axis=1).max() <= FASTEST_MPS + 1e-9
+    rows = [
+        ",".join(f"{value:.{digits}f}" for value in (t, *point))
+        for t, point in zip(times, points, strict=True)
+    ]
+    file = tmp_path_factory.mktemp("paths") / "path.csv"
+    file.write_text("\n".join(["t,x,y,z", *rows, ""]))
+    read = from_csv(file)
+    assert read.closed
+    np.testing.assert_allclose(read.at(times), points, rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(read.duration_s, path.duration_s, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [*map(as_path, KINDS), recording(True, 0), recording(False, 1), from_callable(wave)],
+)
+def test_paths_are_values(path: FingertipPath) -> None:
+    """A pickled path has the same positions; writing to a result does not change the path."""
+    times = np.linspace(-1.0, 3.0, 50)
+    copy = pickle.loads(pickle.dumps(path))
+    before = path.at(times)
+    answer = path.at(times)
+    answer += 1.0
+    np.testing.assert_array_equal(copy.at(times), before)
+    np.testing.assert_array_equal(path.at(times), before)
+    assert (copy.duration_s, copy.closed) == (path.duration_s, path.closed)
+    assert circle(hz=1.0) == circle(hz=1.0) != circle(hz=1.1)
+
+
+@pytest.mark.parametrize("t", [math.nan, math.inf, [0.0, -math.inf]])
+def test_times_must_be_finite(t: float | list[float]) -> None:
+    with pytest.raises(PathError, match=r"^Times of a path must be finite, got NaN"):
+        circle().at(t)
+
+
+@pytest.mark.parametrize(
+    ("normal", "length"),
+    [((0, 1, 0), 1), ((0, 0, -3), 3), ((1, 0, 0), 1), ((2, 3, 6), 7), ((1e-200, 0, 0), 1e-200)],
+)
+def test_a_circle_is_round(normal: Point, length: float) -> None:
+    """Points are in the plane, at the radius, and turn counter-clockwise at constant speed."""
+    path: Any = circle(0.01, hz=2.0, normal=normal)
+    t = np.linspace(0.0, 0.5, 100)
+    arms, velocity = path.at(t) - CENTRE, path.position(t, 1)
+    unit, rate = np.array(normal) / length, 4 * math.pi  # rad/s
+    np.testing.assert_allclose(np.linalg.norm(arms, axis=1), 0.01)
+    np.testing.assert_allclose(arms @ unit, 0.0, atol=1e-12)
+    np.testing.assert_allclose(velocity, rate * np.cross(unit, arms), atol=1e-12)
+
+
+def test_a_circle_starts_distally_and_goes_palmar() -> None:
+    """Phase 0 is the distal point; the direction is palmar."""
+    np.testing.assert_allclose(circle().at(0.0), CENTRE + 0.012 * DISTAL)
+    np.testing.assert_allclose(circle().at(0.5), CENTRE - 0.012 * DORSAL)
+    np.testing.assert_allclose(circle(normal=(1, 0, 0)).at(0.0), CENTRE + 0.012 * DORSAL)
+
+
+def test_a_figure_eight_crosses_itself_once() -> None:
+    """The path passes its centre twice a period, and the loops turn in opposite directions."""
+    path: Any = figure_eight(0.02)
+    np.testing.assert_allclose(path.at([0.0, 1.0]), [CENTRE, CENTRE], atol=1e-15)
+    towards, back = path.position(np.array([0.0, 1.0]), 1)
+    assert towards @ DISTAL > 0 > back @ DISTAL
+    assert abs(towards @ back) < 0.9 * np.linalg.norm(towards) * np.linalg.norm(back)
+    points = path.at(np.linspace(0.0, 2.0, 2001)) - CENTRE
+    np.testing.assert_allclose(np.ptp(points, axis=0), [0.02, 0.0, 0.01], atol=1e-6)
+    for half, sign in ((points[:1001], -1), (points[1000:], 1)):
+        # With the normal towards the viewer, palmar is up where distal is right.
+        right, up = half @ DISTAL, half @ -DORSAL
+        assert np.sign(np.sum(right[:-1] * up[1:] - right[1:] * up[:-1])) == sign
+
+
+@pytest.mark.parametrize("make", [circle, figure_eight, curve_3d])
+@pytest.mark.parametrize("phase", [-1.0, 0.3, 2.0])
+def test_a_phase_is_a_shift_in_time(make: Callable[..., FingertipPath], phase: float) -> None:
+    t = np.linspace(0.0, 4.0, 50)
+    ahead = phase / (2 * math.pi * 0.25)  # s
+    np.testing.assert_allclose(
+        make(hz=0.25, phase=phase).at(t), make(hz=0.25).at(t + ahead), atol=1e-12
+    )
+
+
+def test_a_line_rests_at_both_ends() -> None:
+    """A line goes there and back in one period, fastest in the middle."""
+    path: Any = line((0.06, 0.0, -0.04), (0.04, 0.0, -0.04), hz=0.25)
+    times = np.array([0.0, 1.0, 2.0, 4.0])
+    np.testing.assert_allclose(path.at(times)[:, 0], [0.06, 0.05, 0.04, 0.06], rtol=1e-12)
+    speeds = np.linalg.norm(path.position(times, 1), axis=1)
+    np.testing.assert_allclose(speeds, [0.0, 0.01 * math.pi / 2, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_curve_is_a_bent_figure_eight() -> None:
+    """Seen along the normal it is the figure eight; along the normal it has the given depth."""
+    t = np.linspace(0.0, 2.0, 2001)
+    bent, flat = curve_3d(0.02, depth=0.006).at(t), figure_eight(0.02).at(t)
+    np.testing.assert_allclose(bent[:, [0, 2]], flat[:, [0, 2]], atol=1e-12)
+    np.testing.assert_allclose((bent @ RADIAL)[[0, 500, 1000, 1500]], [-0.003, 0.003] * 2)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: circle(radius=0.0), "The radius of a circle must be a finite number above 0"),
+        (lambda: circle(radius=math.nan), "must be a finite number above 0, got nan"),
+        (lambda: circle(radius="1"), "must be a finite number above 0, got '1'"),
+        (lambda: circle(radius=True), "must be a finite number above 0, got True"),
+        (lambda: circle(hz=-1), "The hz of a circle must be a finite number above 0, got -1"),
+        (lambda: circle(phase=math.inf), "The phase of a circle must be a finite number, got inf"),
+        (lambda: circle(centre=(0.0, 0.0)), "The centre of a circle must be three finite numbers"),
+        (lambda: circle(normal=(0, 1, math.nan)), "The normal of a plane must be three finite"),
+        (lambda: circle(normal=(0, 0, 0)), "The normal of a plane must not be"),
+        (lambda: circle(radius=0.05, hz=10.0), "This circle is as fast as 3.14 m/s, and no"),
+        (lambda: circle(radius=1e300, hz=1e300), "This circle is as fast as inf m/s"),
+        (lambda: figure_eight(size=-0.1), "The size of a figure eight must be a finite number"),
+        (lambda: curve_3d(size=0), "The size of a curve must be a finite number above 0"),
+        (lambda: curve_3d(depth=0), "The depth of a curve must be a finite number above 0"),
+        (lambda: line((1, 2, 3), (1, 2, 3)), "A line must end elsewhere than it starts"),
+        (lambda: line(start=None), "The start of a line must be three finite numbers"),
+        (lambda: line(end=[1, 2, "c"]), "The end of a line must be three finite numbers"),
+    ],
+)
+def test_invalid_arguments_are_refused(make: Callable[[], Any], message: str) -> None:
+    """Each argument is checked, and the error names it."""
+    with pytest.raises(PathError, match=message):
+        make()
+
+
+# Functions
+
+
+def test_positions_are_those_of_the_function() -> None:
+    """Neither rounded nor interpolated; a function gets floats, and none beyond its end."""
+    seen: list[float] = []
+
+    def function(t: float) -> Point:
+        seen.append(t)
+        return t, 0.0, 0.0
+
+    path = from_callable(function, duration_s=0.018)
+    np.testing.assert_array_equal(path.at([-1.0, 0.001, 1.0])[:, 0], [0, 0.001, 0.018])
+    assert (min(seen), max(seen)) == (0.0, 0.018)
+    assert {type(t) for t in seen} == {float}
+    endless, closed = from_callable(wave), from_callable(wave, period_s=4.0)
+    assert (endless.duration_s, endless.closed) == (math.inf, False)
+    assert (closed.duration_s, closed.closed) == (4.0, True)
+
+
+@pytest.mark.parametrize("given", [(0.0, 0.0), "abc", (0.0, 0.0, "z"), None, (0, 0, math.nan)])
+def test_a_point_is_three_finite_numbers(given: object) -> None:
+    """Other results raise an error that shows them, also beyond the trial."""
+    function: Any = lambda t: given if t > 60.0 else (0.0, 0.0, 0.0)  # noqa: E731
+    path = from_callable(function)
+    for fails in (lambda: path.at([59.0, 61.0]), lambda: from_callable(lambda _: given)):
+        with pytest.raises(PathError, match="it returned") as caught:
+            fails()
+        assert repr(given) in str(caught.value)
+    with pytest.raises(ZeroDivisionError):  # The function's own errors are not wrapped.
+        from_callable(lambda t: (1 / t, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("jump", [1e-5, 1e-3, 0.5, 1e308])
+@pytest.mark.parametrize("when", [0.0007, 1.23456, 3.999])
+def test_a_jump_is_found(jump: float, when: float) -> None:
+    """Jumps from 0.01 mm on are found at any time, and the error states where."""
+
+    def function(t: float) -> Point:
+        x, y, z = wave(t)
+        return x, y, z + (jump if t > when else -jump if jump > 1 else 0.0)
+
+    with pytest.raises(PathError, match="no fingertip is faster than 2 m/s") as caught:
+        from_callable(function, duration_s=4.0)
+    assert abs(float(str(caught.value).split()[1]) - when) < 3e-3
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda t: (1.9 * t, 0.0, 0.0),
+        lambda t: (0.01 * abs(math.sin(t)), 0.0, 0.0),
+        lambda t: [0.05 * math.sqrt(t + 1e-3), 0.0, 0.0],
+        lambda t: np.array([0.01, math.floor(t * 100) * 1e-9, 0.0]),
+    ],
+)
+def test_steep_slopes_and_corners_are_not_jumps(function: Callable[[float], Any]) -> None:
+    """Corners are continuous, and steps of 1 nm count as rounding."""
+    path = from_callable(function, duration_s=2.0)
+    np.testing.assert_array_equal(path.at(1.9), np.array(function(1.9)))
+
+
+@pytest.mark.parametrize("hz", [100.0, 3000.0])
+def test_a_path_that_is_too_fast_is_refused(hz: float) -> None:
+    """Fast oscillations are found, even where whole periods fit between the samples."""
+    with pytest.raises(PathError, match="no fingertip is faster than 2 m/s"):
+        from_callable(lambda t: (0.02 * math.sin(2 * math.pi * hz * t), 0.0, 0.0), duration_s=1.7)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ({"duration_s": 0.0}, "duration_s must be a finite number above 0, got 0.0"),
+        ({"period_s": math.inf}, "period_s must be a finite number above 0, got inf"),
+        ({"duration_s": 1.0, "period_s": 1.0}, "give only one of them"),
+        ({"period_s": 3.0}, r"is 0\.12 mm from its beginning, and 0.1 mm are allowed"),
+    ],
+)
+def test_invalid_durations_are_refused(times: dict[str, float], message: str) -> None:
+    """Durations are positive and exclude each other, and a period returns to the start."""
+    with pytest.raises(PathError, match=message):
+        from_callable(lambda t: (0.00004 * t, 0.0, 0.0), **times)
+
+
+# CSV files
+
+GOOD = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0,0\n0.2,0.07,0.01,0\n0.3,0.08,0.01,0\n"
+
+
+@pytest.fixture
+def write(tmp_path: File) -> Callable[[str], File]:
+    """Return a function that writes a text to a CSV file."""
+
+    def put(text: str) -> File:
+        file = tmp_path / "path.csv"
+        file.write_bytes(text.encode())
+        return file
+
+    return put
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\n\n"),
+        "\ufeff" + GOOD,
+        GOOD.replace(",", " , "),
+        "z,t,y,x\n0,0,0,.05\n0,.1,0,6e-2\n0,.2,.01,.07\n0,.3,.01,.08",
+        '"t","x","y","z"\n7.5,0.05,0,0\n7.6,0.06,0,0\n7.7,0.07,0.01,0\n7.8,0.08,0.01,0\n',
+    ],
+    ids=["CRLF", "empty lines", "BOM", "spaces", "order", "offset and quotes"],
+)
+def test_formats_of_csv(write: Callable[[str], File], text: str) -> None:
+    """Line ends, spaces, quotes, a BOM and the order of columns do not matter."""
+    path = from_csv(str(write(text)))
+    assert not path.closed
+    assert path.duration_s == pytest.approx(0.3)
+    np.testing.assert_allclose(
+        path.at([0.0, 0.1, 0.2, 0.3]),
+        [[0.05, 0, 0], [0.06, 0, 0], [0.07, 0.01, 0], [0.08, 0.01, 0]],
+        atol=1e-12,
+    )
+
+
+def test_a_file_that_returns_to_its_start_is_closed(write: Callable[[str], File]) -> None:
+    """Ends within 0.1 mm of each other close the path; both move to their mean."""
+    rows = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0.01,0\n0.2,0.05,0.02,0\n0.3,{end},0,0\n"
+    closed = from_csv(write(rows.format(end=0.05009)))
+    assert closed.closed
+    np.testing.assert_allclose(closed.at([0.0, 0.3]), [[0.050045, 0, 0]] * 2, atol=1e-12)
+    ending = from_csv(write(rows.format(end=0.05011)))
+    assert not ending.closed
+    np.testing.assert_allclose(ending.at(9.0), [0.05011, 0, 0], atol=1e-12)
+
+
+def lines(*rows: str) -> str:
+    """Return a CSV text with the usual header."""
+    return "\n".join(["t,x,y,z", *rows, ""])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("\n\n", "names the columns none in its first line: they must be t, x, y and z"),
+        ("t,x,y\n0,0,0\n", "names the columns t, x, y in its first line"),
+        ("t,x,x,y,z\n", "names the columns t, x, x, y, z in its first line"),
+        ("t,x,y,z\n", "has too few rows: 0, and a path needs 3"),
+        (lines("0,0,0,0", "1,0,0,0"), "has too few rows: 2"),
+        (lines("0,0,0,0", "", "1,0,0"), "line 4: four finite numbers are due, got '1,0,0'"),
+        (lines("0,0,zero,0"), "line 2: four finite numbers are due, got '0,0,zero,0'"),
+        (lines("0,0,0,0", "1,,0,0"), "line 3: four finite numbers are due"),
+        (lines("0,0,0,0", "-inf,0,0,0"), "line 3: four finite numbers are due"),
+        (lines("0,0,0,0", "0.2,0,0,0", "0.1,0,0,0"), "line 4: time must increase, from 0.2 s to"),
+        (lines("5,0,0,0", "5.2,0,0,0", "", "5.2,0,0,0"), "line 5: time must increase"),
+        (
+            lines("0,0,0,0", "0.1,0,0,0", "0.2,0,0,0", "0.8,0,0,0"),
+            "line 5: the time step of 0.6 s is a gap: the median is 0.1 s",
+        ),
+        (
+            lines("0,0,0,0", "0.1,0,0,0", "0.2,0.3,0,0"),
+            "line 4: the point moves 0.3 m in 0.1 s, .* t must be in s, and x, y, z in m",
+        ),
+        (lines("0,0,-1e308,0", "0.1,0,1e308,0", "0.2,0,0,0"), "line 3: the point moves inf m"),
+        (lines('0,0,0,"0'), "line 2, is not valid CSV: unexpected end of data"),
+    ],
+)
+def test_invalid_files_are_refused(write: Callable[[str], File], text: str, message: str) -> None:
+    """The error names the file and the line."""
+    with pytest.raises(PathError, match=f"path.csv.*{message}"):
+        from_csv(write(text))
+
+
+def test_unreadable_files_are_refused(tmp_path: File) -> None:
+    noise = tmp_path / "noise.csv"
+    noise.write_bytes(b"t,x,y,z\n\xff\xfe\n")
+    for file, why in ((tmp_path / "none.csv", "cannot be read: No such"), (noise, "not UTF-8")):
+        with pytest.raises(PathError, match=f"{file.name} .*{why}"):
+            from_csv(file)
+
+
+# What users give
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_argument_of_a_shape_is_a_setting(kind: str) -> None:
+    """A name gives the shape with default settings, and so do all defaults, given explicitly."""
+    makers = {"circle": circle, "figure-eight": figure_eight, "line": line, "curve": curve_3d}
+    assert tuple(makers) == KINDS
+    make: Any = makers[kind]
+    defaults = {n: p.default for n, p in inspect.signature(make).parameters.items()}
+    given = {"kind": kind, **defaults}
+    assert as_path(kind) == as_path(given) == make()
+    assert "kind" in given  # It is not modified.
+    path = as_path({"kind": "circle", "radius": 0.01, "centre": [0.04, 0, 0]})
+    assert path == circle(0.01, (0.04, 0, 0))
+    assert as_path(path) is path
+
+
+def test_files_and_functions_are_paths(write: Callable[[str], File]) -> None:
+    """File names are accepted as str or Path, with `.csv` in any case."""
+    file = write(GOOD)
+    upper = file.rename(file.with_suffix(".CSV"))
+    for one in (upper, str(upper)):
+        np.testing.assert_allclose(as_path(one).at(0.1), [0.06, 0, 0])
+    assert as_path(wave).duration_s == math.inf
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ("figure_eight", UnknownName, r"No path .*Did you mean 'figure-eight'\? There are: circle"),
+        ({"kind": "cirle"}, UnknownName, "No path matches 'cirle'. Did you mean 'circle'"),
+        ({"kind": "circle", "raduis": 1}, UnknownName, "setting of 'circle' .*mean 'radius'"),
+        ({"kind": "line", 3: 0.01}, UnknownName, "No setting of 'line' matches '3'"),
+        ({"kind": "circle", "radius": "wide"}, PathError, "The radius of a circle must be a"),
+        ({"radius": 0.01}, PathError, 'one of circle, .* with such a name as "kind"'),
+        (File("path.txt"), PathError, "a .csv file or a function of time, got .*path.txt"),
+        (3, PathError, "a function of time, got 3"),
+    ],
+)
+def test_other_objects_are_refused(given: Any, error: type[Exception], message: str) -> None:
+    """The error lists what is accepted, and suggests the nearest shape or setting."""
+    with pytest.raises(error, match=message):
+        as_path(given)

@@ -1,0 +1,125 @@
+"""Kinematics of the fingertip, the reward, and the numbers of an observation."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import UnknownName
+from shapechanger.finger.anatomy import JOINT_RANGE, MOST_TENSION_N, PHALANX_LENGTH_M
+from shapechanger.finger.model import FINGERTIP
+from shapechanger.finger.task import (
+    FingerSenses,
+    FingertipReward,
+    features_of_senses,
+    fingertip,
+    fingertip_jacobian,
+)
+from tests.finger.commands import made
+
+_RIGHT = np.pi / 2
+# Any posture, joint limits exceeded.
+_ANGLES = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
+
+
+def test_fingertip_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Straight, each joint flexed to a right angle, and full abduction."""
+    monkeypatch.setattr("shapechanger.finger.task.PHALANX_LENGTH_M", (4.0, 2.0, 1.0))
+    expected = {
+        (0.0, 0.0, 0.0, 0.0): (7.0, 0.0, 0.0),
+        (_RIGHT, 0.0, 0.0, 0.0): (0.0, 0.0, -7.0),
+        (0.0, _RIGHT, 0.0, 0.0): (0.0, 7.0, 0.0),
+        (0.0, 0.0, _RIGHT, 0.0): (4.0, 0.0, -3.0),
+        (0.0, 0.0, 0.0, _RIGHT): (6.0, 0.0, -1.0),
+        (0.0, 0.0, _RIGHT, _RIGHT): (3.0, 0.0, -2.0),
+    }
+    for angles, place in expected.items():
+        np.testing.assert_allclose(fingertip(angles), place, atol=1e-12)
+
+
+def test_fingertip_matches_the_simulator() -> None:
+    """The position equals the site's in MuJoCo; angles of any shape are batched."""
+    model = made()
+    data = mujoco.MjData(model)
+    angles = np.random.default_rng(0).uniform(*JOINT_RANGE.T, (200, 4))
+    places = []
+    for q in angles:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        places.append(data.site_xpos[model.site(FINGERTIP).id].copy())
+    np.testing.assert_allclose(fingertip(angles), places, atol=1e-12)
+    assert fingertip(angles.reshape(4, 50, 4)).shape == (4, 50, 3)
+
+
+@given(angles=_ANGLES)
+def test_jacobian_matches_finite_differences(angles: tuple[float, ...]) -> None:
+    """The Jacobian equals central differences at any angles, alone and in a batch."""
+    step = 1e-6
+    moved = np.array(angles) + step * np.concatenate([np.eye(4), -np.eye(4)])
+    there, back = fingertip(moved).reshape(2, 4, 3)
+    expected = ((there - back) / (2.0 * step)).T
+    np.testing.assert_allclose(fingertip_jacobian(angles), expected, atol=1e-9)
+    np.testing.assert_allclose(fingertip_jacobian([[angles]]), [[expected]], atol=1e-9)
+
+
+@given(angles=_ANGLES)
+def test_no_posture_reaches_beyond_the_finger(angles: tuple[float, ...]) -> None:
+    """The distance is at most the finger's length, and flexing the knuckle does not change it."""
+    place = fingertip(angles)
+    assert np.linalg.norm(place) <= sum(PHALANX_LENGTH_M) + 1e-12
+    straight = fingertip((0.0, *angles[1:]))
+    assert np.linalg.norm(place) == pytest.approx(np.linalg.norm(straight))
+    assert place[1] == straight[1]
+
+
+def test_nearness_grows_as_the_distance_shrinks() -> None:
+    """Monotonically, fastest in the last millimetres, up to the weight per second."""
+    distances = np.linspace(0.1, 0.0, 201)
+    near = FingertipReward().terms(distances, 0.0, 0.0, 0.02)["reward_nearness"]
+    gains = np.diff(near)
+    assert (gains > 0.0).all()
+    assert gains.argmax() == len(gains) - 1
+    assert near[0] > 0.0
+    for dt in (0.02, 0.1):
+        terms = FingertipReward().terms(0.0, 0.0, 0.0, dt)
+        assert terms.pop("reward_nearness") == pytest.approx(50.0 * dt)
+        assert terms == {"reward_effort": 0.0, "reward_change": 0.0}
+
+
+def test_effort_and_change_are_weighted() -> None:
+    """Costs per second; change costs nothing by default, and unknown weights are refused."""
+    plain = FingertipReward().terms(0.01, 0.5, 1.0, 0.02)
+    assert plain["reward_effort"] == pytest.approx(-0.01)
+    assert plain["reward_change"] == 0.0
+    other = FingertipReward.from_weights({"change": 5.0, "effort": 0})
+    assert other.terms(0.01, 0.5, 1.0, 0.02)["reward_change"] == pytest.approx(-0.1)
+    assert other.terms(0.01, 0.5, 1.0, 0.02)["reward_effort"] == 0.0
+    assert other.nearness == FingertipReward().nearness
+    with pytest.raises(UnknownName, match=r"'nearnes'. Did you mean 'nearness'"):
+        FingertipReward.from_weights({"nearnes": 1.0})
+
+
+def test_numbers_match_their_features() -> None:
+    """Each number has its name, unit, bounds and element."""
+    parts = (4, 4, 7, 7, 7, 3)
+    senses = FingerSenses(*(10.0 * i + np.arange(n) for i, n in enumerate(parts)))
+    features = {f.name: f for f in features_of_senses()}
+    found = dict(zip(features, senses.numbers(), strict=True))
+    expected = {
+        "PIP_flexion/angle": (2.0, "rad", *JOINT_RANGE[2]),
+        "MCP_abduction/velocity": (11.0, "rad/s", -np.inf, np.inf),
+        "EIP/tension": (22.0, "N", 0.0, MOST_TENSION_N[2]),
+        "FDP/length": (30.0, "m", -np.inf, np.inf),
+        "PI/command": (46.0, "1", -1.0, 1.0),
+        "fingertip/z": (52.0, "m", -np.inf, np.inf),
+    }
+    assert len(found) == 32
+    for name, (number, unit, low, high) in expected.items():
+        feature = features[name]
+        assert (found[name], feature.unit, feature.low, feature.high) == (number, unit, low, high)
+    element = features["EIP/tension"].element
+    assert element is not None
+    assert (element.kind, element.name) == ("tendon", "EIP")
