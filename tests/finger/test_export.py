@@ -6,9 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.finger.export import finger_mjcf
 from shapechanger.finger.gap import GAPS
-from shapechanger.finger.model import build_finger
+from shapechanger.finger.model import build_finger, finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import drive_of
 

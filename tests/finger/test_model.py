@@ -14,11 +14,10 @@ from shapechanger.finger.anatomy import (
     JOINTS,
     LEAST_TENSION_N,
     MOMENT_ARMS,
-    PHALANX_LENGTH_M,
     TENDONS,
 )
 from shapechanger.finger.gap import GAPS
-from shapechanger.finger.model import FINGERTIP, HOOD, SIM_DT
+from shapechanger.finger.model import HOOD, SIM_DT
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.postures import draw_posture
 from shapechanger.finger.tensions import DRIVES, co_contraction, drive_of
@@ -104,18 +103,6 @@ def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
         assert not any(warning.number for warning in data.warning), name
 
 
-def test_commands_are_clipped() -> None:
-    """Commands beyond their range act like those at its end."""
-    model = made()
-    ends = []
-    for command in (1.0, 100.0):
-        data = at_rest(model)
-        data.ctrl[:] = command
-        mujoco.mj_step(model, data, 50)
-        ends.append(data.qpos.copy())
-    np.testing.assert_array_equal(*ends)
-
-
 def test_tendons_are_slack_within_the_backlash() -> None:
     """Within the backlash, motors do not move the finger."""
     parameters = STRETCHED.replace(backlash=2e-3)
@@ -129,27 +116,6 @@ def test_tendons_are_slack_within_the_backlash() -> None:
     data.qpos[4:] += 2e-3
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qfrc_spring[4:], -10e3 * 1e-3)
-
-
-def test_lengths_are_relative_to_the_straight_finger() -> None:
-    model = made()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.ten_length[:7], 0.0, atol=1e-15)
-    data.qpos[:] = JOINT_REST
-    mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.ten_length[:7], -MOMENT_ARMS @ JOINT_REST, atol=1e-15)
-
-
-def test_size_and_weight_of_the_finger() -> None:
-    """The finger is about 9 cm long and weighs about 25 g."""
-    model = made()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    tip = data.site_xpos[model.site(FINGERTIP).id]
-    np.testing.assert_allclose(tip, [sum(PHALANX_LENGTH_M), 0.0, 0.0], atol=1e-12)
-    assert 0.020 < model.body_mass.sum() < 0.035
-    assert (np.diff(model.body_mass[1:4]) < 0.0).all()
 
 
 def test_a_command_acts_after_its_delay() -> None:
@@ -171,7 +137,7 @@ def test_a_command_acts_after_its_delay() -> None:
     np.testing.assert_allclose(later[15:], now[:45], atol=1e-6)
 
 
-@pytest.mark.parametrize("level", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("level", [1.0, 2.0])
 def test_co_contraction_stiffens_the_joints(level: float) -> None:
     """Active stiffness is proportional to tensions that have no torque."""
     model = made(NOMINAL, "impedance")

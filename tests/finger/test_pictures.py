@@ -54,36 +54,6 @@ def test_a_frame_follows_finger_and_target(finger: Any) -> None:
     assert 0.001 < _differs(*frames).mean() < 0.1
 
 
-def test_a_reached_target_is_visible(finger: Any) -> None:
-    """The target is drawn larger than the fingertip and stays visible."""
-    rest = JOINT_REST.tolist()
-    finger.reset(seed=0, options={"posture": rest, "target": rest})
-    reached = finger.render().astype(int)
-    green = (reached[:, :, 1] > reached[:, :, 0] + 30) & (reached[:, :, 1] > reached[:, :, 2] + 15)
-    finger.reset(seed=0, options={"posture": rest, "target": (0.0, 0.0, -0.5)})
-    without = finger.render().astype(int)
-    still_green = (without[:, :, 1] > without[:, :, 0] + 30) & (
-        without[:, :, 1] > without[:, :, 2] + 15
-    )
-    assert green.sum() > still_green.sum() + 20
-
-
-def test_each_tendon_is_visible(finger: Any) -> None:
-    """Hiding a tendon changes the frame."""
-    finger.render()
-    env = finger.unwrapped
-    model = env._figure.model
-    frame = finger.render()
-    hidden = []
-    for name in TENDON_COLOURS:
-        course = model.tendon(f"{name}/course").id
-        model.tendon_rgba[course, 3] = 0.0
-        if _differs(finger.render(), frame).sum() < 5:
-            hidden.append(name)
-        model.tendon_rgba[course, 3] = 1.0
-    assert set(hidden) <= {"PI"}  # PI is on the far side of the finger.
-
-
 def test_tension_makes_a_tendon_thick(finger: Any) -> None:
     env = finger.unwrapped
     frames = []
@@ -123,18 +93,6 @@ def test_a_picture_shows_the_whole_finger(finger: Any) -> None:
     assert not np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]]).any()
     columns = np.flatnonzero(dark.any(axis=0))
     assert np.ptp(columns) > 0.25 * 160
-
-
-def test_the_renderer_is_kept_across_fingers() -> None:
-    """Resets with another finger keep the renderer."""
-    arguments = {"render_mode": "rgb_array", "gap": "wide", **_SIZE}
-    with gym.make("shapechanger/Finger-v1", **arguments) as env:
-        env.reset(seed=0)
-        env.render()
-        renderer = env.unwrapped._renderer
-        env.reset(seed=1)
-        env.render()
-        assert env.unwrapped._renderer is renderer
 
 
 def test_depth_frames_show_the_finger() -> None:

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog, lsq_linear
 
-from shapechanger.errors import UnknownName
 from shapechanger.finger.anatomy import (
     AN_1983_ARMS,
     JOINT_RANGE,
@@ -92,7 +91,7 @@ def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @pytest.mark.parametrize("seed", range(40))
 def test_tensions_are_within_bounds(seed: int) -> None:
-    """The flag states whether the tensions give the torque."""
+    """The flag states whether the tensions give the torque; no others are nearer."""
     arms, torque, low, high = _problem(seed)
     tensions, is_enough = tensions_for_torque(arms, torque, low, high)
     assert (tensions >= low - 1e-9).all()
@@ -102,29 +101,15 @@ def test_tensions_are_within_bounds(seed: int) -> None:
     best = lsq_linear(1e3 * arms.T, 1e3 * torque, bounds=(low, high), method="bvls", tol=1e-14)
     nearest = float(np.linalg.norm(arms.T @ best.x - torque))
     assert np.linalg.norm(arms.T @ tensions - torque) <= nearest + _MICRO
-    if seed % 2 == 0:
-        assert is_enough
-
-
-@pytest.mark.parametrize("seed", range(0, 40, 2))
-def test_tensions_are_minimal(seed: int) -> None:
-    """No other solution has less co-contraction."""
-    arms, torque, low, high = _problem(seed)
-    tensions, _ = tensions_for_torque(arms, torque, low, high)
+    if seed % 2:
+        return
+    # No other solution has less co-contraction.
+    assert is_enough
     matrix = np.concatenate([1e5 * arms.T, 1e-2 * np.eye(7)])
     goal = np.concatenate([1e5 * (torque - arms.T @ low), np.zeros(7)])
     other = lsq_linear(matrix, goal, bounds=(np.zeros(7), high - low), method="bvls", tol=1e-14)
     assert np.abs(arms.T @ (low + other.x) - torque).max() < _MICRO
     assert np.linalg.norm(tensions - low) <= np.linalg.norm(other.x) * (1.0 + 1e-3)
-
-
-def test_an_impossible_torque_is_reported() -> None:
-    """The flag is false, and the tensions stay within bounds."""
-    tensions, is_enough = tensions_for_torque(
-        MOMENT_ARMS, [5.0, 0.0, 0.0, 0.0], LEAST_TENSION_N, MOST_TENSION_N
-    )
-    assert not is_enough
-    assert (tensions <= MOST_TENSION_N + 1e-6).all()
 
 
 @pytest.mark.parametrize("mode", DRIVES)
@@ -181,9 +166,3 @@ def test_length_commands_span_all_postures() -> None:
         length = -MOMENT_ARMS @ angles
         assert (drive.tension(-np.ones(7), length, _STILL) <= LEAST_TENSION_N + 1e-9).all()
         assert (drive.tension(np.ones(7), length, _STILL) >= MOST_TENSION_N).all()
-
-
-def test_an_unknown_mode_is_refused() -> None:
-    """The error suggests the nearest name."""
-    with pytest.raises(UnknownName, match=r"'tensions'. Did you mean 'tension'\? There are: imped"):
-        drive_of("tensions", NOMINAL)

@@ -18,10 +18,10 @@ from shapechanger.envs.naming import env_ref
 from shapechanger.errors import FingerError, OutputError, StudyError, UnknownName, check_seed
 from shapechanger.files import read_file, require_file, write_atomic
 from shapechanger.finger.anatomy import JOINTS, TENDONS
-from shapechanger.finger.export import finger_mjcf
 from shapechanger.finger.gap import resolve_gap, shipped_rig
 from shapechanger.finger.identify import IdentifiedFinger, identify, load_log, save_log
 from shapechanger.finger.identify.log import record_babble
+from shapechanger.finger.model import finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters, named_set
 from shapechanger.finger.report import (
     arm_cell,

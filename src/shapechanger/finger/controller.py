@@ -147,8 +147,12 @@ class FingerBabble:
         self._angles = places_of(layout, JOINTS, "angle")
         self._drive = drive_of(actions, NOMINAL)
         rng = np.random.default_rng(seed)
-        self._joints = _Waves(rng, len(JOINTS))
-        self._tendons = _Waves(rng, len(TENDONS))
+        # One wave per part of the frequency range, so that no signal has slow waves only.
+        edges = np.geomspace(_SLOWEST_HZ, _FASTEST_HZ, _WAVES + 1)
+        self._joints, self._tendons = (
+            (rng.uniform(edges[:-1], edges[1:], shape), rng.uniform(0.0, 2.0 * np.pi, shape))
+            for shape in ((len(JOINTS), _WAVES), (len(TENDONS), _WAVES))
+        )
         self._back = np.array(NOMINAL.joint_damping) / _BACK_S
         self._dt = control_dt
         self._steps = 0
@@ -162,7 +166,7 @@ class FingerBabble:
         speed = (after - before) / (2.0 * dt)
         off = np.clip(wanted - angles, -_MOST_OFF, _MOST_OFF)
         torque = moving_torque(wanted, speed, np.zeros(len(JOINTS))) + self._back * off
-        least = _LEAST_N[0] + (_LEAST_N[1] - _LEAST_N[0]) * self._tendons.at(t)
+        least = _LEAST_N[0] + (_LEAST_N[1] - _LEAST_N[0]) * _signals(self._tendons, t)
         tensions, _ = tensions_for_torque(MOMENT_ARMS, torque, least, MOST_TENSION_N)
         # Drives that resist a change of length need the lengths of the motion too.
         command = self._drive.command(tensions, -MOMENT_ARMS @ wanted, -MOMENT_ARMS @ speed)
@@ -172,27 +176,19 @@ class FingerBabble:
         """Return the commanded posture at a time, s: angles, rad, (4,)."""
         low, high = JOINT_RANGE.T
         inner = _MARGIN * (high - low)
-        shares = self._joints.at(t)
+        shares = _signals(self._joints, t)
         angles = low + inner + (high - low - 2.0 * inner) * shares
         angles[3] = DIP_BY_PIP * angles[2] + _DIP_OFF * (2.0 * shares[3] - 1.0)
         return np.clip(angles, low + inner, high - inner)
 
 
-class _Waves:
-    """Smooth random signals that are near their ends most of the time."""
-
-    def __init__(self, rng: np.random.Generator, signals: int) -> None:
-        # One wave per part of the frequency range, so that no signal has slow waves only.
-        edges = np.geomspace(_SLOWEST_HZ, _FASTEST_HZ, _WAVES + 1)
-        self._hz = rng.uniform(edges[:-1], edges[1:], (signals, _WAVES))
-        self._phase = rng.uniform(0.0, 2.0 * np.pi, (signals, _WAVES))
-
-    def at(self, t: float) -> NDArray[np.float64]:
-        """Return the signals at a time, s: 0 to 1, (signals,)."""
-        waves = np.sin(2.0 * np.pi * self._hz * t + self._phase)
-        # The sum is nearly normal with a variance of one half per wave, so its cumulative
-        # distribution makes the values nearly uniform.
-        return np.asarray(ndtr(_SPREAD * waves.sum(axis=1) / np.sqrt(0.5 * _WAVES)), np.float64)
+def _signals(waves: tuple[NDArray[np.float64], NDArray[np.float64]], t: float) -> Any:
+    """Return smooth signals at a time, s, mostly near their ends: 0 to 1, (signals,)."""
+    hz, phase = waves
+    total = np.sin(2.0 * np.pi * hz * t + phase).sum(axis=1)
+    # The sum is nearly normal with a variance of one half per wave, so its cumulative distribution
+    # makes the values nearly uniform.
+    return np.asarray(ndtr(_SPREAD * total / np.sqrt(0.5 * _WAVES)), np.float64)
 
 
 def places_of(layout: Layout, names: tuple[str, ...], kind: str) -> list[int]:

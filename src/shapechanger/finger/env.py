@@ -105,12 +105,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
         EzPickle.__init__(self, **arguments)
-        if render_mode is not None and render_mode not in _MODES:
-            raise UnknownName("render mode", render_mode, _MODES)
-        if render_mode == "human":
-            require_screen()
-        elif render_mode is not None:
-            choose_gl()
+        if render_mode not in (None, *_MODES):
+            raise UnknownName("render mode", str(render_mode), _MODES)
+        if render_mode is not None:
+            (require_screen if render_mode == "human" else choose_gl)()
         if gap is not None and parameters is not None:
             raise FingerError("Give either parameters or a gap to draw them from, not both.")
         if gap is None and finger_seed is not None:

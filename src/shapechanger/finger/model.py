@@ -1,10 +1,13 @@
-"""The finger as a MuJoCo model: four hinges, and tendons that carry the physics."""
+"""The finger as a MuJoCo model and as an MJCF file: hinges, and tendons that carry the physics."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
+from xml.etree import ElementTree
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -63,10 +66,9 @@ _MARK: Final = (0.10, 0.55, 0.25, 0.45)
 _MARK_RADIUS_M: Final = 0.005
 # Length of the metacarpal, two thirds of a palm, for images only.
 _METACARPAL_M: Final = 0.060
-_FLEX: Final = (0.0, 1.0, 0.0)
-_ABDUCT: Final = (0.0, 0.0, 1.0)
-# Phalanx that each joint moves, and its axis.
-_HINGES: Final = ((0, _FLEX), (0, _ABDUCT), (1, _FLEX), (2, _FLEX))
+# Phalanx that each joint moves, and its axis: y flexes, and z abducts.
+_Y: Final = (0.0, 1.0, 0.0)
+_HINGES: Final = ((0, _Y), (0, (0.0, 0.0, 1.0)), (1, _Y), (2, _Y))
 # Joint limits: the smallest stable time constant, s, and a damping ratio; and an impedance that
 # hardly yields under full tension.
 _LIMIT: Final = (2.0 * SIM_DT, 1.0)
@@ -142,32 +144,25 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
             density=TISSUE_DENSITY,
             rgba=_SKIN,
         )
-        for j, (moved, axis) in enumerate(_HINGES):
-            if moved == k:
-                _add_hinge(body, j, axis, parameters)
+        for j in (j for j, (moved, _) in enumerate(_HINGES) if moved == k):
+            stiffness = parameters.joint_stiffness[j]
+            farther = max(abs(JOINT_RANGE[j] - JOINT_REST[j]))
+            # The torque k x + c x³ is END_STIFFNESS times as stiff at the end as at rest.
+            rise = (END_STIFFNESS - 1.0) / (3.0 * farther**2)
+            body.add_joint(
+                name=JOINTS[j],
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=_HINGES[j][1],
+                range=np.degrees(JOINT_RANGE[j]),
+                stiffness=[stiffness, 0.0, stiffness * rise],
+                springref=math.degrees(JOINT_REST[j]),
+                damping=[parameters.joint_damping[j], 0.0, 0.0],
+                frictionloss=parameters.joint_friction[j],
+                solref_limit=_LIMIT,
+                solimp_limit=_LIMIT_IMPEDANCE,
+            )
         parent, at = body, length
     parent.add_site(name=FINGERTIP, pos=[at, 0, 0], size=[0.001, 0, 0])
-
-
-def _add_hinge(
-    body: mujoco.MjsBody, j: int, axis: tuple[float, float, float], parameters: FingerParameters
-) -> None:
-    stiffness = parameters.joint_stiffness[j]
-    farther = max(abs(JOINT_RANGE[j] - JOINT_REST[j]))
-    # The torque k x + c x³ is END_STIFFNESS times as stiff at the end as at rest.
-    rise = (END_STIFFNESS - 1.0) / (3.0 * farther**2)
-    body.add_joint(
-        name=JOINTS[j],
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=axis,
-        range=np.degrees(JOINT_RANGE[j]),
-        stiffness=[stiffness, 0.0, stiffness * rise],
-        springref=math.degrees(JOINT_REST[j]),
-        damping=[parameters.joint_damping[j], 0.0, 0.0],
-        frictionloss=parameters.joint_friction[j],
-        solref_limit=_LIMIT,
-        solimp_limit=_LIMIT_IMPEDANCE,
-    )
 
 
 def _add_path(spec: mujoco.MjSpec, name: str, arms: tuple[float, ...]) -> mujoco.MjsTendon:
@@ -267,3 +262,127 @@ class FingerFigure:
         self.data.qpos[:] = angles
         self.data.mocap_pos[self._mark] = target
         mujoco.mj_forward(self.model, self.data)
+
+
+_UNITS: Final[Mapping[str, str]] = {
+    "moment_arms": f"m, for each of {', '.join(TENDONS)}: {', '.join(JOINTS)}",
+    "most_tension": "N",
+    "least_tension": "N",
+    "joint_stiffness": "N·m/rad",
+    "joint_damping": "N·m·s/rad",
+    "joint_friction": "N·m",
+    "tendon_damping": "N·s/m",
+    "tendon_friction": "N",
+    "tendon_stiffness": "N/m",
+    "backlash": "m",
+    "motor_kg": "kg",
+    "motor_lag": "s",
+    "command_delay": "s",
+    "joint_noise": "rad",
+    "tension_noise": "N",
+    "control_hz": "1/s",
+    "tick_hz": "1/s",
+    "slew_per_s": "ranges per second",
+    "slew_down_per_s": "ranges per second",
+    "tension_step": "N",
+}
+# Attributes of MJCF elements with the arrays of the compiled model that hold them exactly. All
+# joints have one degree of freedom.
+_EXACT: Final[Mapping[str, Mapping[str, str]]] = {
+    "joint": {
+        "range": "jnt_range",
+        "damping": "dof_damping",
+        "frictionloss": "dof_frictionloss",
+        "springref": "qpos_spring",
+    },
+    "geom": {"size": "geom_size", "pos": "geom_pos", "quat": "geom_quat"},
+    "site": {"pos": "site_pos"},
+    "body": {"pos": "body_pos"},
+    "fixed": {
+        "stiffness": "tendon_stiffness",
+        "damping": "tendon_damping",
+        "frictionloss": "tendon_frictionloss",
+        "armature": "tendon_armature",
+        "springlength": "tendon_lengthspring",
+    },
+    "general": {
+        "delay": "actuator_delay",
+        "forcerange": "actuator_forcerange",
+        "dynprm": "actuator_dynprm",
+        "gainprm": "actuator_gainprm",
+        "biasprm": "actuator_biasprm",
+    },
+}
+
+
+def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
+    """Return the MJCF of a finger with its anatomy, parameters and, as a comment, its limits.
+
+    Controls are the commands of the drive; with a path, they are tensions.
+    """
+    spec = build_finger(parameters, drive, anatomy=True)
+    model: Any = spec.compile()
+    # MuJoCo writes six digits, and leaves out the inertia of bodies without geoms.
+    root = ElementTree.fromstring(spec.to_xml())
+    for tag, exact in _EXACT.items():
+        find = getattr(model, {"fixed": "tendon", "general": "actuator"}.get(tag, tag))
+        for element in [one for one in root.iter(tag) if one.get("name")]:
+            number = find(element.get("name")).id
+            for key, array in exact.items():
+                if key in element.attrib:
+                    many = len(element.attrib[key].split())
+                    element.set(key, _text(np.ravel(getattr(model, array)[number])[:many]))
+            if tag == "joint" and "stiffness" in element.attrib:
+                rise = model.jnt_stiffnesspoly[number]
+                element.set("stiffness", _text([model.jnt_stiffness[number], *rise]))
+            elif tag == "body" and element.get("name", "").endswith("/motor"):
+                inertial = ElementTree.Element("inertial", pos="0 0 0")
+                inertial.set("mass", _text(model.body_mass[number]))
+                inertial.set("diaginertia", _text(model.body_inertia[number]))
+                element.insert(0, inertial)
+            elif tag == "fixed":
+                for i, wrapped in enumerate(element):
+                    wrapped.set("coef", _text(model.wrap_prm[model.tendon_adr[number] + i]))
+    root.insert(0, ElementTree.Comment(_limits(parameters)))
+    root.append(_custom(parameters))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _text(value: Any) -> str:
+    return " ".join(repr(float(number)) for number in np.ravel(value))
+
+
+def _custom(parameters: FingerParameters) -> ElementTree.Element:
+    """Return the parameters as numbers, each with a text for its unit."""
+    custom = ElementTree.Element("custom")
+    values = msgspec.structs.asdict(parameters)
+    path = values.pop("path")
+    if path is not None:
+        values |= msgspec.structs.asdict(path)
+    for name, value in values.items():
+        if value is not None:
+            ElementTree.SubElement(custom, "numeric", name=name, data=_text(value))
+            ElementTree.SubElement(custom, "text", name=f"{name}/unit", data=_UNITS[name])
+    return custom
+
+
+def _limits(parameters: FingerParameters) -> str:
+    """List the effects that the file does not simulate, for the comment at its top."""
+    comments = [
+        "A finger of Shapechanger. Controls are -1 to 1 in the order of the actuators.",
+        f"Not simulated by this file: noise of the joints ({parameters.joint_noise:g} rad) and of "
+        f"the tensions ({parameters.tension_noise:g} N).",
+    ]
+    path = parameters.path
+    if path is not None:
+        slews = [f"{v:g}" if v else "unlimited" for v in (path.slew_per_s, path.slew_down_per_s)]
+        comments.append(
+            f"Nor the path of a command: tensions are computed at {path.control_hz:g} Hz, sent at "
+            f"{path.tick_hz:g} Hz, with a slew of {slews[0]} up and {slews[1]} down, in ranges per "
+            f"second, and steps of {path.tension_step:g} N. The controls are tensions from the "
+            "least to the most."
+        )
+    delay = f"{1e3 * parameters.command_delay:g} ms"
+    comments.append(f"The delay of the commands, {delay}, is the actuators' (MuJoCo 4).")
+    return " " + "\n  ".join(comments) + " "

@@ -105,7 +105,7 @@ class RigMixin(FingerEnv):
         self._operator: Operator | None = None
         with ExitStack() as opened:
             if twin or finger_seed is not None:
-                self._own = opened.enter_context(closing(serve_twin(twin, finger_seed)))
+                self._own = opened.enter_context(closing(_serve_twin(twin, finger_seed)))
                 known = self._own.known
                 robot = known.address
                 more |= {"key": known.key, "fingerprint": known.fingerprint}
@@ -373,26 +373,12 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
         EzPickle.__init__(self, robot, path=path, **rig)
 
 
-def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
-    """Serve the shipped profile of a rig on a twin with its own clock.
-
-    Args:
-        twin: "nominal", or the name of the gap that its finger is drawn from.
-        finger_seed: Seed of the finger drawn from the gap; 0 if not given.
-
-    Raises:
-        UnknownName: If there is no such gap.
-        FingerError: If a seed is given without a gap, or is not a whole number from 0 to 2^32 - 1.
-        RobotError: If the twin does not start.
-    """
+def _serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
+    """Serve the shipped profile on a twin with its own clock; a gap's finger has seed 0 or this."""
     if twin not in ("", NOMINAL_TWIN, *GAPS):
         raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
     if twin not in GAPS and finger_seed is not None:
         raise FingerError("finger_seed selects a finger of a gap, so `twin` must name a gap.")
-    chosen = check_seed(
-        0 if finger_seed is None else finger_seed, FingerError, "finger_seed must be"
-    )
-    drawn = ("--gap", twin, "--finger-seed", str(chosen))
-    return run_robot(
-        find_profile("finger"), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
-    )
+    seed = check_seed(0 if finger_seed is None else finger_seed, FingerError, "finger_seed must be")
+    drawn = ("--gap", twin, "--finger-seed", str(seed)) if twin in GAPS else ()
+    return run_robot(find_profile("finger"), clock="twin", arguments=drawn)

@@ -92,17 +92,14 @@ def number(estimate: ParameterEstimate, value: float) -> str:
 
 def interval(estimate: ParameterEstimate) -> str:
     """Format the 95 % interval of a parameter; one that the log does not bound is unknown."""
-    if unbounded(estimate):
-        return "unknown"
-    return f"{number(estimate, estimate.low)} to {number(estimate, estimate.high)}"
+    low, high = number(estimate, estimate.low), number(estimate, estimate.high)
+    return "unknown" if unbounded(estimate) else f"{low} to {high}"
 
 
 def arm_cell(estimate: ParameterEstimate) -> str:
     """Format a moment arm with half its interval, mm; a star if the nominal arm is outside."""
-    half = 0.5e3 * (estimate.high - estimate.low)
-    if unbounded(estimate):
-        return "unknown"
-    return f"{1e3 * estimate.value:.2f} ±{half:.2f}{'*' if estimate.differs else ''}"
+    half, star = 0.5e3 * (estimate.high - estimate.low), "*" if estimate.differs else ""
+    return "unknown" if unbounded(estimate) else f"{1e3 * estimate.value:.2f} ±{half:.2f}{star}"
 
 
 def unbounded(estimate: ParameterEstimate) -> str:

@@ -142,8 +142,36 @@ def route_names(tendon: str) -> list[str]:
 
 def add_anatomy(spec: mujoco.MjSpec) -> None:
     """Add bones, tendons, a nail and a light background to a finger of `build_finger`."""
-    _add_scene(spec)
-    hand = _add_hand(spec)
+    top, bottom = _SKY
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=top,
+        rgb2=bottom,
+        width=256,
+        height=1536,
+    )
+    spec.visual.headlight.ambient[:] = (0.45, 0.45, 0.45)
+    spec.visual.headlight.diffuse[:] = (0.35, 0.35, 0.35)
+    spec.visual.headlight.specular[:] = (0.1, 0.1, 0.1)
+    # From above and in front of the finger, so that it has a bright and a dark side.
+    spec.worldbody.add_light(
+        name="lamp",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[0.1, 0.0, 0.3],
+        dir=[-0.3, 0.2, -1.0],
+        diffuse=[0.4, 0.4, 0.4],
+        specular=[0.1, 0.1, 0.1],
+        castshadow=False,
+    )
+    # The hand's geom moves to a body, which cameras can follow.
+    plain = spec.geom(METACARPAL)
+    shape: dict[str, Any] = {"fromto": plain.fromto.copy(), "size": plain.size.copy()}
+    spec.delete(plain)
+    hand = spec.worldbody.add_body(name=_HAND)
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+    hand.add_geom(name=METACARPAL, type=capsule, mass=0.0, rgba=_SKIN, **shape)
     bodies = {_HAND: hand} | {name: spec.body(name) for name in PHALANGES}
     for name in PHALANGES:
         spec.geom(name).rgba = _SKIN
@@ -169,49 +197,6 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
     for tendon in TENDONS:
         for name, course in zip(route_names(tendon), _TENDON_ROUTES[tendon], strict=True):
             _add_course(spec, bodies, name, course, TENDON_COLOURS[tendon])
-
-
-def _add_scene(spec: mujoco.MjSpec) -> None:
-    top, bottom = _SKY
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=top,
-        rgb2=bottom,
-        width=256,
-        height=1536,
-    )
-    spec.visual.headlight.ambient[:] = (0.45, 0.45, 0.45)
-    spec.visual.headlight.diffuse[:] = (0.35, 0.35, 0.35)
-    spec.visual.headlight.specular[:] = (0.1, 0.1, 0.1)
-    # From above and in front of the finger, so that it has a bright and a dark side.
-    spec.worldbody.add_light(
-        name="lamp",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[0.1, 0.0, 0.3],
-        dir=[-0.3, 0.2, -1.0],
-        diffuse=[0.4, 0.4, 0.4],
-        specular=[0.1, 0.1, 0.1],
-        castshadow=False,
-    )
-
-
-def _add_hand(spec: mujoco.MjSpec) -> mujoco.MjsBody:
-    """Replace the geom of the hand by a body, which cameras can follow."""
-    plain = spec.geom(METACARPAL)
-    fromto, size = plain.fromto.copy(), plain.size.copy()
-    spec.delete(plain)
-    hand = spec.worldbody.add_body(name=_HAND)
-    hand.add_geom(
-        name=METACARPAL,
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-        fromto=fromto,
-        size=size,
-        mass=0.0,
-        rgba=_SKIN,
-    )
-    return hand
 
 
 def _add_bone(body: mujoco.MjsBody, name: str, start: float, end: float, i: int) -> None:
@@ -288,10 +273,10 @@ def tendon_legend(frame: NDArray[np.uint8], pulled: NDArray[np.float64]) -> NDAr
     top, bottom = gap + 1.2 * size, gap + 1.75 * size
     for i, (name, colour) in enumerate(TENDON_COLOURS.items()):
         left = i * column + gap
-        draw.text((left, 0.5 * gap), name, fill=_INK, font=font)
-        draw.rectangle((left, top, left + bar, bottom), fill=_EMPTY)
         filled = bar * float(np.clip(pulled[i], 0.0, 1.0))
         paint = tuple(round(255 * part) for part in colour)
+        draw.text((left, 0.5 * gap), name, fill=_INK, font=font)
+        draw.rectangle((left, top, left + bar, bottom), fill=_EMPTY)
         draw.rectangle((left, top, left + filled, bottom), fill=paint)
     return np.array(picture)
 

@@ -11,10 +11,10 @@ import pytest
 
 from shapechanger.errors import FingerError
 from shapechanger.finger.anatomy import TENDONS
-from shapechanger.finger.export import finger_mjcf
 from shapechanger.finger.gap import GAPS, shipped_rig
 from shapechanger.finger.identify import FingerLog, load_log
 from shapechanger.finger.identify.log import save_log
+from shapechanger.finger.model import finger_mjcf
 from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters
 from shapechanger.finger.tensions import drive_of
 from tests.cli.running import Cli

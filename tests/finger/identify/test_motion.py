@@ -16,13 +16,13 @@ from shapechanger.finger.identify.kinematics import ARMS, Kinematics
 from shapechanger.finger.identify.motion import (
     FACTORS,
     MOTOR_KG,
+    Motors,
     _MotionFit,
     cut_windows,
     fit_dynamics,
     steps_per_period,
     with_motors,
 )
-from shapechanger.finger.identify.motors import Motors
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from tests.finger.identify.logs import recorded
 

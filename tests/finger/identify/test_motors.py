@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.finger.identify.log import FingerLog
-from shapechanger.finger.identify.motors import CommandSignal, fit_motors
+from shapechanger.finger.identify.motion import CommandSignal, fit_motors
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import drive_of
 from tests.finger.identify.logs import changed, made_up, recorded

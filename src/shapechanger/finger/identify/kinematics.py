@@ -147,14 +147,9 @@ def interval_quantile(times: int, control_dt: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Regression:
-    """Columns of the regression, one row per time.
+    """Columns of the regression, one row per time: those of a log, and two of their rates.
 
-    Attributes:
-        lengths: Tendon lengths, m, (n, 7).
-        angles: Joint angles, rad, (n, 4).
-        tensions: Tendon tensions, N, (n, 7).
-        speeds: Rates of the lengths, m/s, (n, 7).
-        directions: Smoothed signs of the speeds, -1 to 1, (n, 7).
+    `speeds` are rates of the lengths, m/s, (n, 7), and `directions` their smoothed signs, -1 to 1.
     """
 
     lengths: NDArray[np.float64]

@@ -26,13 +26,15 @@ from shapechanger.finger.identify.log import FingerLog, require_informative
 from shapechanger.finger.identify.motion import (
     FACTORS,
     MOTOR_KG,
+    CommandSignal,
+    Motors,
     Window,
     cut_windows,
     fit_dynamics,
+    fit_motors,
     steps_per_period,
     with_motors,
 )
-from shapechanger.finger.identify.motors import CommandSignal, Motors, fit_motors
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.plant import HeldTensions, hold_controls
