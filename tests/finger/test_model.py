@@ -118,25 +118,6 @@ def test_tendons_are_slack_within_the_backlash() -> None:
     np.testing.assert_allclose(data.qfrc_spring[4:], -10e3 * 1e-3)
 
 
-def test_a_command_acts_after_its_delay() -> None:
-    late = NOMINAL.replace(command_delay=0.030)
-    tensions = []
-    for parameters in (NOMINAL, late):
-        model = made(parameters)
-        data = at_rest(model)
-        for _ in range(200):  # Until earlier commands have no effect.
-            mujoco.mj_step(model, data)
-        data.ctrl[:] = 1.0
-        found = []
-        for _ in range(60):
-            mujoco.mj_step(model, data)
-            found.append(-data.actuator_force[0])
-        tensions.append(np.array(found))
-    now, later = tensions
-    np.testing.assert_allclose(later[:15], LEAST_TENSION_N, atol=1e-6)
-    np.testing.assert_allclose(later[15:], now[:45], atol=1e-6)
-
-
 @pytest.mark.parametrize("level", [1.0, 2.0])
 def test_co_contraction_stiffens_the_joints(level: float) -> None:
     """Active stiffness is proportional to tensions that have no torque."""

@@ -54,15 +54,6 @@ def test_a_frame_follows_finger_and_target(finger: Any) -> None:
     assert 0.001 < _differs(*frames).mean() < 0.1
 
 
-def test_tension_makes_a_tendon_thick(finger: Any) -> None:
-    env = finger.unwrapped
-    frames = []
-    for tension in (0.0, 1.0):
-        env.plant.data.actuator_force[:] = -tension * np.array(env.parameters.most_tension)
-        frames.append(finger.render())
-    assert _differs(*frames).mean() > 0.005
-
-
 def test_rendering_does_not_change_the_episode() -> None:
     """Observations with and without rendering are equal."""
     found = []

@@ -93,21 +93,6 @@ def _is_within(angles: np.ndarray) -> bool:
     return bool(((angles >= _LOW) & (angles <= _HIGH)).all())
 
 
-def test_fingertips_of_balanced_postures_are_reached() -> None:
-    """Each point is reached within 0.01 mm, from the resting posture and from nearby ones."""
-    rng = np.random.default_rng(0)
-    for _ in range(150):
-        posture = draw_posture(rng)
-        place = fingertip(posture)
-        near = np.clip(posture + rng.uniform(-0.2, 0.2, 4), _LOW, _HIGH)
-        for start in (None, near):
-            angles, off = angles_for(place, start)
-            assert _is_within(angles)
-            assert off < 1e-5
-            found = fingertip(angles)
-            assert off == pytest.approx(np.linalg.norm(place - found), abs=1e-12)
-
-
 def test_points_of_any_posture_are_reached() -> None:
     """Fingertips of all postures within the joint limits are reached."""
     rng = np.random.default_rng(1)

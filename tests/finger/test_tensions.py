@@ -16,7 +16,6 @@ from shapechanger.finger.anatomy import (
     LEAST_TENSION_N,
     MOMENT_ARMS,
     MOST_TENSION_N,
-    TENDONS,
 )
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.tensions import (
@@ -39,16 +38,6 @@ def test_co_contraction_has_no_torque() -> None:
     assert spans_all_torques(MOMENT_ARMS)
     assert tensions.min() == pytest.approx(1.0)
     np.testing.assert_allclose(MOMENT_ARMS.T @ tensions, 0.0, atol=1e-12)
-
-
-def test_necessary_tendons() -> None:
-    """Without FDP, FDS or PI, some torques are out of reach; the other tendons are redundant."""
-    needed = [
-        name
-        for i, name in enumerate(TENDONS)
-        if not spans_all_torques(np.delete(MOMENT_ARMS, i, axis=0))
-    ]
-    assert needed == ["FDP", "FDS", "PI"]
 
 
 def test_arms_that_do_not_span_are_detected() -> None:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path as File
-from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.errors import PathError, UnknownName
 from shapechanger.finger.anatomy import JOINT_REST
@@ -176,13 +173,3 @@ def test_random_paths_differ_and_can_be_followed() -> None:
         for point in path.at(np.linspace(0.0, path.duration_s, 20)):
             begin, off = angles_for(point, begin)
             assert off < 5e-4
-
-
-@pytest.mark.parametrize("path", ["line", {"kind": "circle", "radius": 0.008, "hz": 1.0}])
-def test_a_spec_makes_the_env_again(path: Any) -> None:
-    """Specs with a named path round trip through JSON."""
-    with gym.make("shapechanger/FingerTrack-v1", path=path) as env:
-        spec = EnvSpec.from_json(env.spec.to_json())
-        wanted = env.unwrapped.path.at([0.0, 0.2])
-    with gym.make(spec) as again:
-        np.testing.assert_array_equal(again.unwrapped.path.at([0.0, 0.2]), wanted)

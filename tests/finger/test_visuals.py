@@ -39,13 +39,6 @@ def test_anatomy_does_not_change_the_simulation(parameters: FingerParameters, mo
     np.testing.assert_array_equal(*found)
 
 
-def _site(model: mujoco.MjModel, data: mujoco.MjData, body: str, at: int) -> np.ndarray:
-    """Return point `at` of a spatial tendon in the frame of a body, m."""
-    world = data.site_xpos[at]
-    k = model.body(body).id
-    return data.xmat[k].reshape(3, 3).T @ (world - data.xpos[k])
-
-
 def _stops(model: mujoco.MjModel, course: str) -> list[tuple[str, int]]:
     """Return body and number of each site of a route, from the wrist on."""
     tendon = model.tendon(course).id
@@ -80,39 +73,6 @@ def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
         assert bodies[0] == "hand"
         assert bodies[-1] == ends_at
         assert bodies == sorted(bodies, key=order.index)
-
-
-def _places(tendon: str, body: str) -> np.ndarray:
-    """Return the points of a tendon's routes on a bone, in its frame, m, (n, 3)."""
-    model = made(anatomy=True)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return np.array(
-        [
-            _site(model, data, body, site)
-            for course in route_names(tendon)
-            for at, site in _stops(model, course)
-            if at == body
-        ]
-    )
-
-
-def test_routes_are_anatomical() -> None:
-    """Flexors are palmar, extensors dorsal, and intrinsic tendons lateral."""
-    for tendon, side in itertools.product(("FDP", "FDS"), ("hand", "proximal", "middle")):
-        assert (_places(tendon, side)[:, 2] < -0.002).all()
-    for tendon, side in itertools.product(("EIP", "EDC"), ("hand", "proximal", "middle", "distal")):
-        assert (_places(tendon, side)[:, 2] > 0.002).all()
-    for bone in ("hand", "proximal", "middle", "distal"):
-        assert _places("EIP", bone)[:, 1].max() < _places("EDC", bone)[:, 1].min()
-    assert _places("DI", "proximal")[0, 1] > 0.006
-    for tendon, sign in (("LUM", 1.0), ("PI", -1.0)):
-        assert sign * _places(tendon, "hand")[-1, 1] > 0.005
-        assert _places(tendon, "hand")[-1, 2] < -0.002
-        hood = _places(tendon, "proximal")
-        assert hood[0, 2] < 0.0 < hood[-1, 2]
-        assert (_places(tendon, "middle")[:, 2] > 0.003).all()
-        assert (sign * _places(tendon, "middle")[:, 1] > 0.0).all()
 
 
 def test_routes_agree_with_the_moment_arms() -> None:

@@ -313,17 +313,3 @@ def test_a_delay_on_a_path_follows_from_the_motion() -> None:
     assert "command_delay" in names
     assert "motor_lag" not in names
     assert "motor_lag" in dict(found.undetermined)
-
-
-@pytest.mark.slow
-def test_known_motors_do_not_bias_the_joints() -> None:
-    """Joints are found with geared motors and individual current limits."""
-    weak = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)
-    drawn = GAPS["real-like"].draw(np.random.default_rng(3))
-    log, truth = recorded(8.0, parameters=with_gears(drawn.replace(most_tension=weak)))
-    found = identify(log)
-    assert found.parameters.most_tension == weak
-    assert found.parameters.motor_kg == truth.motor_kg
-    assert "most_tension" not in dict(found.undetermined)
-    np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.3)
-    np.testing.assert_allclose(found.parameters.joint_damping, truth.joint_damping, rtol=0.3)

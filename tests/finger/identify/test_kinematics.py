@@ -51,17 +51,6 @@ def test_slack_and_the_start_of_a_log_are_outliers() -> None:
     assert len(found.angles) == len(log)
 
 
-def test_standard_errors_grow_with_correlated_errors() -> None:
-    """Errors that repeat ten times count as a tenth as many samples."""
-    rng = np.random.default_rng(0)
-    ones = np.ones((2000, 1, 1))
-    fresh = rng.standard_normal((2000, 1))
-    stale = np.repeat(rng.standard_normal((200, 1)), 10, axis=0)
-    known, unknown = (float(robust_covariance(ones, r, 0.02)[0, 0]) for r in (fresh, stale))
-    assert known == pytest.approx(1.0 / 2000, rel=0.5)
-    assert 4.0 < unknown / known < 16.0
-
-
 def test_the_covariance_has_newey_west_weights() -> None:
     """Lag k of L steps has the weight 1 - k / (L + 1), with L half a second."""
     residual = np.array([[1.0], [2.0], [-1.0], [3.0]])
