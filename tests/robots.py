@@ -104,18 +104,8 @@ def write_profile(folder: Path, text: str = CAR) -> Profile:
     return load_profile(path)
 
 
-_WAYS = "forward = 22\nbackward = 27\n"
-_DRIVE = f'[output.drive]\ndriver = "hbridge"\npart = "wheels"\n{_WAYS}'
-_SIDES = "forward = 4\nbackward = 17\n"
-_STEER = f'[output.steer]\ndriver = "hbridge"\npart = "steering"\n{_SIDES}'
 
-SWAPPED_WAYS = changed(_WAYS, "forward = 27\nbackward = 22\n")
-"""The car with the two pins of its drive swapped."""
 
-SWAPPED_ROLES = changed(
-    _STEER, _STEER.replace(_SIDES, _WAYS), changed(_DRIVE, _DRIVE.replace(_WAYS, _SIDES))
-)
-"""The car with the pins of its drive and of its steering swapped."""
 
 BLIND_CAR = """\
 # A car without any sensor.

@@ -1,12 +1,8 @@
 """The envs of a finger on a rig through connection, daemon, guard and drivers to a simulation."""
 
-from __future__ import annotations
-
-import os
-import signal
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -21,7 +17,6 @@ from shapechanger.finger.task import POLICIES
 from shapechanger.policy import load_policy
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
-from tests.robot.twin.robots import until
 
 Env = gym.Env[Any, Any]
 
@@ -101,64 +96,6 @@ def test_sensed_values_are_near_the_truth(env: Env) -> None:
     assert info["distance"] == pytest.approx(info["true_distance"], abs=0.0002)
 
 
-def test_encoders_locate_the_fingertip_of_another_finger() -> None:
-    """With other moment arms, angles are accurate up to the noise of the encoders."""
-    other = ("--gap", "real-like", "--finger-seed", "3")
-    with run_robot(find_profile("finger"), clock="twin", arguments=other) as robot:
-        env = _env(robot)
-        observation, info = env.reset(seed=0)
-        with gym.make("shapechanger/Finger-v1") as simulated:
-            begins, _ = simulated.reset(seed=0)
-        np.testing.assert_allclose(info["true_angles"], begins[:4], atol=0.1)
-        off: list[float] = []
-        for action in np.random.default_rng(0).uniform(-1.0, 1.0, (40, 7)).astype(np.float32):
-            observation, *_, info = env.step(action)
-            off.append(float(np.abs(observation[:4] - info["true_angles"]).max()))
-            assert info["distance"] == pytest.approx(info["true_distance"], abs=0.006)
-        assert 0.001 < np.median(off) < 0.05
-        env.close()
-
-
-def test_a_rig_without_encoders_uses_tendon_lengths(tmp_path: Path) -> None:
-    """Angles are accurate to a few degrees, with the nominal moment arms."""
-    text = find_profile("finger").read_text()
-    path = tmp_path / "finger.toml"
-    path.write_text(text[: text.index("[sensor.joints]")] + text[text.index("[limits]") :])
-    with run_robot(path, clock="twin") as robot:
-        env = _env(robot)
-        env.reset(seed=1)
-        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
-        info: dict[str, Any] = {}
-        observation: Any = None
-        for _ in range(60):
-            observation, *_, info = env.step(pull)
-        np.testing.assert_allclose(observation[:4], info["true_angles"], atol=0.06)
-        assert info["distance"] == pytest.approx(info["true_distance"], abs=0.003)
-        env.close()
-
-
-def test_a_lost_magnet_ends_the_episode() -> None:
-    """The rig is disarmed and releases its tendons, as after a failed servo."""
-    with run_robot(find_profile("finger"), clock="twin") as robot:
-        env = _env(robot)
-        env.reset(seed=0)
-        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
-        for _ in range(10):
-            env.step(pull)
-        with robot.operator() as operator:
-            operator.break_magnet("PIP_flexion")
-            truncated, info = False, dict[str, Any]()
-            for _ in range(10):
-                *_, truncated, info = env.step(pull)
-                if truncated:
-                    break
-            assert "The encoder of PIP_flexion" in info["truncated_because"]
-            assert not info["armed"]
-            operator.advance(0.8)
-            assert max(operator.tensions().values()) < 1.0
-        env.close()
-
-
 @pytest.mark.parametrize("actions", ["tension", "length", "impedance"])
 def test_every_mode_of_action_moves_the_finger(rig: RunningRobot, actions: str) -> None:
     """Flexors bend and extensors straighten."""
@@ -187,21 +124,6 @@ def test_a_start_is_that_of_the_simulation(env: Env) -> None:
     np.testing.assert_allclose(info["true_angles"], begins[:4], atol=0.05)
 
 
-def test_the_same_seed_gives_the_same_episode(rig: RunningRobot) -> None:
-    """On the twin's clock, episodes are deterministic."""
-    ends: list[Any] = []
-    for _ in range(2):
-        with run_robot(find_profile("finger"), clock="twin") as robot:
-            env = _env(robot)
-            env.reset(seed=3)
-            action = np.linspace(-0.5, 0.5, 7, dtype=np.float32)
-            for _ in range(10):
-                observation, *_ = env.step(action)
-            ends.append(observation)
-            env.close()
-    np.testing.assert_array_equal(ends[0], ends[1])
-
-
 def test_goal_observations(rig: RunningRobot) -> None:
     """`goal=True` gives goal observations and `compute_reward`."""
     env = _env(rig, goal=True)
@@ -223,49 +145,6 @@ def test_invalid_actions_are_refused(env: Env) -> None:
         unwrapped.step(np.full(7, np.nan, np.float32))
     with pytest.raises(UnknownName, match="option of reset"):
         env.reset(options={"postur": 1})
-
-
-@pytest.mark.parametrize(("how", "text"), [("mute", "does not answer"), ("hot", "FDS")])
-def test_a_failed_servo_ends_the_episode(how: str, text: str) -> None:
-    """Tensions ramp down to the pretension and then to zero, measured at the twin."""
-    with run_robot(find_profile("finger"), clock="twin") as robot:
-        env = _env(robot)
-        env.reset(seed=0)
-        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
-        for _ in range(20):
-            *_, info = env.step(pull)
-            assert info["stop_reason"] == ""
-        with robot.operator() as operator:
-            before = max(operator.tensions().values())
-            assert before > 6.0
-            operator.break_servo("FDS", how)  # pyright: ignore[reportArgumentType]
-            for _ in range(20):
-                *_, truncated, info = env.step(pull)
-                if truncated:
-                    break
-            assert text in info["truncated_because"]
-            assert not info["armed"]
-            operator.advance(0.2)
-            assert max(operator.tensions().values()) < before
-            operator.advance(0.6)
-            assert max(operator.tensions().values()) < 2.0
-        env.close()
-
-
-@pytest.mark.parametrize("program", ["daemon", "guard"])
-def test_a_killed_process_releases_the_finger(program: Literal["daemon", "guard"]) -> None:
-    """Without a daemon the guard releases; without a guard the servo watchdogs do."""
-    with run_robot(find_profile("finger"), clock="real") as robot:
-        env = _env(robot)
-        env.reset(seed=0)
-        pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
-        for _ in range(20):
-            env.step(pull)
-        with robot.operator() as operator:
-            assert max(operator.tensions().values()) > 5.0
-            os.kill(robot.pid_of(program), signal.SIGKILL)
-            until(lambda: max(operator.tensions().values()) < 2.0)
-        env.close()
 
 
 def test_an_own_twin_defines_the_reward() -> None:

@@ -1,7 +1,5 @@
 """`RemoteWaypoint-v1` over the real thing: link, daemon, guard, drivers, and a simulated car."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The robot stops in time after each fault, judged by the ledger of a twin."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import subprocess

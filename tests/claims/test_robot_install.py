@@ -1,7 +1,5 @@
 """`pip install "shapechanger[robot]"` in a fresh environment."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

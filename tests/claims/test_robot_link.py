@@ -1,7 +1,5 @@
 """The benchmark of the link still runs against today's daemon."""
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.echo import EchoRobot

@@ -1,7 +1,5 @@
 """No robot code reads the wall clock, which can jump."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 from typing import Final

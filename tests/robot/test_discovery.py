@@ -1,7 +1,5 @@
 """Announcement of robots, and their discovery on loopback."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from collections.abc import Iterator

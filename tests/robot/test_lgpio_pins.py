@@ -1,7 +1,5 @@
 """The Pi's pins, over a fake lgpio modelled on its source."""
 
-from __future__ import annotations
-
 import collections
 import importlib
 import sys

@@ -1,7 +1,5 @@
 """Questions of `shapechanger robot check`."""
 
-from __future__ import annotations
-
 import pytest
 
 from shapechanger.cli.robot.check import ask_person

@@ -1,7 +1,5 @@
 """Served twins become known robots, without replacing others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`shapechanger robot drive` opens the console in a browser and passes the key to it alone."""
 
-from __future__ import annotations
-
 import sys
 import webbrowser
 from pathlib import Path

@@ -1,25 +1,20 @@
 """Default worlds of served twins."""
 
-from __future__ import annotations
-
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shapechanger.cli.robot import serve as serving
 from shapechanger.cli.robot.serve import place_of
-from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
+from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import finger_place
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.start import Place, start_board
+from shapechanger.robot.twin.start import Place
 from shapechanger.vehicles.twin import course_place
-from tests.robots import CAR, changed, write_profile
+from tests.robots import changed, write_profile
 
 pytestmark = pytest.mark.realtime
 
@@ -74,19 +69,6 @@ def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path)
         place_of(odd, "corridor", ())
 
 
-def test_without_mujoco_the_default_is_the_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Requesting a world raises an error that names the extra."""
-    found = serving.find_spec
-    monkeypatch.setattr(
-        serving, "find_spec", lambda name: found(name) if name != "mujoco" else None
-    )
-    assert place_of(_shipped("lab-car"), "", ()) == Place()
-    monkeypatch.delitem(sys.modules, "shapechanger.vehicles.twin")
-    monkeypatch.setitem(sys.modules, "shapechanger.vehicles.bodies", None)
-    with pytest.raises(MissingExtra, match=r"shapechanger\[sim\]"):
-        place_of(_shipped("lab-car"), "corridor", ())
-
-
 def test_unknown_worlds_and_lenses_are_refused() -> None:
     """The error lists what exists, or explains the mismatch."""
     car = _shipped("lab-car")
@@ -102,17 +84,3 @@ def test_unknown_worlds_and_lenses_are_refused() -> None:
         place_of(_shipped("lab-boat"), "yard", ())
     with pytest.raises(RobotError, match="plain camera: choose a --world for a --lens"):
         place_of(car, "room", ("night",))
-
-
-def test_a_board_starts_in_its_place(tmp_path: Path) -> None:
-    profile = write_profile(tmp_path, CAR)
-    board = start_board(
-        profile.guard_plan(),
-        "twin",
-        tmp_path,
-        profile.camera,
-        seed=4,
-        place=place_of(profile, "yard", ()),
-    )
-    with board, Operator(board.socket_path) as operator:
-        assert operator.where().truth == {"progress_m": 0.0, "collisions": 0.0}

@@ -1,7 +1,5 @@
 """`shapechanger robot camera`: writes a camera's measured geometry into the profile."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

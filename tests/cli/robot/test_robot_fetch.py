@@ -1,7 +1,5 @@
 """`shapechanger robot fetch`: exact copies, resumed after interruptions."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections import Counter
@@ -235,18 +233,6 @@ def test_mistakes_give_one_sentence(
     (tmp_path / "here").write_text("in the way")
     _fails(["robot", "fetch", "car", *out])
     assert "Cannot write" in capsys.readouterr().err
-
-
-def test_a_running_recording_is_skipped(
-    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A message says so."""
-    from shapechanger.robot.client.known_robots import recall
-
-    with RobotClient.connect(recall("car"), role="person") as person:
-        began = person.record()
-        main(["robot", "fetch", "car", "--out", str(tmp_path / "here")])
-        assert f"{began.episode} is still being recorded" in capsys.readouterr().out
 
 
 def _fails(arguments: list[str], run: Callable[[list[str]], None] = main) -> None:

@@ -1,7 +1,5 @@
 """`shapechanger robot init`: its questions."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

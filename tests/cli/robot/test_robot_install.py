@@ -1,7 +1,5 @@
 """`shapechanger robot install`: what it says, and whom it refuses."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -71,24 +69,6 @@ def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
     lines = said(dry_run=True)
     assert any(line.startswith("would    service: sudo install -m 644 ") for line in lines)
     assert pi.ran == []
-
-
-def test_a_failure_is_counted(pi: FakePi, said: Said, capsys: pytest.CaptureFixture[str]) -> None:
-    """The exit code is 1, and the command is printed."""
-    pi.refuses = "systemctl"
-    with pytest.raises(SystemExit, match="1"):
-        said()
-    lines = capsys.readouterr().out
-    assert "FAILED   service: systemctl: permission denied. By hand: sudo install -m" in lines
-    assert "could not be done." in lines
-
-
-def test_new_groups_alone_need_a_login(pi: FakePi, said: Said) -> None:
-    """Without a line of config.txt, no restart is asked for."""
-    pi.write("boot/firmware/config.txt", "dtparam=strict_gpiod\ncamera_auto_detect=1\n")
-    lines = said()
-    assert any(line.startswith("Log out and in") for line in lines)
-    assert not any(line.startswith("Restart the computer") for line in lines)
 
 
 def test_the_profile_of_this_folder_is_named(

@@ -1,7 +1,5 @@
 """`shapechanger robot key`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

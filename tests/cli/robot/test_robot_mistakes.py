@@ -1,7 +1,5 @@
 """Mistakes in `shapechanger robot` commands give one sentence and leave no files."""
 
-from __future__ import annotations
-
 import errno
 import io
 import json
@@ -75,30 +73,6 @@ def write_ready_profile(home: Path, text: str = CAR) -> str:
     profile = write_profile(home / "work", text)
     make_credentials(home / "config" / "shapechanger" / "robots" / profile.name, profile.name)
     return str(profile.path)
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "init",
-        "install",
-        "check",
-        "calibrate",
-        "serve",
-        "key",
-        "find",
-        "remember",
-        "forget",
-        "drive",
-        "stop",
-        "safe-pins",
-    ],
-)
-def test_help(run: Run, command: str) -> None:
-    """Each command has a help text."""
-    code, output, _ = run(command, "--help")
-    assert code == 0
-    assert f"shapechanger robot {command}" in output
 
 
 @pytest.mark.parametrize(
@@ -302,17 +276,6 @@ def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch)
     code, output, wrong = run("stop", "off")
     assert (code, output) == (1, "")
     assert "The stop was not confirmed" in wrong
-
-
-def test_wiring(run: Run, home: Path) -> None:
-    """The check reports what is good on a machine other than a Raspberry Pi."""
-    code, output, _ = run("check", write_ready_profile(home), "--wiring", "--port", "0")
-    assert code == 1
-    assert "good  profile" in output
-    assert "good  credentials" in output
-    shutil.rmtree(home / "config" / "shapechanger")
-    _, output, _ = run("check", "test-car.toml", "--wiring")
-    assert "BAD   credentials" in output
 
 
 def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:

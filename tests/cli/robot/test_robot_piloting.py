@@ -1,12 +1,9 @@
 """A policy drives a twin, and a person takes over from the terminal."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main
 from shapechanger.cli.robot.drive import recorded_to
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.robot.client.known_robots import KnownRobot, remember
@@ -85,47 +82,3 @@ def test_recordings_are_kept_after_a_failure(
 def _is_corrected(seen: Observation) -> bool:
     """Return whether a person drives while the policy suggests."""
     return seen.commanded[1:] == (0.5,) and bool(seen.suggested)
-
-
-PLOUGH = """\
-[robot]
-name = "plough"
-body = "truck"
-
-[action.throttle]
-propels = true
-
-[action.blade]
-
-[output.drive]
-driver = "hbridge"
-part = "wheels"
-forward = 22
-backward = 27
-mix = { throttle = 1.0 }
-
-[output.lift]
-driver = "hbridge"
-part = "bed"
-forward = 4
-backward = 17
-mix = { blade = 1.0 }
-
-[limits]
-deadline_ms = 1000
-"""
-
-
-def test_a_policy_for_another_robot_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The error names the actions of both, before anything moves."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    with run_robot(write_profile(tmp_path, PLOUGH), arguments=IN_A_ROOM) as robot:
-        known = robot.known
-        remember(KnownRobot("plough", known.address, known.key, known.fingerprint))
-        with pytest.raises(SystemExit) as stop:
-            main(["robot", "drive", "plough", "--policy", str(CLONES["car"])])
-    assert stop.value.code == 2
-    message = " ".join(capsys.readouterr().err.split())
-    assert "steering, throttle, but those required here are throttle, blade" in message

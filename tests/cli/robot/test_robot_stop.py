@@ -1,8 +1,5 @@
 """Serving a twin registers it, and any observer can stop it."""
 
-from __future__ import annotations
-
-import socket
 from pathlib import Path
 
 import pytest
@@ -36,27 +33,6 @@ def test_a_second_person_stops_a_robot(
             seen = car.step(0.0, 0.5)
             assert seen.emergency
             assert seen.action_applied[1] == 0.0
-
-
-def test_a_robot_that_is_served_on_its_twin_is_known_here(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The twin can then be driven: its name is known."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    profile = write_profile(tmp_path, BLIND_CAR)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", str(port))
-    serve += IN_A_ROOM
-    with Person(serve, tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}) as person:
-        person.read_until("Known here as blind-car: `shapechanger robot drive blind-car`")
-        person.read_until(" listens at ")
-        assert recall("blind-car").address == f"127.0.0.1:{port}"
-        with RobotClient.connect(recall("blind-car"), role="person") as client:
-            client.take()
-            client.arm()
-        person.process.terminate()
-        assert person.end() == 0
 
 
 def test_a_name_is_that_of_a_robot_that_can_be_reached(

@@ -1,7 +1,5 @@
 """Driving and calibrating a twin from a terminal."""
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from pathlib import Path

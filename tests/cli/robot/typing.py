@@ -1,7 +1,5 @@
 """A terminal session: sends keys and reads the output of a command."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

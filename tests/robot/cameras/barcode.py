@@ -1,7 +1,5 @@
 """Reader of the barcode that the test pattern and a twin's frames carry."""
 
-from __future__ import annotations
-
 import binascii
 
 import numpy as np

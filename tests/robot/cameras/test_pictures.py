@@ -3,7 +3,6 @@
 import operator
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -84,24 +83,6 @@ def test_a_truncated_frame_is_not_rotated() -> None:
     with pytest.raises(RobotError, match="cannot be decoded"):
         checked_frame(broken, 0, CameraPlan("file", flip=True))
     assert FrameChecks().refusal(Frame(broken, 0)) != ""
-
-
-@pytest.mark.parametrize("flip", [False, True])
-def test_a_frame_is_decoded_once(flip: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One decode serves rotation and all checks."""
-    decoded: list[bytes] = []
-    decode = simplejpeg.decode_jpeg
-
-    def counting(data: bytes, **options: Any) -> Any:
-        decoded.append(data)
-        return decode(data, **options)
-
-    monkeypatch.setattr(simplejpeg, "decode_jpeg", counting)
-    jpeg = simplejpeg.encode_jpeg(_picture(), 80, colorsubsampling="420")
-    frame = checked_frame(jpeg, 0, CameraPlan("file", flip=flip))
-    assert FrameChecks().refusal(frame) == ""
-    assert decoded == [jpeg]
-    assert frame.encoded_here is flip
 
 
 def _turned(jpeg: bytes, quality: int) -> bytes:

@@ -1,7 +1,5 @@
 """Pins that stay as they are, and robots that have them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPin, MockPWMPin

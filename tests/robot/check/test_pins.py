@@ -1,7 +1,5 @@
 """Pins of a robot, the test of two that are joined by a wire, and LEDs instead of motors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """The report of checks."""
 
-from __future__ import annotations
-
 import getpass
 import socket
 from collections.abc import Iterator

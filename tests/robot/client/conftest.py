@@ -1,7 +1,5 @@
 """Fixtures that start robots and clients, and check that no thread remains."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pty

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import threading
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -59,12 +58,6 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
     assert sorted(numbers) == list(range(1, 101))
 
 
-def test_a_ping_measures_the_round_trip(run: Run, connect: Connect) -> None:
-    took_s, now_ns = connect(run()).ping()
-    assert took_s > 0.0
-    assert now_ns > 0
-
-
 def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
     robot = run()
     with pytest.raises(LinkError) as refused:
@@ -106,17 +99,6 @@ def test_a_missing_robot_is_one_error(run: Run, credentials: object) -> None:
     assert shown.count("Traceback") == 1
     assert "aiohttp" not in shown
     assert "asyncio" not in shown
-
-
-def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
-    robot = run(delay_s=60.0)
-    client = connect(robot, timeout_s=30.0)
-    threading.Thread(
-        target=lambda: (eventually(lambda: bool(robot.received(m.Take))), robot.cut())
-    ).start()
-    with pytest.raises(LinkError, match="lost") as refused:
-        client.take()
-    assert "".join(traceback.format_exception(refused.value)).count("Traceback") == 1
 
 
 def test_plain_connections_must_be_asked_for(run: Run) -> None:

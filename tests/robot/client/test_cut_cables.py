@@ -1,7 +1,5 @@
 """Broken connections are detected in time, reported, and not hidden by stale data."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The inbox between the receiving thread and callers."""
 
-from __future__ import annotations
-
 import pytest
 
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation

@@ -69,10 +69,6 @@ def test_a_press_holds_until_its_time(
     assert (keys.value("throttle", now_s), keys.value("steering", now_s)) == (0.0, 0.0)
 
 
-def test_other_keys_are_ignored() -> None:
-    assert not HeldKeys().press("x", 0.0)
-
-
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)

@@ -1,7 +1,5 @@
 """Files of known robots."""
 
-from __future__ import annotations
-
 import pytest
 
 from shapechanger.errors import LinkError, UnknownName
@@ -25,20 +23,6 @@ def test_a_known_robot_round_trips() -> None:
         recall("new-bright")
     with pytest.raises(UnknownName):
         forget("new-bright")
-
-
-def test_a_new_address_replaces_the_old() -> None:
-    key = new_key()
-    remember(KnownRobot("car", "car.local", key, PRINT))
-    path = remember(KnownRobot("car", "10.0.0.7", key, PRINT))
-    assert recall("car").address == "10.0.0.7"
-    assert list(path.parent.iterdir()) == [path]
-
-
-def test_a_misspelt_name_gets_a_suggestion() -> None:
-    remember(KnownRobot("new-bright", "car.local", new_key(), PRINT))
-    with pytest.raises(UnknownName, match="Did you mean 'new-bright'"):
-        recall("new-brigt")
 
 
 def test_a_key_that_other_users_can_read_is_refused() -> None:

@@ -1,15 +1,10 @@
 """Images and observations decoded from messages of a robot."""
 
-from __future__ import annotations
-
 import numpy as np
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from shapechanger.demos.jpeg import decode_picture
 from shapechanger.layout import Layout
-from shapechanger.robot.client import observations
 from shapechanger.robot.client.connection import Received
 from shapechanger.robot.client.observations import RobotSpaces, resize_picture
 from shapechanger.robot.link.messages import Welcome
@@ -35,18 +30,6 @@ def test_shrinking_by_a_whole_number_keeps_the_mean(
     seed = data.draw(st.integers(0, 2**32 - 1))
     whole = np.random.default_rng(seed).integers(0, 256, (by * high, by * wide, 3), np.uint8)
     assert abs(float(resize_picture(whole, (wide, high)).mean()) - float(whole.mean())) <= 0.5
-
-
-def test_other_sizes_take_the_nearest_pixel() -> None:
-    row = np.arange(5, dtype=np.uint8)
-    whole = np.repeat(np.repeat(row[None, :, None], 2, axis=0), 3, axis=2)
-    assert resize_picture(whole, (2, 2))[0, :, 0].tolist() == [1, 3]
-    assert resize_picture(whole, (10, 2))[0, :, 0].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
-
-
-def test_an_equal_size_returns_the_same_array() -> None:
-    whole = np.zeros((2, 3, 3), np.uint8)
-    assert resize_picture(whole, (3, 2)) is whole
 
 
 def spaces() -> RobotSpaces:
@@ -107,21 +90,3 @@ def test_a_restarted_robot_shows_its_new_frame() -> None:
     after = robot.view(seen(1, picture((16, 12), 20)))
     assert after.fresh
     assert (after.observation != before.observation).any()
-
-
-def test_an_invalid_frame_is_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = spaces()
-    good = robot.view(seen(1, picture((16, 12), 1)))
-    tried: list[bytes] = []
-
-    def decode(jpeg: bytes, name: str) -> object:
-        tried.append(jpeg)
-        return decode_picture(jpeg, name)
-
-    monkeypatch.setattr(observations, "decode_picture", decode)
-    for _ in range(3):
-        assert not robot.shows(seen(2, b"no picture"))
-        shown = robot.view(seen(2, b"no picture"))
-        assert not shown.fresh
-        assert (shown.observation == good.observation).all()
-    assert len(tried) == 1

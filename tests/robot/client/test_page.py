@@ -1,7 +1,5 @@
 """The examples of docs/remote.md."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Callable

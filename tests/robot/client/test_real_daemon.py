@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
-import numpy as np
 import pytest
 
 from shapechanger.demos.episodes import read_episode
@@ -25,7 +23,6 @@ from tests.robot.daemon.running import Running, running
 
 pytestmark = pytest.mark.realtime
 
-ID = "shapechanger/RemoteVehicle-v1"
 HZ = 20.0
 SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
 
@@ -98,63 +95,6 @@ def serve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
             return robot
 
         yield made
-
-
-def made(robot: Served, **how: Any) -> gym.Env[Any, Any]:
-    """The env of a robot."""
-    known = robot.known
-    access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
-    return gym.make(ID, **access | how)
-
-
-@pytest.mark.parametrize("pace", ["realtime", "lockstep"])
-def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) -> None:
-    robot = serve(arming="anyone")
-    env = made(robot, pace=pace, state=True)
-    seen, info = env.reset(seed=0)
-    assert env.observation_space.contains(seen)
-    assert info["armed"]
-    ages: list[float] = []
-    for _ in range(5):
-        seen, reward, terminated, truncated, info = env.step(np.array([0.25, 0.5], np.float32))
-        # Missing if the observation was sent before the guard applied the action.
-        ages += filter(None, [info["latency"].get("observation_age_at_action")])
-        assert not terminated
-        assert not truncated, info["truncated_because"]
-        assert info["refused"] == ""
-    assert info["action_applied"].tolist() == [0.25, 0.5]
-    assert 0.0 < reward < 0.5
-    assert ages
-    assert min(ages) > 0.0
-    assert info["reward_sources"]["speed"] == "wheel"
-    robot.sense(collision=1.0)
-    for _ in range(20):
-        *_, terminated, _, info = env.step(np.array([0.0, 0.0], np.float32))
-        if terminated:
-            break
-    assert info["reward_collision"] == -10.0
-    env.close()
-    eventually(lambda: "disarm" in robot.running.guard.kinds())
-
-
-def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
-    robot = serve()
-    with RobotClient.connect(robot.known, role="person", name="Grace") as person:
-
-        def click(_: str) -> None:
-            person.ask()
-            threading.Thread(target=person.arm).start()
-
-        env = made(robot, on_waiting=click, reset_timeout_s=20.0)
-        _, info = env.reset(seed=0)
-        assert info["armed"]
-        person.emergency_stop("a dog")
-        for _ in range(20):
-            *_, truncated, info = env.step(np.zeros(2, np.float32))
-            if truncated:
-                break
-        assert info["truncated_because"].startswith("Emergency stop")
-        env.close()
 
 
 def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None:
@@ -231,24 +171,3 @@ def test_refused_requests_leave_the_link_up(recorder: Served) -> None:
                 refused()
         assert client.browse().episodes == ()
         assert client.alive
-
-
-def test_a_program_suggests_while_a_person_drives(recorder: Served) -> None:
-    with (
-        RobotClient.connect(recorder.known, role="person", name="Ada") as person,
-        RobotClient.connect(recorder.known, name="net") as program,
-    ):
-        person.take()
-        person.arm()
-        drive(person, 2)
-        seen = program.ask()
-        assert (seen.message.holder, seen.message.holder_role) == ("Ada", "person")
-        assert seen.message.commanded == (0.0, 0.5)
-        program.suggest((0.25, 1.0), answers=seen.message.seq)
-        shown = program.observation(seen.message.seq)
-        assert (shown.message.suggested, shown.message.suggested_by) == ((0.25, 1.0), "net")
-        assert person.ask().message.suggested == (0.25, 1.0)
-        wrong = program.suggest((0.25,), answers=shown.message.seq)
-        eventually(lambda: "2 values" in program.refusal(wrong))
-        mine = person.suggest((0.0, 0.0), answers=person.ask().message.seq)
-        eventually(lambda: "You have control" in person.refusal(mine))

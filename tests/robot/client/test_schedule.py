@@ -1,7 +1,5 @@
 """The control period: when the next step begins."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -111,23 +111,6 @@ def test_a_held_escape_stops_at_once() -> None:
     assert now_s <= 2 * ESCAPE_WAIT_S
 
 
-def test_a_read_split_anywhere_moves_nothing(typed: tuple[int, Terminal]) -> None:
-    keyboard, terminal = typed
-    for sequence in UNKNOWN:
-        if sequence in {b"\x03", b"\x1a"}:
-            continue  # Ctrl-C and Ctrl-Z are signals.
-        for place in range(len(sequence)):
-            keys = list[str]()
-            for part in filter(None, (sequence[:place], sequence[place:])):
-                os.write(keyboard, part)
-                keys += terminal.keys(0.0)
-            assert orders(keys) == [], (sequence, place)
-    assert orders(terminal.keys(REST_WAIT_S)) == []
-    os.write(keyboard, b"\x1b")
-    assert terminal.keys(0.0) == []  # Escape is a key after a moment.
-    assert terminal.keys(5.0) == ["escape"]
-
-
 @pytest.mark.parametrize(
     ("data", "keys"),
     [

@@ -1,7 +1,5 @@
 """Episodes in which a person takes control and returns it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -91,13 +89,6 @@ def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
         person.emergency_stop("enough")
         assert "Emergency stop" in _cut(env)
         _end_emergency(person)
-
-
-def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) -> None:
-    with _made(robot) as env, robot.client(role="person") as person:
-        env.reset()
-        person.take()
-        assert "has control of the robot now" in _cut(env)
 
 
 def _cut(env: gym.Env[Any, Any]) -> str:

@@ -1,7 +1,5 @@
 """Fixtures with a served twin and its console."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path

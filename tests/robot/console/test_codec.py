@@ -1,7 +1,5 @@
 """The console and the robot agree on messages and proofs."""
 
-from __future__ import annotations
-
 import base64
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Driving with the console, and its stops."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest
@@ -124,36 +122,6 @@ def test_the_stop_button_acts_on_pointer_down(car: RunningRobot, visit: Visit) -
         console.arm()
         assert observer.ask().message.emergencies == stops
     console.stop()
-
-
-def test_the_stick_works_with_mouse_and_touch(car: RunningRobot, visit: Visit) -> None:
-    """The stick returns to the centre, and touching it does not scroll the page."""
-    pins = Pins(car)
-    for how in ({}, PHONE):
-        console = visit(car, **how)
-        console.arm()
-        console.page.locator("#pad").scroll_into_view_if_needed()
-        box = console.page.locator("#pad").bounding_box()
-        assert box is not None
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        if how:
-            touch = console.page.context.new_cdp_session(console.page)
-            before = console.page.evaluate("scrollY")
-            for kind, dy in (("touchStart", 0.0), ("touchMove", 0.4)):
-                point = {"x": x, "y": y + dy * box["height"]}
-                touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
-            pins.await_motion(-1.0)
-            touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-            assert console.page.evaluate("scrollY") == before
-        else:
-            console.page.mouse.move(x, y)
-            console.page.mouse.down()
-            console.page.mouse.move(x, y + 0.4 * box["height"])
-            pins.await_motion(-1.0)
-            console.page.mouse.up()
-        pins.await_rest()
-        console.stop()
-        console.page.close()
 
 
 def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:

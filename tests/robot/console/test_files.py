@@ -1,7 +1,5 @@
 """Files of the console in the package."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Orders that nobody gave: layouts, modifiers, the focus, gamepads and lost ends of presses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
@@ -149,19 +147,6 @@ def test_a_key_has_one_meaning_on_every_layout(person: Input) -> None:
         person.console.await_state(robot="emergency")
         assert tap("KeyE") == ["arm"], name
         person.console.await_state(robot="armed")
-
-
-def test_the_page_shows_the_letters_of_the_layout(person: Input) -> None:
-    """AZERTY has Z Q S D where QWERTY has W A S D."""
-    at = dict(zip(_PLACES, LAYOUTS["AZERTY"].split(), strict=True))
-    person.page.evaluate(
-        "letters => { navigator.keyboard.getLayoutMap = async () => new Map(letters);"
-        " dispatchEvent(new Event('focus')); }",
-        list(at.items()),
-    )
-    person.page.locator("#stage[aria-label*='Z Q S D']").wait_for()
-    assert person.page.locator("#mark kbd").inner_text() == ","
-    assert person.page.locator("#mark").get_attribute("aria-keyshortcuts") == ","
 
 
 # What a page does not tell from the end of a press: after each, W must be pressed again.

@@ -1,7 +1,5 @@
 """Access, requests and accessibility of the console."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import ssl
@@ -71,14 +69,6 @@ def test_a_wrong_key_is_an_error_and_keeps_the_form(car: RunningRobot, visit: Vi
     console.page.fill("#key", car.known.key.replace("-", " ").lower())
     console.page.click("#enter")
     console.await_state(link="open", view="drive")
-
-
-def test_the_page_requests_only_the_robot(car: RunningRobot, visit: Visit) -> None:
-    """All requests go to the robot; a policy violation would be a page error."""
-    console = visit(car)
-    console.await_state(picture="live")
-    assert console.requested
-    assert all(url.startswith(console.address) for url in console.requested)
 
 
 def test_every_control_has_an_accessible_name(car: RunningRobot, visit: Visit) -> None:
@@ -161,13 +151,6 @@ def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str
         }"""
     )
     assert poor == []
-
-
-def test_reduced_motion_stops_all_animations(car: RunningRobot, visit: Visit) -> None:
-    console = visit(car, reduced_motion="reduce")
-    console.await_state(link="open", view="drive")
-    console.page.evaluate("document.body.dataset.recording = 'true'")
-    assert console.page.evaluate("document.getAnimations().length") == 0
 
 
 def test_a_file_that_fails_to_load_is_requested_again(chromium: Browser, car: RunningRobot) -> None:

@@ -1,7 +1,5 @@
 """Several clients, a slow page, a restarted robot, and recordings."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """A daemon for each test that takes `robot`. Tests may be coroutines, which run in its loop."""
 
-from __future__ import annotations
-
 import asyncio
 import inspect
 from collections.abc import Iterator

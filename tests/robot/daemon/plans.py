@@ -1,7 +1,5 @@
 """Plan, frames and guard states of a car, for the tests of the daemon."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgspec

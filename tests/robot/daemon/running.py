@@ -1,7 +1,5 @@
 """A daemon in this process on real sockets, and a client that sends raw messages."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """Camera thread of the daemon: only valid, new frames are passed on."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 
@@ -122,16 +120,6 @@ def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watche
     watched.until(lambda: len(watched.frames) == 1)
     assert camera.opened == 2
     assert len([text for text in watched.reports if "cannot be decoded" in text]) == 1
-
-
-def test_bytes_between_frames_are_reported_once(camera: FakeCamera, watched: Watched) -> None:
-    for at in range(1, 4):
-        camera.put(Frame(picture(at), at, skipped=62))
-    watched.until(lambda: len(watched.frames) == 3)
-    assert [
-        report for report in watched.reports if "62 before this one" in report
-    ] == watched.reports
-    assert len(watched.reports) == 1
 
 
 def test_closing_ends_a_camera_without_frames(watched: Watched) -> None:

@@ -1,7 +1,5 @@
 """Messages that wait for a client, and how many it may send."""
 
-from __future__ import annotations
-
 import pytest
 
 from shapechanger.errors import RobotRefused

@@ -1,7 +1,5 @@
 """A short run of `benchmarks/fuzz_link.py`."""
 
-from __future__ import annotations
-
 from benchmarks.fuzz_link import fuzz
 
 

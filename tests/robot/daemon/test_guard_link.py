@@ -1,7 +1,5 @@
 """The connection from the daemon to the guard."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 from collections.abc import Iterator

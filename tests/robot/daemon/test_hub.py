@@ -1,7 +1,5 @@
 """The hub: control, observations for one client, and expiry of commands and suggestions."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

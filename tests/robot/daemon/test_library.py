@@ -1,7 +1,5 @@
 """Library of recordings: exact bytes, bounded answers, nothing outside the folder."""
 
-from __future__ import annotations
-
 import tempfile
 import threading
 from collections.abc import Callable, Iterator

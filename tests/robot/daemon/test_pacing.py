@@ -1,7 +1,5 @@
 """Pacing of observations."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

@@ -1,7 +1,5 @@
 """Policies on board: starting, choosing and ending their processes."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import sys
@@ -144,13 +142,6 @@ async def test_a_robot_without_policies_refuses(one: PolicyRunner) -> None:
     with pytest.raises(Declined, match="--policy"):
         one.run("student")
     assert one.state() == PolicyState(names=())
-
-
-@pytest.mark.plan(policies="gone", policy="student")
-async def test_a_folder_that_is_gone_has_no_policies(
-    one: PolicyRunner, said: list[PolicyState]
-) -> None:
-    assert one.state().names == ()
 
 
 @pytest.mark.realtime

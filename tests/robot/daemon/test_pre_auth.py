@@ -1,7 +1,5 @@
 """Limits on connections before authentication."""
 
-from __future__ import annotations
-
 import asyncio
 from collections import Counter
 from dataclasses import dataclass

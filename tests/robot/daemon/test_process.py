@@ -1,7 +1,5 @@
 """The daemon in its own process, as the supervisor starts it."""
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """Recorder: pairing of commands with observations, and the writer thread."""
 
-from __future__ import annotations
-
 import queue
 from collections.abc import Callable
 from pathlib import Path

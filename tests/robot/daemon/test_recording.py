@@ -1,8 +1,5 @@
 """Recording with a daemon on real sockets."""
 
-from __future__ import annotations
-
-import json
 from pathlib import Path
 
 import pytest
@@ -138,25 +135,6 @@ async def test_an_episode_continues_after_a_change_of_control(
     assert [step.wanted for step in steps] == [None, None, None, (-1.0, 5.0)]
 
 
-async def test_undo_drops_the_newest_steps(robot: Running, tmp_path: Path) -> None:
-    async with robot.client(role="person") as person:
-        await robot.armed(person)
-        await recording(person)
-        await drive(robot, person, 1, 5)
-        await person.send(Undo(seconds=3_600.0))
-        while (await person.expect(RecorderState)).dropped != 5:
-            pass
-        await person.send(Undo())
-        assert (await person.expect(Refused)).reason == "There is nothing to undo."
-        await recording(person, on=False)
-        for nothing in (Undo(), Mark(), Record(on=False)):
-            await person.send(nothing)
-            assert (await person.expect(Refused)).reason == "Nothing is being recorded."
-    await robot.end()
-    episode = read_episode(only(tmp_path / "kept"))
-    assert (len(episode.steps), episode.kept) == (5, ())
-
-
 async def test_only_persons_record_and_judge(robot: Running, tmp_path: Path) -> None:
     async with robot.client() as program:
         for request in (
@@ -250,29 +228,6 @@ async def test_the_episode_is_closed_when_the_daemon_ends(robot: Running, tmp_pa
         await robot.end()
     episode = read_episode(only(tmp_path / "kept"))
     assert (episode.closed, episode.outcome, len(episode.steps)) == (True, "", 4)
-
-
-async def test_recordings_can_be_listed_fetched_and_judged(robot: Running, tmp_path: Path) -> None:
-    header = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
-    with EpisodeWriter.create(tmp_path / "kept", header) as writer:
-        for number in range(30):
-            jpeg = picture(number) if number % 3 == 0 else None
-            writer.add(Step(action=(0.0, number / 30), driver="person"), jpeg)
-        name = writer.path.name
-    async with robot.client(role="person") as person:
-        await person.send(Browse())
-        (summary,) = (await person.expect(Recordings)).episodes
-        assert (summary.id, summary.steps, summary.driver) == (name, 30, "Ada")
-        for first, last, keep, kept in ((10, 14, False, 25), (12, 12, True, 26)):
-            await person.send(Judge(episode=name, first=first, last=last, keep=keep))
-            assert (await person.expect(Recordings)).episodes[0].kept == kept
-        await person.send(Judge(episode=name, first=0, last=99))
-        assert "has the steps 0 to 29" in (await person.expect(Refused)).reason
-        await person.send(Fetch(episode=name, first=28, count=100))
-        piece = await person.expect(Piece)
-        assert (piece.first, piece.total, len(piece.lines)) == (28, 32, 4)
-        assert piece.frames == (picture(27), None, None, None)
-        assert json.loads(piece.header)["driver"] == "Ada"
 
 
 async def test_one_question_about_recordings_at_a_time(robot: Running, tmp_path: Path) -> None:

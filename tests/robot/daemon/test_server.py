@@ -1,7 +1,5 @@
 """The daemon on real sockets: authentication, control, limits and stops."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable
 from functools import partial

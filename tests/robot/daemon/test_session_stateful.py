@@ -1,7 +1,5 @@
 """Sessions under random messages in random order: only permitted clients move the robot."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fake pins, buses and pulses that record what was written."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Sequence
 from typing import Any

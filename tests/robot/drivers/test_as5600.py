@@ -1,7 +1,5 @@
 """Joint encoders, at the level of bytes."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Output drivers recover from a single hardware failure with the next write."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from itertools import chain

@@ -1,7 +1,5 @@
 """A sensor and an actuator of another package: one file each, and an entry point."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

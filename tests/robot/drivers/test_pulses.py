@@ -1,14 +1,13 @@
 """Servos, speed controllers and their pulse sources."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers import pca9685, pulse
+from shapechanger.robot.drivers import pulse
 from shapechanger.robot.drivers.pulse import ServoKeys
 from tests.robot.drivers.fakes import MS, FakeHardware
 
@@ -110,19 +109,6 @@ def test_chip_is_set_up_asleep_and_woken(
     hardware.output("servo", **_ON_CHIP, channel=3)
     last = [(0x01, [0x04]), (0x00, [0x20]), (0x06 + 12, [0, 0, 0, 0x10])]
     assert [(register, data) for _, register, data in hardware.bus.writes] == first + last
-
-
-@pytest.mark.parametrize(("is_real", "pauses"), [(True, [500e-6]), (False, [])])
-def test_a_simulated_chip_wakes_up_without_a_pause(
-    monkeypatch: pytest.MonkeyPatch, is_real: bool, pauses: list[float]
-) -> None:
-    """A real oscillator needs 500 us; in simulated time nothing sleeps."""
-    slept: list[float] = []
-    monkeypatch.setattr(pca9685.time, "sleep", slept.append)
-    hardware = FakeHardware({0x40: _asleep()})
-    monkeypatch.setattr(hardware, "clock", SimpleNamespace(is_real=is_real))
-    hardware.output("servo", **_ON_CHIP, channel=3)
-    assert slept == pauses
 
 
 def test_pulse_is_in_whole_steps() -> None:

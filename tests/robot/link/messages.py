@@ -1,7 +1,5 @@
 """Hypothesis strategies for every message of the link, made from the types of its fields."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Keys, proofs of possession, and fingerprints of certificates."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """The card of a robot, which its processes, clients and recordings share."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

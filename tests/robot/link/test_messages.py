@@ -1,7 +1,5 @@
 """Messages of the link: round trips, bounds and invalid bytes."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The finger's profile: its servo bus and the encoders at its joints."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

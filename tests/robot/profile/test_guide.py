@@ -1,7 +1,5 @@
 """The guides to profiles and to the wire have every key, from the types that decode them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

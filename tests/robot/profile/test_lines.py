@@ -1,7 +1,5 @@
 """Line numbers of the keys of a TOML text."""
 
-from __future__ import annotations
-
 import tomllib
 from typing import Any
 

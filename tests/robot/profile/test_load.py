@@ -1,7 +1,5 @@
 """Finding and reading profile files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

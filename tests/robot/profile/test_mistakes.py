@@ -1,7 +1,5 @@
 """Each mistake in a profile gives one sentence: file, line, problem and alternatives."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

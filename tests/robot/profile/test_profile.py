@@ -1,7 +1,5 @@
 """What guard, daemon and workstation read from a profile."""
 
-from __future__ import annotations
-
 import datetime
 import math
 

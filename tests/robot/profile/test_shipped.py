@@ -1,7 +1,5 @@
 """The shipped profiles, and how they map commands to outputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest

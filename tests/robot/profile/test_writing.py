@@ -1,7 +1,5 @@
 """Writing a first profile, and changing an existing one."""
 
-from __future__ import annotations
-
 import datetime
 import os
 import stat

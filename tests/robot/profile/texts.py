@@ -1,7 +1,5 @@
 """A profile with every table, and helpers to change it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Final

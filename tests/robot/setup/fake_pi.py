@@ -1,7 +1,5 @@
 """A Raspberry Pi in a folder, with the commands that change it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from shapechanger.robot.setup.install import Machine, RootCommand

@@ -1,8 +1,5 @@
 """Putting a robot in place on a Raspberry Pi, on a fake one."""
 
-from __future__ import annotations
-
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -177,16 +174,6 @@ def test_commands_run_as_root(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.geteuid", lambda: 1000)
     monkeypatch.setenv("PATH", "")
     assert run_as_root(script) == "sudo: No such file or directory"
-
-
-def test_a_typed_command_does_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A person can copy it."""
-    (tmp_path / "sudo").write_text('#!/bin/sh\nexec "$@"\n')
-    (tmp_path / "sudo").chmod(0o755)
-    command = RootCommand(("tee", str(tmp_path / "made")), "\n[all]\ndtparam=a\\b 'c'\n")
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    subprocess.run(str(command), shell=True, check=True, capture_output=True)
-    assert (tmp_path / "made").read_text() == command.text
 
 
 def test_the_unit_names_profile_program_and_user(

@@ -1,7 +1,5 @@
 """Zeros of joint encoders and tendon servos."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -61,16 +59,6 @@ def test_a_missing_magnet_is_an_error() -> None:
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
         find_joint_zeros(_RIG, board.hardware, lambda: None)
     assert find_joint_zeros(_CAR, board.hardware, lambda: None) == {}
-
-
-def test_zeros_are_measured_with_taut_tendons() -> None:
-    """All servos are released afterwards."""
-    board = _board(servo_zero=5000)
-    zeros = find_zeros(_RIG, board.hardware, lambda: board.pass_ns(10_000_000))
-    # 3 N less the 0.5 N of the gears against a spring of 300 N/m: 8.3 mm, of 62.8 mm a turn.
-    assert list(zeros) == ["FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI"]
-    assert zeros["FDP"] == pytest.approx(5000 + 4096 * 0.0083 / 0.0628, abs=60)
-    assert not any(servo.has_torque for servo in board.pins.require_rig().servos.values())
 
 
 def test_a_loose_tendon_is_an_error() -> None:

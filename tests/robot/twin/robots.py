@@ -1,7 +1,5 @@
 """Plans of small robots, and helpers that run processes and wait for conditions."""
 
-from __future__ import annotations
-
 import math
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """Requests to a board that is held up."""
 
-from __future__ import annotations
-
 import itertools
 import socket
 import threading

@@ -1,10 +1,7 @@
 """Servo instructions sent over a board's socket to servos in another process."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +14,6 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.hardware import TwinHardware, connect
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import RunningBoard, start_board
-from tests.robot.twin.robots import CAR
 
 pytestmark = pytest.mark.realtime
 
@@ -94,13 +90,3 @@ def test_an_unknown_bus_device_is_refused(hardware: TwinHardware) -> None:
     )
     with pytest.raises(RobotError, match="There is no /dev/ttyUSB7 at this twin"):
         OutputBank(replace(_PLAN, outputs=outputs), hardware)
-
-
-def test_a_car_has_no_servo_bus(tmp_path: Path) -> None:
-    """An operator cannot read tendon tensions on a robot without a servo bus."""
-    with (
-        start_board(CAR, "twin", tmp_path) as board,
-        Operator(board.socket_path) as operator,
-        pytest.raises(RobotError, match="no servo bus"),
-    ):
-        operator.tensions()

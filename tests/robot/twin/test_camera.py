@@ -1,24 +1,19 @@
 """The front camera: timestamped JPEG frames written to a pipe."""
 
-from __future__ import annotations
-
 import os
 import re
 import select
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
 import pytest
 import simplejpeg
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.twin.camera import CameraFault, FrontCameraPipe
+from shapechanger.robot.twin.camera import CameraFault
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.start import RunningBoard, start_board
 from tests.robot.cameras.barcode import read_barcode
 from tests.robot.twin.robots import CAR, until
@@ -110,22 +105,6 @@ def test_a_camera_fault_stops_valid_frames(tmp_path: Path, how: CameraFault) -> 
         operator.break_camera("")
         operator.advance(0.2)
         assert _pictures(pipe.read(1 << 20))[-1][0] > newest[0]
-
-
-def test_without_a_barcode_the_comment_still_has_the_time(tmp_path: Path) -> None:
-    """The barcode is optional, so that policies cannot learn it; the comment keeps the time."""
-    world = DrivingWorld({"wheels"}, (160, 120), seed=1)
-    plain, striped = (
-        FrontCameraPipe(
-            tmp_path, replace(_CAMERA, jpeg_quality=95), world, 0, latest_only=True, barcode=barcode
-        ).draw(77)
-        for barcode in (False, True)
-    )
-    assert b"captured_ns=77" in plain
-    seen = simplejpeg.decode_jpeg(plain, "RGB")
-    assert read_barcode(seen) is None
-    assert np.abs(seen.astype(float) - world.picture()).mean() < 5.0
-    assert read_barcode(simplejpeg.decode_jpeg(striped, "RGB")) == 77
 
 
 def test_a_twin_without_a_camera_refuses_camera_faults(tmp_path: Path) -> None:

@@ -1,15 +1,11 @@
 """Joint encoders on the twin's I2C bus."""
 
-from __future__ import annotations
-
 import math
 
-import numpy as np
 import pytest
 
 from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.contract.world import World
-from shapechanger.errors import RobotError, UnknownName
 from shapechanger.finger.anatomy import JOINTS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
@@ -21,7 +17,6 @@ from shapechanger.robot.drivers.as5600 import (
     Tca9548a,
     open_and_read,
 )
-from shapechanger.robot.twin.room import DrivingWorld
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
 
@@ -51,19 +46,6 @@ def test_readings_match_the_joint_angles() -> None:
         assert driver.read(0, 0.0) == pytest.approx(truth, abs=0.51 * _TURN / 4096)
 
 
-def test_encoder_noise_follows_the_parameters_and_the_seed() -> None:
-    """Noise has the configured standard deviation and is reproducible from the seed."""
-    noisy = NOMINAL.replace(joint_noise=0.02)
-    readings: list[list[float]] = []
-    for _ in range(2):
-        world = FingerWorld(noisy, seed=2)
-        driver = open_and_read(_sensor(), _board(world, _sensor()).hardware)
-        readings.append([driver.read(0, 0.0)["PIP_flexion/angle"] for _ in range(400)])
-    assert readings[0] == readings[1]
-    assert np.std(readings[0]) == pytest.approx(0.02, rel=0.1)
-    assert np.mean(readings[0]) == pytest.approx(world.truth()["PIP_flexion/angle"], abs=0.004)
-
-
 def test_the_multiplexer_passes_open_channels_only() -> None:
     """No channel is open at first; with two open, a bit is low where either chip pulls it low."""
     keys = [JointKeys(channel=0, zero=counts) for counts in (0x0F3, 0x155)]
@@ -90,16 +72,3 @@ def test_the_status_reports_the_magnet(how: str) -> None:
     sensor = As5600(_sensor(), board.hardware)
     board.pins.encoder("PIP_flexion").set_magnet(how)
     assert sensor.measure("PIP_flexion")[1] == how
-
-
-def test_unknown_joints_are_refused() -> None:
-    """Unknown joints and faults raise; in a world without joints, encoders read 0."""
-    with pytest.raises(RobotError, match="and no knee"):
-        _board(FingerWorld(NOMINAL, seed=0), _sensor(("knee",)))
-    board = _board(DrivingWorld(frozenset(), (160, 120), 0), _sensor(("knee", "ankle")))
-    with pytest.raises(UnknownName, match=r"'kneee'\. Did you mean 'knee'"):
-        board.pins.encoder("kneee")
-    with pytest.raises(UnknownName, match="fault of a magnet"):
-        board.pins.encoder("knee").set_magnet("gonee")  # pyright: ignore[reportArgumentType]
-    driver = open_and_read(_sensor(("knee", "ankle")), board.hardware)
-    assert driver.read(0, 0.0) == {"knee/angle": 0.0, "ankle/angle": 0.0}

@@ -1,7 +1,5 @@
 """The oracle finds violations in handmade ledgers."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Reading and writing the ledger, including damaged files."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

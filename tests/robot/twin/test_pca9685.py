@@ -1,7 +1,5 @@
 """Registers of the simulated PCA9685."""
 
-from __future__ import annotations
-
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -67,30 +65,6 @@ def test_the_full_on_and_full_off_bits() -> None:
     assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.pulses)
     chip.write(0xFD, [0x10])
     assert all(pulse.us == 0.0 for pulse in chip.pulses)
-
-
-def test_the_prescale_is_read_only_while_awake() -> None:
-    """The chip ignores a new prescale unless it is asleep."""
-    chip = SimulatedPca9685()
-    _awake(chip)
-    chip.write(0xFE, [3])
-    assert chip.read(0xFE, 1) == [121]
-
-
-def test_a_sleeping_chip_sends_no_pulses() -> None:
-    chip = SimulatedPca9685()
-    _awake(chip)
-    chip.write(0x06, [0, 0, 51, 1])
-    chip.write(0x00, [0x31])
-    assert chip.pulses[0].us == 0.0
-
-
-def test_without_auto_increment_a_block_lands_in_one_register() -> None:
-    chip = SimulatedPca9685()
-    chip.write(0x00, [0x01])
-    chip.write(0x06, [0, 0, 51, 1])
-    assert chip.read(0x06, 4) == [1, 1, 1, 1]
-    assert chip.pulses[0].us == 0.0
 
 
 def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written() -> None:

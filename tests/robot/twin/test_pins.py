@@ -1,7 +1,5 @@
 """gpiozero devices on the twin's pins, from processes that start and die."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
-from tests.robot.twin.robots import CAR, die, process
+from tests.robot.twin.robots import CAR, process
 
 pytestmark = pytest.mark.realtime
 
@@ -37,15 +35,6 @@ hardware.close()
 """
 
 
-def test_a_motor_of_another_process_is_seen(tmp_path: Path) -> None:
-    """The board records the duties set by another process, with its pid."""
-    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        with process(_MOTOR, board.socket_path, "-0.4") as robot:
-            assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.4}
-        last = [line for line in read_ledger(board.ledger_path) if line.pin == 27 and line.duty]
-        assert [(line.duty, line.hz, line.pid) for line in last[:1]] == [(0.4, 50, robot.pid)]
-
-
 @pytest.mark.parametrize(("value", "possible"), [("0.4", {0.0, 1.0}), ("1", {1.0}), ("0", {0.0})])
 def test_pins_of_a_killed_process_keep_their_level(
     tmp_path: Path, value: str, possible: set[float]
@@ -64,20 +53,6 @@ def test_pins_of_a_killed_process_keep_their_level(
         assert ledger[gone].pid == robot.pid
         after = [(line.kind, line.pin, line.hz) for line in ledger[gone + 1 :]]
         assert after == [("pin", 22, 0), ("pin", 25, 0), ("pin", 27, 0)]
-
-
-def test_frozen_pwm_is_high_in_proportion_to_its_duty(tmp_path: Path) -> None:
-    """PWM at 40 % freezes high, which is full power, in about 40 % of deaths."""
-    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        high = 0
-        for _ in range(200):
-            hardware = connect(board.socket_path)
-            device = PWMOutputDevice(22, pin_factory=hardware.pin_factory())
-            device.value = 0.4
-            die(hardware)
-            high += operator.levels().duties[22] == 1.0
-            device.close()
-        assert 50 < high < 110
 
 
 def test_a_clean_exit_leaves_motors_low_and_keeps_plain_outputs(tmp_path: Path) -> None:
@@ -139,18 +114,6 @@ def test_opening_a_pin_releases_it_first(tmp_path: Path) -> None:
         released = [line for line in read_ledger(board.ledger_path) if line.released]
         assert [line.pin for line in released] == [22, 27]
         hardware.close()
-
-
-def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
-    """Pulses have whole microseconds; when the process dies, the pin keeps a constant level."""
-    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
-        hardware = connect(board.socket_path)
-        hardware.pin_factory().pulse(12, 1503, 50)
-        assert operator.levels().pulses[12] == (1503, 50)
-        die(hardware)
-        levels = operator.levels()
-        assert 12 not in levels.pulses
-        assert levels.duties[12] in (0.0, 1.0)
 
 
 def test_connecting_without_a_board_names_the_path(tmp_path: Path) -> None:

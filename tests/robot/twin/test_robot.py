@@ -1,7 +1,5 @@
 """What is left of a robot whose link is lost."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

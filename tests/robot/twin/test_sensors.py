@@ -1,7 +1,5 @@
 """The robot's own sensor drivers on the twin's pins and chips."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -64,24 +62,6 @@ def test_the_encoder_measures_the_speed(sensor: SensorPlan, throttle: float) -> 
         seen = rig.advance(0.6)
         assert seen["speed"] == pytest.approx(rig.operator.where().speed, rel=0.1)
         assert seen["speed"] * throttle > 0.0
-
-
-def test_the_encoder_counts_the_distance() -> None:
-    """A wheel turn of 0.2 m gives 80 edges."""
-    edges: list[int] = []
-    with _rig(ENCODER) as rig:
-        for pin, watcher in list(rig.board.watchers.items()):
-
-            def count(level: int, at_ns: int, watcher: Any = watcher) -> None:
-                edges.append(at_ns)
-                watcher(level, at_ns)
-
-            rig.board.watchers[pin] = count
-        rig.motor.value = 1.0
-        rig.advance(0.7)
-        travelled = rig.operator.where().travelled_m
-        assert len(edges) == pytest.approx(travelled / 0.2 * 80, abs=1)
-        assert edges == sorted(edges)
 
 
 def test_the_bumper_is_pressed() -> None:

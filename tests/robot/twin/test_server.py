@@ -1,7 +1,5 @@
 """Edges at a twin's board for a client that does not wait for them."""
 
-from __future__ import annotations
-
 import socket
 
 import msgspec

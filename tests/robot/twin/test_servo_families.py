@@ -1,7 +1,5 @@
 """Rig of a finger: the real guard and drivers on a twin, one exam for both families of servos."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import socket
@@ -12,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.errors import RobotError, UnknownName
-from shapechanger.finger.anatomy import JOINT_REST, JOINTS, MOMENT_ARMS, TENDONS
+from shapechanger.errors import RobotError
+from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
@@ -22,7 +20,6 @@ from shapechanger.robot.guard.outputs import Switches, make_safe
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.calibration import find_zeros
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
@@ -200,26 +197,6 @@ def test_arming_does_not_keep_a_deaf_servo_pulling(bench: _Bench) -> None:
     assert bench.seen.stop_reason == ""
 
 
-def test_another_servo_than_in_the_profile_is_refused(family: str) -> None:
-    """A servo of another model is named before anything moves."""
-    wired = read(re.sub("XL330-M077|STS3215", "XL330-M288", finger_text(family)))
-    with pytest.raises(RobotError, match=r"FDP \(id 1\) is not an .*: its model number is"):
-        _Bench(read(finger_text(family)), wired)
-
-
-def test_zeros_are_found_and_kept(family: str) -> None:
-    """Homing finds the zeros of a straight finger, and lets go."""
-    plan = read(finger_text(family)).guard_plan()
-    world = FingerWorld(NOMINAL, seed=3)
-    board = LocalBoard(TwinWiring(plan), world)
-    zeros = find_zeros(plan, board.hardware, lambda: board.pass_ns(_TICK_NS))
-    assert tuple(zeros) == TENDONS
-    board.pass_ns(20 * _TICK_NS)
-    rig = board.pins.require_rig()
-    assert [servo.pulls_a for servo in rig.servos.values()] == [0.0] * 7
-    assert rig.has_power == (family == "Dynamixel")
-
-
 def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
     """After a crash the enable line falls, whatever the servos do; nothing is sent to them."""
     plan = read(finger_text("Feetech")).guard_plan()
@@ -252,50 +229,6 @@ def test_feetech_servos_find_their_turns_again() -> None:
     bench.robot.close()
 
 
-def test_commands_map_to_tensions(tensed: _Bench) -> None:
-    """Command 0 is the pretension and 1 the largest tension, to one count of current."""
-    tensed.drive(_REST, 5)
-    assert [one * _N_PER_A for one in tensed.pulls()] == pytest.approx([1.0] * 7, abs=0.02)
-    tensed.drive((1.0, *_REST[1:]), 15)
-    assert tensed.pulls()[0] * _N_PER_A == pytest.approx(15.0, abs=0.02)
-    assert tensed.seen.action_applied == pytest.approx((1.0, *_REST[1:]))
-    assert tensed.seen.stop_reason == ""
-
-
-def test_sensed_lengths_match_the_joint_angles() -> None:
-    """The sensors report lengths and tensions, and the same commands give the same motion."""
-    states: list[tuple[float, ...]] = []
-    for _ in range(2):
-        bench = _Bench(load_profile(find_profile("finger")))
-        states.append(bench.drive(_BENT, 50).state)
-        assert bench.world.truth()[f"{JOINTS[0]}/angle"] > JOINT_REST[0] + 0.2
-        stretch = np.array([bench.rig.tensions()[name] for name in TENDONS]) / 20e3
-        expected = bench.lengths_of_angles() - stretch
-        np.testing.assert_allclose(bench.lengths(), expected, atol=2e-4)
-        assert bench.state("FDP/tension") == pytest.approx(1.0 + 0.65 * 14.0, abs=0.1)
-        assert bench.seen.sources["FDP/length"] == "tendons"
-        bench.robot.close()
-    assert states[0] == states[1]
-
-
-def test_a_snapped_tendon_releases_all_tendons(tensed: _Bench) -> None:
-    """Tendons go to the pretension in 0.3 s, then to zero; later commands have no effect."""
-    tensed.drive(_BENT, 25)
-    assert tensed.rig.tensions()["FDP"] > 5.0
-    tensed.rig.break_servo("FDS", "snapped")
-    for _ in range(40):
-        if tensed.drive(_ALL, 1).stop_reason:
-            break
-    assert re.search("FDS .*lost its tendon", tensed.seen.stop_reason), tensed.seen.stop_reason
-    tensed.drive(_BENT, 16)
-    others = [s for s in tensed.rig.servos.values() if s is not tensed.rig.servo("FDS")]
-    assert max(abs(servo.pulls_a) for servo in others) * _N_PER_A < 1.05
-    tensed.drive(_BENT, 20)
-    assert [servo.pulls_a for servo in others] == [0.0] * 6
-    assert max(tensed.rig.tensions().values()) < 2.0
-    assert tensed.seen.stop_reason != ""
-
-
 def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
     """Tendons go to the pretension, then to zero, and stay released until a person arms."""
     tensed.drive(_BENT, 25)
@@ -315,23 +248,6 @@ def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
     tensed.robot.arm()
     tensed.drive(_BENT, 20)
     assert tensed.seen.stop_reason == ""
-
-
-def test_placing_the_finger_keeps_the_tendons_taut(tensed: _Bench) -> None:
-    """Placing the finger sets the tendon lengths to its pose without loading them."""
-    tensed.world.place(7)
-    assert max(tensed.rig.tensions().values()) == 0.0
-    tensed.drive(_REST, 2)
-    assert max(tensed.rig.tensions().values()) < 5.0
-    np.testing.assert_allclose(tensed.lengths(), tensed.lengths_of_angles(), atol=5e-4)
-
-
-def test_unknown_tendons_and_faults_are_refused(tensed: _Bench) -> None:
-    """The error suggests the names of the profile."""
-    with pytest.raises(UnknownName, match=r"'FDPP'. Did you mean 'FDP'"):
-        tensed.rig.break_servo("FDPP", "mute")
-    with pytest.raises(UnknownName, match="fault of a servo"):
-        tensed.rig.break_servo("FDP", "hott")
 
 
 @pytest.mark.realtime

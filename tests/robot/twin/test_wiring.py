@@ -1,7 +1,5 @@
 """Inverse of each driver: from pin levels back to output values."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -5,8 +5,6 @@ armed and at rest, while each attack runs, so that any command that came through
 After the attack the twin's ledger must show no movement, and the robot must serve an honest client.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """The scene of an attack: a served twin, armed and at rest, and what judges a movement."""
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import dataclass, field
 

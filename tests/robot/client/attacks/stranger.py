@@ -3,8 +3,6 @@
 It shares no code with Shapechanger, so that it can also send what a right client never would.
 """
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import hashlib

@@ -1,7 +1,5 @@
 """Attackers that hold all connections, and thieves of the key: what they can do and cannot."""
 
-from __future__ import annotations
-
 import base64
 import itertools
 import os

@@ -1,7 +1,5 @@
 """Attacks that a served robot refuses without a movement, each by its name."""
 
-from __future__ import annotations
-
 import math
 import os
 import ssl

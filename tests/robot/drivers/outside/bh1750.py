@@ -1,7 +1,5 @@
 """Light sensor BH1750 over I2C, as another package would add it."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta

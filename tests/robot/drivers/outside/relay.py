@@ -1,7 +1,5 @@
 """Relay on a pin, as another package would add it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from shapechanger.contract.plan import OutputPlan

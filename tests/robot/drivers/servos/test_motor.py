@@ -6,7 +6,6 @@ import pytest
 
 from shapechanger.robot.drivers.servos.settings import MODELS
 from shapechanger.robot.drivers.servos.simulation import (
-    CABLE_N_PER_M,
     SimulatedMotor,
     pull_spring,
 )
@@ -55,34 +54,3 @@ def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) ->
     friction = MODELS[name].friction_nm / 0.005
     assert motor.tension == pytest.approx(pull, abs=1.01 * friction)
     assert motor.speed == 0.0
-
-
-def test_friction_and_a_slack_tendon_hold_nothing_taut() -> None:
-    """Friction holds a torque below it, and a tendon carries no compression."""
-    model = MODELS["XL330-M288"]
-    motor = _motor(model.name)
-    angle = motor.angle
-    _run(motor, 0.9 * model.friction_nm / model.torque_constant, 5.0, 0.5)
-    assert (motor.angle, motor.tension) == (angle, 0.0)
-    _run(motor, -0.3, 5.0, 0.3)
-    assert motor.angle < angle - 1.0
-    assert motor.tension == 0.0
-
-
-def test_a_pull_ends_at_the_stop_of_its_load() -> None:
-    motor = _motor()
-    start = motor.angle
-    assert _run(motor, 0.5, 5.0, 2.0, springs=True) == 0.02
-    stretch = motor.tension / CABLE_N_PER_M
-    assert (motor.angle - start) * 0.005 == pytest.approx(0.02 + stretch, abs=1e-6)
-
-
-def test_the_temperature_rises_with_the_square_of_the_current() -> None:
-    """The temperature rise is proportional to i^2 and follows the thermal time constant."""
-    rises: list[float] = []
-    for share in (0.25, 0.5):
-        motor = _motor()
-        motor.advance(share * 1.47, 5.0, 0.0, 120.0)
-        rises.append(motor.temperature - 25.0)
-    assert rises[1] == pytest.approx(4 * rises[0], rel=1e-9)
-    assert rises[1] == pytest.approx(30 * 3.401 * 0.735**2 * (1 - math.exp(-1)), rel=1e-3)

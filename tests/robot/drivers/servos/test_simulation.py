@@ -44,29 +44,6 @@ def test_a_read_is_answered_by_the_addressed_servos(bus: Rig) -> None:
     assert bus.read([1, 2, 3], 64, 1) == {1: ServoReply(0, b"\0")}
 
 
-@pytest.mark.parametrize(
-    ("at", "value", "size", "error"),
-    [
-        (64, 2, 1, 4),  # Out of range.
-        (11, 2, 1, 4),  # No such mode.
-        (38, 1751, 2, 4),
-        (98, 128, 1, 4),
-        (102, 1, 1, 5),  # Half a register.
-        (126, 1, 2, 7),  # Read only.
-        (99, 1, 1, 7),  # Unused address.
-    ],
-)
-def test_an_invalid_write_is_refused(bus: Rig, at: int, value: int, size: int, error: int) -> None:
-    """An invalid write returns the error code of the manual and changes no register."""
-    assert bus.write({1: value.to_bytes(size, "little")}, at)[1].error == error
-    assert _read(bus, "torque_enable") == (0, 0)
-
-
-def test_eeprom_is_locked_while_torque_is_on(bus: Rig) -> None:
-    steps = (("torque_enable", 1), ("return_delay", 0), ("torque_enable", 0), ("return_delay", 0))
-    assert [_write(bus, *step) for step in steps] == [[0], [7], [0], [0]]
-
-
 def test_goals_have_a_limit_which_a_change_of_the_mode_sets(bus: Rig) -> None:
     assert _write(bus, "most", 100) == _write(bus, "mode", 0) == [0]
     assert _read(bus, "goal") == (0, 100)

@@ -1,7 +1,5 @@
 """Packets of a simulated bus, packed and unpacked as on the wire."""
 
-from __future__ import annotations
-
 from dynamixel_sdk import PacketHandler
 
 from shapechanger.robot.drivers.servos.settings import FAMILIES, ServoFamily

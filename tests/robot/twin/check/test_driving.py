@@ -1,7 +1,5 @@
 """Checks that drive a robot, on a twin."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The bad network between driver and robot adds exactly the faults that were set."""
 
-from __future__ import annotations
-
 import contextlib
 import random
 import socket
@@ -93,14 +91,3 @@ def test_half_close(line: Line) -> None:
     for _ in range(5):
         line.near.sendall(b"lost")
         assert carried(line.far, line.near, b"after") == b"after"
-
-
-def test_a_connection_without_a_listener_closes() -> None:
-    """A connection closes at once when nothing listens behind the network."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    with (
-        contextlib.closing(BadNetwork(port)) as network,
-        socket.create_connection(("127.0.0.1", network.port), PATIENCE_S) as near,
-    ):
-        assert near.recv(1) == b""

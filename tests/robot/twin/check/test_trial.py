@@ -1,7 +1,5 @@
 """Trials of faults, their findings, and the levels of a check."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from contextlib import nullcontext
