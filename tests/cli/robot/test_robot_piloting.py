@@ -1,12 +1,13 @@
 """A policy drives a twin, and a person takes over from the terminal."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from shapechanger.cli.robot.drive import recorded_to
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.client.known_robots import remember
 from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.twin.robot import run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
@@ -25,11 +26,10 @@ def test_a_person_lets_a_policy_drive_and_corrects_it(
     with run_robot(
         write_profile(tmp_path, PATIENT_CAR), arguments=("--world", "corridor")
     ) as robot:
-        known = robot.known
-        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        remember(replace(robot.known, name="car"))
         data = tmp_path / "data"
         command = ("robot", "drive", "car", "--policy", str(CLONES["car"]), "--record", str(data))
-        with Person(command, tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}) as person:
+        with Person(command, tmp_path) as person:
             read = person.read_until("not armed")
             # The policy does not start by itself.
             read = person.read_until("recording", read)

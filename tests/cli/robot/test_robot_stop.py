@@ -1,12 +1,13 @@
 """Serving a twin registers it, and any observer can stop it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from shapechanger.cli import main
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.client.known_robots import KnownRobot, recall, remember
+from shapechanger.robot.client.known_robots import recall, remember
 from shapechanger.robot.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
@@ -21,8 +22,7 @@ def test_a_second_person_stops_a_robot(
     """`robot stop` works while another client drives, and stays in force."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, BLIND_CAR), arguments=IN_A_ROOM) as robot:
-        known = robot.known
-        remember(KnownRobot("car", known.address, known.key, known.fingerprint))
+        remember(replace(robot.known, name="car"))
         with driving(robot, "real") as car:
             car.drive_until(lambda seen: seen.action_applied[1] > 0.0, 0.0, 0.5)
             main(["robot", "stop", "car", "--reason", "a dog"])
@@ -43,13 +43,12 @@ def test_a_name_is_that_of_a_robot_that_can_be_reached(
     profile = write_profile(tmp_path, BLIND_CAR)
     serve = ("robot", "serve", str(profile.path), "--twin", "--no-announce", "--port", "0")
     serve += (*IN_A_ROOM, "--twin-folder", str(tmp_path))
-    variables = {"XDG_CONFIG_HOME": str(tmp_path)}
-    with Person(serve, tmp_path, variables) as person:
+    with Person(serve, tmp_path) as person:
         person.read_until("Known here as blind-car: `shapechanger robot drive blind-car`")
         known = recall("blind-car")
         with RobotClient.connect(known, frames=False) as client:
             assert client.welcome.robot == "blind-car"
-        with Person(serve, tmp_path, variables) as second:
+        with Person(serve, tmp_path) as second:
             assert second.end() != 0, second.text
         assert recall("blind-car") == known
         person.process.terminate()

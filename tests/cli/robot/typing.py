@@ -25,7 +25,7 @@ class Person:
     """
 
     def __init__(
-        self, arguments: tuple[str, ...], folder: Path, variables: Mapping[str, str]
+        self, arguments: tuple[str, ...], folder: Path, variables: Mapping[str, str] | None = None
     ) -> None:
         self._main, terminal = pty.openpty()
         self.process = subprocess.Popen(
@@ -34,7 +34,7 @@ class Person:
             stdout=terminal,
             stderr=terminal,
             cwd=folder,
-            env={**os.environ, "TERM": "xterm", "COLUMNS": "300", **variables},
+            env={**os.environ, "TERM": "xterm", "COLUMNS": "300", **(variables or {})},
             start_new_session=True,
         )
         os.close(terminal)
