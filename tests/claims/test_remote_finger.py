@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.errors import BadAction, FingerError, PathError, UnknownName
+from shapechanger.errors import FingerError, PathError
 from shapechanger.finger.gap import GAPS, resolve_gap
 from shapechanger.finger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
@@ -122,29 +122,6 @@ def test_a_start_is_that_of_the_simulation(env: Env) -> None:
         begins, _ = simulated.reset(seed=0)
     np.testing.assert_allclose(observation[:4], begins[:4], atol=0.05)
     np.testing.assert_allclose(info["true_angles"], begins[:4], atol=0.05)
-
-
-def test_goal_observations(rig: RunningRobot) -> None:
-    """`goal=True` gives goal observations and `compute_reward`."""
-    env = _env(rig, goal=True)
-    observation, info = env.reset(seed=0)
-    assert env.observation_space.contains(observation)
-    unwrapped: Any = env.unwrapped
-    reward = unwrapped.compute_reward(
-        observation["achieved_goal"], observation["desired_goal"], info
-    )
-    assert reward in (0.0, -1.0)
-    env.close()
-
-
-def test_invalid_actions_are_refused(env: Env) -> None:
-    """No command is sent."""
-    env.reset(seed=0)
-    unwrapped: Any = env.unwrapped
-    with pytest.raises(BadAction):
-        unwrapped.step(np.full(7, np.nan, np.float32))
-    with pytest.raises(UnknownName, match="option of reset"):
-        env.reset(options={"postur": 1})
 
 
 def test_an_own_twin_defines_the_reward() -> None:

@@ -1,18 +1,14 @@
 """The robot stops in time after each fault, judged by the ledger of a twin."""
 
 import contextlib
-import math
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from shapechanger.robot.twin.check.faults import FAULTS
 from shapechanger.robot.twin.check.trial import Bench, run_trials
-from shapechanger.robot.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
@@ -103,31 +99,3 @@ def test_the_robot_stops(bench: Bench, witness: Witness, name: str) -> None:
         late_ms = [(i.end_ns - i.start_ns) / 1e6 for i in result.unauthorised]
         assert sum(late_ms) <= margin_ms, result
     assert drove == TRIALS
-
-
-def frozen(ledger: list[Transition], pins: tuple[int, ...]) -> dict[int, float]:
-    """Return the final levels of pins whose process died."""
-    gone = [line.pid for line in ledger if line.kind == "gone"]
-    return {
-        line.pin: line.duty
-        for line in ledger
-        if line.kind == "pin"
-        and line.pin in pins
-        and line.duty is not None
-        and not line.hz
-        and line.pid in gone
-    }
-
-
-def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
-    """The documented weakness: without processes and hardware protection, power stays on."""
-    # Keep the robot after the trial, to inspect it.
-    fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
-    with contextlib.closing(Bench(write_profile(tmp_path), one_shot=False)) as bench:
-        *_, result = run_trials(bench, fault, 1)
-        levels = frozen(read_ledger(bench.board.ledger_path), (22, 27))
-    assert result.drove
-    assert levels[22] in {0.0, 1.0}
-    assert levels[27] == 0.0
-    # Software PWM freezes at its present level: high is full power without end.
-    assert math.isinf(result.stopped_ms) == (levels[22] == 1.0)

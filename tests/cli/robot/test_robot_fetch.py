@@ -3,7 +3,7 @@
 import json
 import random
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -151,22 +151,6 @@ def test_edits_of_both_sides_survive(
     assert files(local) == before
 
 
-def test_marks_and_edits_stay_with_nothing_new(
-    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Lines of the robot that are the beginning of those here are nothing new."""
-    episode, data = record(there, 6), tmp_path / "here"
-    fetch = ["robot", "fetch", "car", "--out", str(data)]
-    main(fetch)
-    main(["demos", "bad", str(data / episode.name), "--from", "1", "--to", "2"])
-    main(["demos", "mark", str(data / episode.name), "3", "kerb"])
-    before = files(data)
-    capsys.readouterr()
-    main(fetch)
-    assert "nothing new, and 2 edits made here stay" in capsys.readouterr().out
-    assert files(data) == before
-
-
 def test_a_repair_here_stays(there: Path, robot: RobotClient, tmp_path: Path) -> None:
     """The robot's episode was cut off, and that here is closed already."""
     header = json.loads((path := record(there, 6) / "episode.json").read_text())
@@ -218,24 +202,3 @@ def test_damaged_episodes_are_not_fetched(
         fetch_episode(robot, episode.name, tmp_path / "here")
     with pytest.raises(DemosError, match="no episode"):
         episodes_of(tmp_path / "here")
-
-
-def test_mistakes_give_one_sentence(
-    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Unknown episodes, no recordings, and a file instead of the folder."""
-    out = ["--out", str(tmp_path / "here")]
-    main(["robot", "fetch", "car", *out])
-    assert "has recorded nothing yet" in capsys.readouterr().out
-    episode = record(there, 1)
-    _fails(["robot", "fetch", "car", *out, "--episodes", f"{episode.name[:-1]}2"])
-    assert f"Did you mean {episode.name!r}?" in capsys.readouterr().err
-    (tmp_path / "here").write_text("in the way")
-    _fails(["robot", "fetch", "car", *out])
-    assert "Cannot write" in capsys.readouterr().err
-
-
-def _fails(arguments: list[str], run: Callable[[list[str]], None] = main) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run(arguments)
-    assert ended.value.code not in (0, None)

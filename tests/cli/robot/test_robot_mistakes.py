@@ -2,13 +2,9 @@
 
 import errno
 import io
-import json
 import os
 import shutil
-import signal
 import socket
-import subprocess
-import sys
 import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
@@ -20,7 +16,8 @@ from shapechanger.cli import main
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.discovery import FoundRobot
 from shapechanger.robot.link.address import Address
-from tests.robot.twin.robots import until
+from shapechanger.robot.profile.load import load_profile
+from shapechanger.robot.twin.start import start_board
 from tests.robots import CAR, IN_A_ROOM, changed, write_profile
 
 pytestmark = pytest.mark.realtime
@@ -194,34 +191,13 @@ def test_a_port_in_use(run: Run, home: Path) -> None:
 
 
 def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
-    path = write_ready_profile(home)
-    folder = home / "work" / "twin"
+    path, folder = write_ready_profile(home), home / "work" / "twin"
     folder.mkdir()
-    ready = home / "ready.json"
-    command = [sys.executable, "-c", "from shapechanger.cli import main; main()", "robot", "serve"]
-    command += [
-        path,
-        "--twin",
-        "--port",
-        "0",
-        "--no-announce",
-        *IN_A_ROOM,
-        "--twin-folder",
-        str(folder),
-    ]
-    with (home / "log.txt").open("wb") as log:
-        served = subprocess.Popen(
-            [*command, "--ready-file", str(ready)], stdin=subprocess.DEVNULL, stdout=log, stderr=log
-        )
-    try:
-        until(lambda: ready.exists() or served.poll() is not None, 30.0)
-        assert json.loads(ready.read_text())["port"] > 0
-        code, _, output = run(*command[4:], "--clock", "twin")
-        assert code == 2
-        assert "runs on --clock real" in output
-    finally:
-        served.send_signal(signal.SIGTERM)
-        assert served.wait(20.0) == 0
+    with start_board(load_profile(path).guard_plan(), "real", folder):
+        options = ("--twin", "--port", "0", "--no-announce", "--twin-folder", str(folder))
+        code, _, output = run("serve", path, *options, *IN_A_ROOM, "--clock", "twin")
+    assert code == 2
+    assert "runs on --clock real" in output
 
 
 def test_init_never_overwrites(run: Run, home: Path) -> None:

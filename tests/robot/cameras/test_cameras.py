@@ -22,7 +22,6 @@ from shapechanger.robot.cameras import v4l2 as api
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.v4l2 import V4l2
 from tests.robot.cameras.barcode import read_barcode
-from tests.robot.guard.waiting import until
 
 pytestmark = pytest.mark.realtime
 
@@ -144,22 +143,6 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
     assert camera.read().jpeg == _jpeg(30)  # The writer closed, but this frame is new.
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
-
-
-def test_frames_queued_by_a_program_are_skipped(tmp_path: Path) -> None:
-    """A command such as rpicam-vid is started, and ends when the camera is closed."""
-    (tmp_path / "stream").write_bytes(_jpeg(10) * 90 + _jpeg(90))
-    (tmp_path / "send.py").write_text(
-        "import pathlib, sys, time\n"
-        f"sys.stdout.buffer.write(pathlib.Path('{tmp_path}/stream').read_bytes())\n"
-        f"sys.stdout.flush(); pathlib.Path('{tmp_path}/sent').touch(); time.sleep(60)\n"
-    )
-    camera = open_camera(_plan("pipe", path=f"| {sys.executable} {tmp_path}/send.py"))
-    until((tmp_path / "sent").exists)
-    assert camera.read().jpeg == _jpeg(90)
-    assert _ends_when_closed(camera, camera.read) == "The camera is closed."
-    with pytest.raises(RobotError, match="cannot be opened"):
-        open_camera(_plan("pipe", path="| no-such-program"))
 
 
 def test_closing_ends_a_read_that_waits_for_a_writer(fifo: Path) -> None:

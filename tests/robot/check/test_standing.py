@@ -18,7 +18,6 @@ from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.check import standing
 from shapechanger.robot.check.report import Finding
 from shapechanger.robot.check.standing import StandingRobot, examine
-from shapechanger.robot.drivers.as5600 import Magnet
 from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.profile.profile import Profile
@@ -280,18 +279,6 @@ def test_the_battery_is_measured(car: Profile) -> None:
     assert found == ("bad", "pack measures 0.00 V: connect its V- to the load.")
 
 
-def test_servo_boards() -> None:
-    """A board is asked for a register that has no effect."""
-    cat = shipped("cat")
-    board = _board(cat)
-    found = _wired(cat, board.hardware)
-    assert found["servo board"] == [("good", "The PCA9685 at 0x40 on I2C bus 1 answers.")]
-    assert found["resistors"] == [("good", "GPIO25, OE of the servo board, is pulled up.")]
-    board.pins.dead_chips.add((1, 0x40))
-    ((level, sentence),) = _wired(cat, board.hardware)["servo board"]
-    assert (level, "i2cdetect -y 1" in sentence) == ("bad", True)
-
-
 def test_the_servos_of_a_rig_answer() -> None:
     """Servos are read without torque, and a missing one is named."""
     rig = shipped("finger")
@@ -300,28 +287,6 @@ def test_the_servos_of_a_rig_answer() -> None:
     board.pins.require_rig().break_servo("EIP", "mute")
     ((level, sentence),) = _wired(rig, board.hardware)["servo bus"]
     assert (level, "EIP" in sentence) == ("bad", True)
-
-
-def test_each_magnet_is_checked() -> None:
-    """A missing magnet is reported for its joint, a dead multiplexer for each joint behind it."""
-    rig = shipped("finger")
-    board = _board(rig)
-    states: dict[str, Magnet] = {
-        "MCP_flexion": "gone",
-        "PIP_flexion": "weak",
-        "DIP_flexion": "strong",
-    }
-    for joint, state in states.items():
-        board.pins.encoder(joint).set_magnet(state)
-    assert _wired(rig, board.hardware)["encoders"] == [
-        ("bad", "The encoder of MCP_flexion detects no magnet: fit one above the chip."),
-        ("good", "The encoder of MCP_abduction detects its magnet."),
-        ("bad", "The magnet of PIP_flexion is too far from its encoder."),
-        ("bad", "The magnet of DIP_flexion is too near to its encoder."),
-    ]
-    board.pins.dead_chips.add((1, 0x70))
-    found = _wired(rig, board.hardware)["encoders"]
-    assert ["The multiplexer of sensor 'joints' at 0x70" in one for _, one in found] == [True] * 4
 
 
 @pytest.mark.parametrize(

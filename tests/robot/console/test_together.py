@@ -4,8 +4,7 @@ import contextlib
 import os
 import signal
 import socket
-import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,8 +12,7 @@ from playwright.sync_api import Browser
 
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.robot.client.client import RobotClient
+from shapechanger.errors import LinkError
 from shapechanger.robot.profile import load
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.demos.cloning.data import clone_card
@@ -31,42 +29,6 @@ _SLACK_MS = 60.0
 _SHIPPED = Path(load.__file__).parent / "shipped"
 
 
-@contextlib.contextmanager
-def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
-    """Run a program that commands whenever it has control; the event is set while it drives."""
-    drives, ended = threading.Event(), threading.Event()
-
-    def run() -> None:
-        with car.client(name="Expert", frames=False) as client:
-            until(lambda: _takes(client), 60.0)
-            seen = client.ask().message
-            with contextlib.suppress(LinkError):
-                client.arm()
-            while not ended.is_set():
-                if seen.mine:
-                    client.command((0.0, throttle), answers=seen.seq)
-                else:
-                    client.acknowledge()
-                seen = client.observation(seen.seq).message
-                (drives.set if seen.mine and seen.armed else drives.clear)()
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        yield drives
-    finally:
-        ended.set()
-        thread.join()
-
-
-def _takes(client: RobotClient) -> bool:
-    """Try to take control, and return whether it was granted."""
-    with contextlib.suppress(RobotRefused):
-        client.take()
-        return True
-    return False
-
-
 def test_a_second_person_cannot_take_control(car: RunningRobot, visit: Visit) -> None:
     """The second person sees who has control, and can stop the robot."""
     first, second, pins = visit(car), visit(car), Pins(car)
@@ -81,28 +43,6 @@ def test_a_second_person_cannot_take_control(car: RunningRobot, visit: Visit) ->
     pins.await_rest()
     first.await_state(robot="emergency", driver="me")
     first.page.keyboard.up("w")
-
-
-def test_a_person_takes_over_from_a_program_by_driving(car: RunningRobot, visit: Visit) -> None:
-    """Control changes without rearming, and the page shows the program's suggestion."""
-    console, pins = visit(car), Pins(car)
-    console.arm()
-    console.page.keyboard.press("x")
-    console.await_state(robot="disarmed")
-    console.page.click("#leave")
-    with _program(car, throttle=0.3) as drives:
-        console.page.click("#enter")
-        console.await_state(link="open", driver="program")
-        if not drives.is_set():
-            console.page.keyboard.press("p")
-        pins.await_motion(1.0)
-        console.await_words("#actions", "+0.30")
-        console.page.locator("#legend-wanted").wait_for()
-        console.drive("s", pins, -1.0)
-        console.await_state(driver="me", robot="armed")
-        console.page.keyboard.up("s")
-        pins.await_rest()
-        console.stop()
 
 
 def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
@@ -254,7 +194,7 @@ def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
 
 
 def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_path: Path) -> None:
-    """The page shows which one runs and what it does; it drives once a person arms the robot."""
+    """It drives once a person arms the robot, until one presses a key."""
     car = write_profile(tmp_path, PATIENT_CAR)
     net = {"eyes": "none", "nerves": (1,), "low": (0.3, 0.3), "high": (0.3, 0.3)}
     card = clone_card(car.action_layout(), car.state_layout(), **net)
@@ -277,9 +217,13 @@ def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_pa
         page.click("#arm")
         pins.await_motion(1.0)
         console.await_words("#policy-state", "student: it drives")
-        page.click("#policy-run")
-        console.await_state(driver="nobody", robot="disarmed")
+        # A driving key takes over without rearming, and the page shows what the policy wants.
+        console.drive("s", pins, -1.0)
+        console.await_state(driver="me", robot="armed")
+        page.locator("#legend-wanted").wait_for()
+        page.keyboard.up("s")
         pins.await_rest()
+        page.click("#policy-run")
         console.await_words("#policy-state", "None runs.")
         (folder / "student.onnx").write_bytes(b"changed")
         page.click("#policy-run")

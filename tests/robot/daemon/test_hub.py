@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,7 +10,7 @@ from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.guard.channel import GuardState, Order
-from shapechanger.robot.link.messages import Command, Lease, Observation
+from shapechanger.robot.link.messages import Command, Observation
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
@@ -41,35 +40,6 @@ def seen_at_50_ns(
         hub.on_frame(Frame(b"jpeg", 30))
     hub.on_state(guard_state(at_ns=40) if state is None else state)
     return observed(hub, frame_sent)
-
-
-@pytest.mark.parametrize("holder", [ANN, SAC], ids=lambda client: client.name)
-@pytest.mark.parametrize("other", [BOB, PPO], ids=lambda client: client.name)
-def test_only_a_person_takes_control_and_only_from_a_program(holder: Client, other: Client) -> None:
-    hub, _ = new_hub()
-    hub.take(holder)
-    hub.take(other)
-    if (holder, other) == (SAC, BOB):
-        assert (hub.holder, hub.lease) == (BOB, 2)
-    else:
-        assert (hub.holder, hub.lease) == (holder, 1)
-        answer = list(iter(other.take, None))[-1]
-        assert isinstance(answer, Lease)
-        assert answer.reason.startswith(f"{holder.name} has control; a {other.role} cannot")
-
-
-@given(moves=st.lists(st.tuples(st.booleans(), st.sampled_from((ANN, BOB, SAC, PPO))), max_size=50))
-def test_each_lease_has_one_holder_and_a_larger_number(moves: list[tuple[bool, Client]]) -> None:
-    hub, _ = new_hub()
-    of_number: dict[int, Client] = {}
-    for takes, client in moves:
-        before, held = hub.lease, hub.holder
-        hub.take(client) if takes else hub.release(client, "it went")
-        if held is client:
-            assert (hub.lease, hub.holder) == (before, client if takes else None)
-        assert hub.lease >= before
-        if hub.holder is not None:
-            assert of_number.setdefault(hub.lease, hub.holder) is hub.holder
 
 
 def test_an_absent_quantity_is_nan() -> None:
@@ -138,16 +108,3 @@ def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: in
     clock.ns = 1
     hub.halt()
     assert observed(hub).commanded == ()
-
-
-def test_the_newest_suggestion_counts_until_it_expires() -> None:
-    hub, clock = new_hub(1, deadline_ms=250)
-    assert observed(hub).suggested == ()
-    hub.suggest(ANN, (0.1, 0.0))
-    clock.ns += 10 * MS
-    hub.suggest(SAC, (0.2, 0.0))
-    clock.ns += 250 * MS
-    seen = observed(hub)
-    assert (seen.suggested_by, seen.suggested) == ("sac", (0.2, 0.0))
-    clock.ns += 1
-    assert observed(hub).suggested == ()

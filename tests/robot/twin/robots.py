@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.running import ServePlan, plan_fd
-from shapechanger.robot.hardware import Clock
 from shapechanger.robot.twin.hardware import GrantedClock, SteadyClock, TwinHardware
 from shapechanger.robot.twin.rpc import BoardClient
 from shapechanger.robot.twin.start import BoardAt
@@ -92,14 +91,6 @@ def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.005)
-
-
-def run_until(clock: Clock, condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait on a guard's clock, in real time, until a condition holds."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        clock.wait([], clock.now_ns() + 5_000_000, 0.01)
 
 
 def steady(hardware: TwinHardware) -> SteadyClock:

@@ -1,16 +1,13 @@
 """Inverse of each driver: from pin levels back to output values."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from shapechanger.contract.plan import GuardPlan, OutputPlan
-from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.drivers.simulation import Levels, Pulse
 from shapechanger.robot.twin.room import DrivingWorld
-from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
 from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
@@ -86,12 +83,3 @@ def test_the_one_shot_powers_motors_only() -> None:
     assert wiring.read(levels, 149_000_000)["drive"].value == 1.0
     assert wiring.read(levels, 150_000_000)["drive"].value == 0.0
     assert wiring.read(levels, 150_000_000)["turn"].value == 1.0
-
-
-def test_an_unsupported_plan_is_refused(tmp_path: Path) -> None:
-    """Unsupported drivers and over-long socket paths raise before anything starts."""
-    kernel = servo("turn", "steering", {"steering": 1.0}, over="sysfs", chip=0, channel=0)
-    with pytest.raises(RobotError, match="no servos over 'sysfs'"):
-        start_board(replace(CAR, outputs=(kernel,)), "twin", tmp_path)
-    with pytest.raises(RobotError, match="too long for a socket"):
-        start_board(CAR, "twin", tmp_path / ("long" * 40))

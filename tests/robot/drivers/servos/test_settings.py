@@ -7,7 +7,6 @@ from typing import Any, get_args
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import KeyMistake
@@ -147,26 +146,6 @@ def test_a_length_is_clipped_to_its_range(length: float, direction: int) -> None
     kept = min(max(length, -0.02), 0.01)
     turns = -kept / (2 * math.pi * 0.005)
     assert one.goal_position == pytest.approx(direction * turns * 4096, abs=0.6)
-
-
-def test_known_spools() -> None:
-    """An XL330-M288 with 5 mm pulls 0.52 N·m / 1.47 A / 5 mm / 1000 a count, 0.071 N.
-
-    A thousandth of an STS3215's 1.91 N·m is 0.382 N. docs/finger-rig.md has its numbers on 10 mm.
-    """
-    one = servo("FDP", model="XL330-M288")
-    assert one.newton_per_goal == pytest.approx(0.0708, abs=1e-4)
-    assert _one(one).goal_of(10.0) == 141
-    assert _one(replace(one, direction=-1)).goal_of(10.0) == -141
-    one = feetech("FDP")
-    assert one.newton_per_goal == pytest.approx(0.382, abs=1e-4)
-    assert (_one(one).goal_of(10.0), one.most_counts) == (26, 157)
-    assert _one(replace(one, direction=-1)).goal_of(10.0) == 26  # A limit has no sign.
-    one, radius = feetech("FDP", spool_radius_m=0.010), 0.010
-    assert one.newton_per_goal == pytest.approx(0.19, abs=5e-3)
-    assert one.known.friction_nm / radius == pytest.approx(5.0, abs=0.5)
-    assert one.known.inertia / radius**2 == pytest.approx(260.0, abs=5.0)
-    assert math.pi * radius == pytest.approx(0.031, abs=5e-4)
 
 
 _DYNAMIXEL = bytes.fromhex("ffff fdffffff 00f0ffff 00000000 00000000 3200 1f".replace(" ", ""))

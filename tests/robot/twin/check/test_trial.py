@@ -13,15 +13,12 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.pins import lamps_of
-from shapechanger.robot.check.report import Finding
-from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.twin.check import trial as module
 from shapechanger.robot.twin.check.faults import FAULTS, Fault
 from shapechanger.robot.twin.check.trial import (
     Bench,
     TrialResult,
     Watcher,
-    check_robot,
     fault_finding,
     run_trials,
 )
@@ -98,22 +95,6 @@ def test_faults_need_parts_of_a_robot() -> None:
     assert Bench(shipped("finger")).lacks("throttle") == "This robot has no throttle."
     # Only a board makes the other faults.
     assert {fault.needs for fault in FAULTS.values() if fault.on_pins} == {"", "one-shot"}
-
-
-def test_a_part_is_named_before_its_questions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The heading comes before anything is asked or opened, and each part ends at rest."""
-    bench: Any = Bench(shipped("car"))
-    lit = Finding("LED GPIO22", "good", "lit.")
-    lamps = MagicMock(return_value=[lit])
-    monkeypatch.setattr(module, "check_lamps", lamps)
-    monkeypatch.setattr(module, "examine", lambda _: iter(()))
-    bench.watcher, bench.close = Watcher, MagicMock(side_effect=[["GPIO22 burns."], []])
-    parts = check_robot("leds", bench, StandingRobot(bench.profile), cap=0.2)
-    assert next(parts)[0] == "wiring"
-    part, findings = next(parts)
-    assert (part, lamps.called) == ("LEDs", False)
-    assert list(findings) == [lit, Finding("safe pins", "bad", "GPIO22 burns.")]
-    assert bench.close.call_count == 2
 
 
 @pytest.fixture
