@@ -8,6 +8,5 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
 def test_every_command_is_answered_with_a_picture() -> None:
-    """A client that drives the echo gets as many round trips as it asks for."""
     with EchoRobot() as echo:
         assert len(echo.round_trips(20)) == 20

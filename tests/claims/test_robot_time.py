@@ -46,7 +46,6 @@ def wall_clock_reads(source: str) -> list[str]:
 
 
 def test_the_search_finds_each_spelling() -> None:
-    """Each spelling of a wall-clock read is found, and `monotonic` is not."""
     assert wall_clock_reads("import time\ntime.time()") == ["2: time.time"]
     assert wall_clock_reads("from time import time") == ["1: time"]
     assert wall_clock_reads("datetime.datetime.now()") == ["1: datetime.now"]

@@ -66,7 +66,6 @@ def test_without_a_display_nothing_is_opened(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_browser_failure_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error gives the address, and the option to use the terminal."""
     monkeypatch.setattr(webbrowser, "open", lambda *_: False)
     robot = KnownRobot("car", "127.0.0.1:5000", new_key(), "insecure")
     with pytest.raises(LinkError, match=r"open http://127\.0\.0\.1:5000/ in one, or .*--terminal"):

@@ -70,7 +70,6 @@ def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path)
 
 
 def test_unknown_worlds_and_lenses_are_refused() -> None:
-    """The error lists what exists, or explains the mismatch."""
     car = _shipped("lab-car")
     with pytest.raises(UnknownName, match=r"No world matches 'coridor'. Did you mean 'corridor'"):
         place_of(car, "coridor", ())

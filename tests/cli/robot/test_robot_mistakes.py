@@ -177,7 +177,6 @@ def test_the_key_is_asked_for(run: Run) -> None:
 
 
 def test_a_port_in_use(run: Run, home: Path) -> None:
-    """No process is started."""
     path = write_ready_profile(home)
     before = files(home / "work")
     with socket.create_server(("127.0.0.1", 0)) as other:
@@ -201,7 +200,6 @@ def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
 
 
 def test_init_never_overwrites(run: Run, home: Path) -> None:
-    """Profile and key are kept."""
     code, output, _ = run("init", "car", "--name", "rover")
     assert code == 0
     key = next(line.split()[1] for line in output.splitlines() if line.startswith("key  "))
@@ -255,7 +253,6 @@ def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forgetting removes all files."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     before = files(home / "work")
     assert run("remember", "one", "127.0.0.1:5000", "--fingerprint", "insecure")[0] == 0
@@ -267,7 +264,6 @@ def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPat
 @pytest.mark.skipif(any(Path("/dev").glob("gpiochip*")), reason="This machine has pins.")
 @pytest.mark.parametrize("command", ["serve", "safe-pins", "check --leds"])
 def test_a_machine_without_pins(run: Run, home: Path, command: str) -> None:
-    """The error names the twin, and nothing starts that would fail repeatedly."""
     name, *options = command.split()
     code, _, output = run(name, write_ready_profile(home), *options)
     assert code == 2
@@ -312,7 +308,6 @@ def test_a_refused_init_leaves_nothing(run: Run, home: Path) -> None:
 def test_a_broken_file_of_a_known_robot_is_skipped(
     run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Other robots are found."""
     found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
     monkeypatch.setattr("shapechanger.cli.robot.remote.find", lambda _: [found])
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)

@@ -111,7 +111,12 @@ def _at_the_terminal(
         operator.place(0)
         with Person(("robot", "drive", "car", "--cap", cap), folder) as person:
             yield robot, operator, person
-            person.press("q")
+
+            def leaves() -> bool:
+                person.press("q")  # Just after Escape it belongs to a sequence.
+                return person.process.poll() is not None
+
+            person.wait_for(leaves)
             assert person.end() == 0
 
 
@@ -136,7 +141,6 @@ def test_driving(tmp_path: Path) -> None:
 
 
 def test_actions_without_a_key_stay_at_rest(tmp_path: Path) -> None:
-    """A blade that is up at rest stays up, whatever the cap."""
     with (
         _at_the_terminal(tmp_path, "0.5", PLOUGH) as (robot, operator, person),
         robot.client(frames=False) as watcher,
@@ -256,7 +260,6 @@ def test_calibrating_a_motor_and_a_servo(tmp_path: Path) -> None:
 
 
 def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
-    """Values are limited to the cap until the person confirms."""
     steps = (
         ("fastest backward", "a" * 40),
         ("Go beyond it?", "\r"),

@@ -81,7 +81,6 @@ def test_a_folder_is_read_in_order_and_repeated(tmp_path: Path) -> None:
 
 
 def test_a_bad_file_is_named_and_skipped(tmp_path: Path) -> None:
-    """One broken image raises an error, and the next read continues."""
     (tmp_path / "a.jpg").write_bytes(b"broken")
     (tmp_path / "b.jpg").write_bytes(_jpeg(90))
     camera = open_camera(_plan("file", path=str(tmp_path)))
@@ -146,13 +145,11 @@ def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
 
 
 def test_closing_ends_a_read_that_waits_for_a_writer(fifo: Path) -> None:
-    """`close` unblocks a read on a pipe without a writer."""
     camera = open_camera(_plan("pipe", path=str(fifo)))
     assert _ends_when_closed(camera, camera.read) == "The camera is closed."
 
 
 def test_a_file_of_frames_is_read_in_order(tmp_path: Path) -> None:
-    """In a regular file, no frame is skipped."""
     file = tmp_path / "drive.mjpeg"
     file.write_bytes(b"".join(map(_jpeg, (10, 20, 30))))
     camera = open_camera(_plan("pipe", path=str(file)))
@@ -229,7 +226,6 @@ def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) 
 
 
 def test_a_webcam_without_the_frame_size_is_refused(tmp_path: Path) -> None:
-    """The error names the command that lists the sizes."""
     kernel = _Kernel(tmp_path / "video0", size=(640, 480))
     with pytest.raises(RobotError, match="list-formats-ext"):
         V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)

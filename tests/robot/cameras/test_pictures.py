@@ -47,7 +47,6 @@ def _with_comment(jpeg: bytes, comment: bytes) -> bytes:
 def test_barcode_survives_jpeg(
     number: int, size: tuple[int, int], quality: int, subsampling: str
 ) -> None:
-    """The barcode is read back after JPEG compression, even over noise."""
     image = _picture(*size)
     below = image[barcode_rows(size[0]) :].copy()
     draw_barcode(image, number)
@@ -71,7 +70,6 @@ def test_a_frame_of_the_wrong_size_is_refused() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"no picture", _jpeg()[:-2], b"\xff\xd8 and \xff\xd9"])
 def test_invalid_jpeg_is_refused(data: bytes) -> None:
-    """Includes data with the markers of a JPEG at its ends."""
     with pytest.raises(RobotError, match=r"(incomplete|invalid) JPEG"):
         checked_frame(data, 0, CameraPlan("file", size=(32, 24)))
 
@@ -92,7 +90,6 @@ def _turned(jpeg: bytes, quality: int) -> bytes:
 
 
 def test_rotating_twice_restores_the_image() -> None:
-    """Two rotations are the identity, up to JPEG loss."""
     image = np.zeros((24, 32, 3), np.uint8)
     image[:8, :8] = 255
     jpeg = simplejpeg.encode_jpeg(image, 95)
@@ -155,7 +152,6 @@ def test_a_stream_recovers_after_garbage(garbage: bytes) -> None:
 
 
 def test_a_stream_without_frames_is_refused() -> None:
-    """More than 1 MiB without a frame raises an error and frees its memory."""
     for nothing in (_jpeg()[:-2] + bytes(4 << 20), bytes(2 << 20), b"\xff\xd8\xff\xd9" * 270_000):
         splitter = JpegSplitter()
         splitter.feed(nothing)

@@ -66,7 +66,6 @@ def test_close_leaves_everything_low(driver: str, settings: dict[str, float], va
 
 @pytest.mark.parametrize(("value", "broken"), [(0.5, 27), (-0.5, 22)])
 def test_one_input_goes_low_also_when_the_other_one_fails(value: float, broken: int) -> None:
-    """A failure on one input does not keep the other from going low."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     motor.write(value, 0)

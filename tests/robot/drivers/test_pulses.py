@@ -125,7 +125,6 @@ def test_pulse_is_in_whole_steps() -> None:
 
 
 def test_channels_share_their_chip() -> None:
-    """Channels share one chip, which is closed with its last channel and can be reopened."""
     hardware = FakeHardware({0x40: _asleep()})
     servos = [hardware.output("servo", **_ON_CHIP, channel=c) for c in range(12)]
     assert sum(register == 0xFE for _, register, _ in hardware.bus.writes) == 1
@@ -203,7 +202,6 @@ _KERNEL = {"over": "sysfs", "channel": 1, "hz": 50}
 def test_kernel_pwm_is_written_in_nanoseconds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Period and duty cycle are written to files in nanoseconds."""
     monkeypatch.setattr(pulse, "_ROOT", tmp_path)
     folder = tmp_path / "pwmchip0" / "pwm1"
     folder.mkdir(parents=True)
@@ -219,6 +217,5 @@ def test_kernel_pwm_is_written_in_nanoseconds(
 
 
 def test_a_missing_kernel_pwm_is_named() -> None:
-    """Without the overlay in config.txt, opening raises an error."""
     with pytest.raises(RobotError, match=r"'it' does not answer: .*pwmchip77"):
         FakeHardware().output("servo", **_KERNEL, chip=77)

@@ -44,7 +44,6 @@ def test_quadrature_gives_speed_and_direction(speed: float, counts: int, backwar
 
 
 def test_one_channel_has_the_sign_of_the_propulsion() -> None:
-    """A single channel takes the sign of the propulsion, and keeps it while coasting."""
     hardware = FakeHardware()
     encoder = hardware.sensor("encoder", **_ENCODER)
     for i in range(6):
@@ -54,7 +53,6 @@ def test_one_channel_has_the_sign_of_the_propulsion() -> None:
 
 
 def test_wheel_without_edges_slows_to_zero() -> None:
-    """The speed falls while no edge comes, and is zero after half a second."""
     hardware = FakeHardware()
     encoder = hardware.sensor("encoder", **_QUADRATURE)
     assert encoder.read(0, 0.0) == {"speed": 0.0}
@@ -65,7 +63,6 @@ def test_wheel_without_edges_slows_to_zero() -> None:
 
 @pytest.mark.parametrize(("pull", "pressed"), [("up", 0), ("down", 1)])
 def test_a_press_is_reported_even_if_it_is_short(pull: str, pressed: int) -> None:
-    """A bumper pressed and released between two reads is reported once."""
     hardware = FakeHardware()
     bumper = hardware.sensor("switch", pins=[6, 13], pull=pull)
     assert bumper.read(0, 1.0) == {"bump": 0.0}

@@ -118,7 +118,6 @@ def test_a_rig_on_the_headers_serial_port(pi: FakePi, raspi_config: bool, level:
 
 
 def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:
-    """The other changes are made."""
     pi.refuses = "usermod"
     found = _install(pi, _blind("car"))
     sentence = "usermod: permission denied. By hand: sudo usermod -aG gpio pi"
@@ -155,7 +154,6 @@ def test_the_service_is_removed(pi: FakePi) -> None:
 
 
 def test_other_machines_are_refused(pi: FakePi) -> None:
-    """The error names what is needed."""
     pi.machine.require_pi()
     (pi.root / "proc/device-tree/model").unlink()
     with pytest.raises(RobotError, match=r"not a Raspberry Pi.*Raspberry Pi OS"):

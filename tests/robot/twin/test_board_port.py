@@ -84,7 +84,6 @@ def test_make_safe_sends_nothing_to_servos(board: RunningBoard, hardware: TwinHa
 
 
 def test_an_unknown_bus_device_is_refused(hardware: TwinHardware) -> None:
-    """A mistyped device path raises an error, as on a real rig."""
     outputs = tuple(
         replace(one, settings={**one.settings, "device": "/dev/ttyUSB7"}) for one in _PLAN.outputs
     )

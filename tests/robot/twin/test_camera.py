@@ -36,7 +36,6 @@ def _pictures(data: bytes) -> list[tuple[int, bytes]]:
 
 
 def test_frames_carry_their_capture_time(tmp_path: Path) -> None:
-    """Each frame holds its capture time in a JPEG comment and in its barcode, at 20 fps."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -88,7 +87,6 @@ def select_on(pipe: BinaryIO) -> select.epoll:
 
 @pytest.mark.parametrize("how", ["off", "freeze", "garbage", "short"])
 def test_a_camera_fault_stops_valid_frames(tmp_path: Path, how: CameraFault) -> None:
-    """During a fault no new valid frame arrives; afterwards frames arrive again."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,

@@ -48,7 +48,6 @@ def test_a_participant_is_granted_each_tick(tmp_path: Path) -> None:
 
 
 def test_a_participant_is_granted_its_exact_deadline(tmp_path: Path) -> None:
-    """A deadline between two ticks is granted to the nanosecond."""
     deadline = START_NS + 123_456_789
     with (
         start_board(CAR, "twin", tmp_path) as board,
@@ -103,7 +102,6 @@ def test_sleep_advances_the_clock(tmp_path: Path) -> None:
 
 
 def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
-    """In real time `advance` raises an error and waits end at their deadlines."""
     with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
         with pytest.raises(RobotError, match="real time"):
             operator.advance(1.0)
@@ -118,7 +116,6 @@ def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
 
 
 def test_using_a_closed_board_raises(tmp_path: Path) -> None:
-    """Waiting or sleeping after the board exits raises an error."""
     board = start_board(CAR, "twin", tmp_path)
     hardware = connect(board.socket_path)
     clock = granted(hardware)

@@ -37,7 +37,6 @@ def _board(world: World, sensor: SensorPlan) -> LocalBoard:
 
 
 def test_readings_match_the_joint_angles() -> None:
-    """Readings match the joint angles within half a count for any channel, zero and direction."""
     world = FingerWorld(NOMINAL, seed=2)
     driver = open_and_read(_sensor(), _board(world, _sensor()).hardware)
     for seed in range(5):
@@ -67,7 +66,6 @@ def test_the_multiplexer_passes_open_channels_only() -> None:
 
 @pytest.mark.parametrize("how", ["", "gone", "weak", "strong"])
 def test_the_status_reports_the_magnet(how: str) -> None:
-    """The status bits MD, ML and MH report a missing, weak or strong magnet."""
     board = _board(FingerWorld(NOMINAL, seed=0), _sensor())
     sensor = As5600(_sensor(), board.hardware)
     board.pins.encoder("PIP_flexion").set_magnet(how)

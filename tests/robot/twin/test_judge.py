@@ -21,7 +21,6 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 
 
 def test_driving_without_permission_is_found() -> None:
-    """Motion without permission is a violation, however short, forward or backward."""
     for pin, sign in ((22, 1), (27, -1)):
         ledger = [_pin(10, pin, 0.5), _pin(11, pin, 0.0)]
         assert unauthorised(ledger, _NO_ONE_SHOT, [(9 * _MS, 250 * _MS)]) == []
@@ -33,7 +32,6 @@ def test_driving_without_permission_is_found() -> None:
 
 
 def test_steering_is_allowed_without_a_command() -> None:
-    """Steering a standing car is not a violation."""
     assert unauthorised([_pin(10, 17, 1.0)], _NO_ONE_SHOT, []) == []
 
 
@@ -63,7 +61,6 @@ def test_the_one_shot_stops_a_frozen_pin() -> None:
 
 
 def test_without_toggling_the_motors_have_no_power() -> None:
-    """A guard that does not toggle the enable line cannot drive."""
     assert propelled([_pin(10, 22, 0.5)], TwinWiring(CAR, 100.0)) == []
 
 

@@ -14,7 +14,6 @@ from tests.robot.twin.robots import CAR
 
 
 def test_a_ledger_round_trips(tmp_path: Path) -> None:
-    """Transitions are read back unchanged, sorted by time."""
     path = tmp_path / "ledger.jsonl"
     with path.open("xb", buffering=0) as file:
         board = PinBoard(TwinWiring(CAR), DrivingWorld((), (8, 6), 0), file, 0, lambda: 9)
@@ -39,7 +38,6 @@ def test_a_truncated_last_line_is_skipped(tmp_path: Path, cut: int) -> None:
 
 
 def test_a_malformed_line_in_the_middle_is_refused(tmp_path: Path) -> None:
-    """A malformed line before the last raises an error that names it."""
     path = tmp_path / "ledger.jsonl"
     path.write_text('{"t": 1, "kind": "gone"}\n{"t": 2, "ki\n{"t": 3, "kind": "gone"}\n')
     with pytest.raises(RobotError, match=r"Line 2 of .*ledger\.jsonl is malformed"):

@@ -39,7 +39,6 @@ hardware.close()
 def test_pins_of_a_killed_process_keep_their_level(
     tmp_path: Path, value: str, possible: set[float]
 ) -> None:
-    """A pin keeps its level when its process dies; software PWM freezes at either level."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, value) as robot:
             robot.send_signal(signal.SIGKILL)
@@ -89,7 +88,6 @@ def test_pwm_is_rounded_down() -> None:
 
 
 def test_a_pin_has_one_owner(tmp_path: Path) -> None:
-    """A pin held by a live process is busy; it is free once the process has died."""
     with start_board(CAR, "twin", tmp_path) as board:
         second = connect(board.socket_path)
         with (
@@ -117,6 +115,5 @@ def test_opening_a_pin_releases_it_first(tmp_path: Path) -> None:
 
 
 def test_connecting_without_a_board_names_the_path(tmp_path: Path) -> None:
-    """Connecting to a missing socket raises an error."""
     with pytest.raises(RobotError, match="No twin's board answers"):
         connect(str(tmp_path / "nothing"))

@@ -36,7 +36,6 @@ def test_the_default_place_is_the_room() -> None:
 
 
 def test_the_room_does_not_import_mujoco() -> None:
-    """The room works without MuJoCo; other places name the extra to install."""
     script = (
         "import sys\n"
         "sys.modules['mujoco'] = None\n"
@@ -77,7 +76,6 @@ def test_an_invalid_place_is_refused() -> None:
 
 
 def test_an_opener_that_does_not_exist_is_refused() -> None:
-    """An unknown module or function of a product is named, with what exists."""
     with pytest.raises(UnknownName, match=r"'open_cours'. Did you mean 'open_course'"):
         open_world(Place("shapechanger.vehicles.twin:open_cours"), _PARTS, None, 1)
     with pytest.raises(RobotError, match=r"opened by cars.twin:open_course, and there is no cars"):
@@ -85,7 +83,6 @@ def test_an_opener_that_does_not_exist_is_refused() -> None:
 
 
 def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
-    """Laying out a course moves the vehicle, is recorded in the ledger and is reproducible."""
     with (
         start_board(CAR, "twin", tmp_path, seed=4, place=_CORRIDOR) as board,
         Operator(board.socket_path) as operator,
@@ -141,7 +138,6 @@ def test_an_operator_puts_it_back_on_a_course(tmp_path: Path) -> None:
 
 
 def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> None:
-    """An unknown fault is answered with an error, and the board continues."""
     with (
         start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board,
         Operator(board.socket_path) as operator,
@@ -154,7 +150,6 @@ def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> 
 def test_a_board_that_fails_to_start_prints_the_reason(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """The reason is on standard error before the board exits."""
     with pytest.raises(RobotError, match="did not start"):
         start_board(CAR, "twin", tmp_path, place=course_place("corridor", "tank"))
     assert "a tank is driven by" in capfd.readouterr().err

@@ -56,7 +56,6 @@ def _rig(sensor: SensorPlan) -> Iterator[_Rig]:
 @pytest.mark.parametrize("sensor", [ENCODER, _SINGLE])
 @pytest.mark.parametrize("throttle", [0.5, -0.5])
 def test_the_encoder_measures_the_speed(sensor: SensorPlan, throttle: float) -> None:
-    """The driver computes the signed speed of the world from the edges."""
     with _rig(sensor) as rig:
         rig.motor.value = throttle
         seen = rig.advance(0.6)
@@ -65,7 +64,6 @@ def test_the_encoder_measures_the_speed(sensor: SensorPlan, throttle: float) -> 
 
 
 def test_the_bumper_is_pressed() -> None:
-    """Operators and walls press the bumper."""
     with _rig(BUMPER) as rig:
         assert rig.advance(0.02)["bump"] == 0.0
         rig.operator.press_bumper()
@@ -93,7 +91,6 @@ def test_the_distance_is_measured() -> None:
 
 
 def test_the_imu_measures_acceleration() -> None:
-    """The IMU measures the acceleration of the car, and a dead chip raises an error."""
     with _rig(_IMU) as rig:
         assert rig.advance(0.05)["acceleration_x"] == pytest.approx(0.0, abs=0.01)
         rig.motor.value = 1.0
@@ -104,7 +101,6 @@ def test_the_imu_measures_acceleration() -> None:
 
 
 def test_the_battery_sags_and_runs_down() -> None:
-    """The voltage drops under load and follows an operator's setting."""
     with _rig(_BATTERY) as rig:
         idle = rig.advance(0.2)["battery"]
         rig.motor.value = 1.0

@@ -91,7 +91,6 @@ def tensed() -> Iterator[_Bench]:
 
 
 def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
-    """An armed rig enables no torque without a command."""
     assert bench.seen.armed
     assert not any(servo.has_torque for servo in bench.rig.servos.values())
 

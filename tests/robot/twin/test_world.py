@@ -96,7 +96,6 @@ def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
 
 @given(seed=_SEEDS, steps=st.lists(st.tuples(_VALUES, _VALUES), min_size=1, max_size=30))
 def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
-    """For any outputs, the vehicle stays in the room."""
     world = DrivingWorld({"left track", "right track"}, _SIZE, seed)
     for left, right in steps:
         world.advance(0.2, {"left track": left, "right track": right})
@@ -106,7 +105,6 @@ def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, flo
 
 @given(seed=_SEEDS)
 def test_a_start_has_room_ahead(seed: int) -> None:
-    """A start pose has free space ahead and is reproducible."""
     world = DrivingWorld({"wheels"}, (8, 6), seed)
     first = world.inputs()
     assert not first.bumped
@@ -118,6 +116,5 @@ def test_a_start_has_room_ahead(seed: int) -> None:
 
 
 def test_mixed_parts_are_refused() -> None:
-    """A car with a rudder is refused."""
     with pytest.raises(RobotError, match="No vehicle has all of these parts: rudder, wheels"):
         DrivingWorld({"wheels", "rudder"}, _SIZE, seed=1)

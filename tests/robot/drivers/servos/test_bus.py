@@ -130,7 +130,6 @@ def test_a_stop_pulls_no_slack_tendon(ramp_ms: int, pulled: bool) -> None:
 
 
 def test_close_leaves_no_torque() -> None:
-    """`close` disables torque and closes the port."""
     rig = Rig().start()
     rig.run(5.0, 5)
     rig.bus.close()

@@ -57,7 +57,6 @@ def test_content_and_order_are_kept(line: Line, slice_bytes: int, largest: int) 
 
 
 def test_latency(line: Line) -> None:
-    """Bytes are held until the latency has passed, and no longer."""
     line.network.latency_s = 0.2
     began_s = time.monotonic()
     assert carried(line.near, line.far, b"late") == b"late"
@@ -65,7 +64,6 @@ def test_latency(line: Line) -> None:
 
 
 def test_silence_holds_data_and_keeps_the_connection(line: Line) -> None:
-    """While silent, the network holds data; afterwards it delivers everything."""
     line.network.silent = True
     line.far.settimeout(0.2)
     with pytest.raises(TimeoutError):
