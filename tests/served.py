@@ -46,7 +46,6 @@ class Served:
         return self.seen
 
     def drive(self, *values: float, steps: int) -> Observation:
-        """Repeat a command."""
         for _ in range(steps):
             self.step(*values)
         return self.seen
@@ -65,7 +64,6 @@ class Served:
         raise AssertionError(f"not seen within {at_most} commands; last observation: {self.seen}")
 
     def state(self, name: str) -> float:
-        """Return the value of a state feature."""
         return self.seen.state[self._places[name]]
 
     def rest_ns(self, wiring: TwinWiring) -> int:

@@ -96,34 +96,6 @@ def test_sensed_values_are_near_the_truth(env: Env) -> None:
     assert info["distance"] == pytest.approx(info["true_distance"], abs=0.0002)
 
 
-@pytest.mark.parametrize("actions", ["tension", "length", "impedance"])
-def test_every_mode_of_action_moves_the_finger(rig: RunningRobot, actions: str) -> None:
-    """Flexors bend and extensors straighten."""
-    env = _env(rig, actions=actions)
-    flex = np.array([0.6, 0.6, -1.0, -1.0, 0.0, -0.5, -0.5], np.float32)
-    env.reset(seed=2)
-    bent: Any = None
-    for _ in range(40):
-        bent, *_ = env.step(flex)
-    straight: Any = None
-    for _ in range(60):
-        straight, *_ = env.step(-flex)
-    env.close()
-    assert bent[0] > straight[0] + 0.3
-
-
-def test_a_start_is_that_of_the_simulation(env: Env) -> None:
-    """Reset returns a bent finger to the start."""
-    env.reset(seed=0)
-    for _ in range(30):
-        env.step(np.array([1, 1, -1, -1, 0, 0, 0], np.float32))
-    observation, info = env.reset(seed=0)
-    with gym.make("shapechanger/Finger-v1") as simulated:
-        begins, _ = simulated.reset(seed=0)
-    np.testing.assert_allclose(observation[:4], begins[:4], atol=0.05)
-    np.testing.assert_allclose(info["true_angles"], begins[:4], atol=0.05)
-
-
 def test_an_own_twin_defines_the_reward() -> None:
     """Observations are sensed, the reward uses the truth, and the twin ends with the env."""
     env = gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=1)

@@ -67,7 +67,6 @@ class Witness:
         return float(stdout.readline())
 
     def close(self) -> None:
-        """End the process."""
         self._process.communicate()
 
 

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.setup import RobotInit, RobotInstall
+from shapechanger.cli.robot.setup import RobotInit
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile, shipped_profiles
-from shapechanger.robot.setup.install import Machine
 
 
 class _Terminal(io.StringIO):
@@ -82,29 +81,6 @@ def test_answers_are_checked_one_by_one(
     profile = load_profile("rover.toml")
     assert (profile.name, profile.body, profile.camera) == ("rover", "tank", None)
     assert profile.arming == "anyone"
-
-
-def test_on_a_pi_the_fifth_question_installs(
-    asked: tuple[list[str], list[str]],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """The next step is not one that is taken already."""
-    questions, answers = asked
-    installed: list[str] = []
-    monkeypatch.setattr(Machine, "require_pi", lambda _: None)
-    monkeypatch.setattr(RobotInstall, "run", lambda self: installed.append(self.profile))
-    answers += ["tank", "", "usb", "", "maybe", ""]
-    RobotInit().run()
-    assert installed == ["tank.toml"]
-    assert "robot install" not in capsys.readouterr().out
-    assert len(set(questions)) == 5
-    camera = load_profile("tank.toml").camera
-    assert camera is not None
-    assert camera.driver == "v4l2"
-    answers += ["tank", "second", "", "", "no"]
-    RobotInit().run()
-    assert installed == ["tank.toml"]
 
 
 def test_the_end_of_the_answers_writes_nothing(

@@ -61,7 +61,6 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 def files(folder: Path) -> set[str]:
-    """Return all paths in a folder."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
@@ -252,15 +251,6 @@ def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch)
     assert "The stop was not confirmed" in wrong
 
 
-def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
-    before = files(home / "work")
-    assert run("remember", "one", "127.0.0.1:5000", "--fingerprint", "insecure")[0] == 0
-    assert run("forget", "one")[0] == 0
-    assert files(home / "work") == before
-    assert not list((home / "config").rglob("one*"))
-
-
 @pytest.mark.skipif(any(Path("/dev").glob("gpiochip*")), reason="This machine has pins.")
 @pytest.mark.parametrize("command", ["serve", "safe-pins", "check --leds"])
 def test_a_machine_without_pins(run: Run, home: Path, command: str) -> None:
@@ -295,14 +285,6 @@ def test_a_full_disk_leaves_no_partial_robot(
         assert not list(home.rglob(".*"))
     left = 99
     assert run("init", "car", "--name", "rover")[0] == 0
-
-
-def test_a_refused_init_leaves_nothing(run: Run, home: Path) -> None:
-    """No key is created when the profile cannot be written."""
-    write_ready_profile(home)
-    before = files(home)
-    assert run("init", "car", "--name", "rover", "--out", "test-car.toml")[0] == 2
-    assert files(home) == before
 
 
 def test_a_broken_file_of_a_known_robot_is_skipped(

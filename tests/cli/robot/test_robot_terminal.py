@@ -235,7 +235,6 @@ def _output(text: str, name: str) -> dict[str, Any]:
 
 
 def _with(first: str, second: str) -> str:
-    """Return a profile with the actions and outputs of two."""
     return f"{first}\n[action{second.partition('[action')[2]}"
 
 

@@ -10,7 +10,6 @@ from shapechanger.robot.profile.profile import Profile
 
 
 def shipped(kind: str) -> Profile:
-    """Load a profile that comes with Shapechanger."""
     return load_profile(find_profile(kind))
 
 

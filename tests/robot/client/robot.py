@@ -48,7 +48,6 @@ def observation(**fields: Any) -> m.Observation:
 
 
 def eventually(is_true: Callable[[], bool], within_s: float = 5.0) -> None:
-    """Wait for a condition."""
     until = time.monotonic() + within_s
     while not is_true():
         assert time.monotonic() < until, "the condition did not hold in time"
@@ -130,7 +129,6 @@ class Robot:
         return {"robot": self.address, "key": self.key, "fingerprint": self.fingerprint}
 
     def received(self, kind: type[Any]) -> list[Any]:
-        """Return the received messages of a type."""
         return [message for message in self.messages if type(message) is kind]
 
     def stand_at(self, place: float) -> None:
@@ -154,7 +152,6 @@ class Robot:
             thread.join()
 
     def cut(self) -> None:
-        """Cut every connection."""
         self._loop.call_soon_threadsafe(self._abort)
 
     def _abort(self) -> None:

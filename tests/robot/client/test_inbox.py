@@ -9,7 +9,6 @@ from tests.robot.client.robot import observation
 
 
 def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observation:
-    """Return an observation with a number and a frame."""
     return observation(seq=seq, frame_seq=frame_seq, frame=frame)
 
 

@@ -54,7 +54,6 @@ def spaces() -> RobotSpaces:
 
 
 def seen(frame_seq: int, jpeg: bytes | None) -> Received:
-    """Return an observation with a frame."""
     message = observation(seq=frame_seq, frame_seq=frame_seq, frame=jpeg)
     return Received(message, 0.0, jpeg)
 

@@ -114,7 +114,6 @@ def recorder(tmp_path: Path, serve: Callable[..., Served]) -> Served:
 
 
 def drive(client: RobotClient, steps: int) -> None:
-    """Send commands."""
     seen = client.ask()
     for _ in range(steps):
         seen = client.exchange((0.0, 0.5), seen)

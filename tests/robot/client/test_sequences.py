@@ -137,7 +137,6 @@ def pieces(parts: list[bytes] | tuple[bytes, ...], gap_s: float) -> list[str]:
 
 
 def keys_in_bytes(data: bytes) -> list[str]:
-    """Return the keys of one read."""
     return pieces([data], 0.0)
 
 

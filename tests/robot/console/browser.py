@@ -149,11 +149,9 @@ class Console:
         self.await_state(robot="emergency")
 
     def await_words(self, where: str, text: str) -> None:
-        """Wait until an element has a text."""
         self.page.locator(where, has_text=text).first.wait_for(timeout=60_000)
 
     def pixels(self) -> list[int]:
-        """Return the pixels of the canvas."""
         return self.page.evaluate(
             "() => { const c = document.getElementById('picture');"
             " return Array.from(c.getContext('2d').getImageData(0, 0, c.width, c.height).data); }"
@@ -184,7 +182,6 @@ class Pins:
         return self._push()
 
     def forget(self) -> None:
-        """Count motion from now on."""
         now = self.propels()
         self._pushes = [now] if now else []
 
@@ -201,7 +198,6 @@ class Pins:
         return any(push * (way or push) > 0.0 for push in self._pushes)
 
     def await_rest(self) -> None:
-        """Wait until the propelling outputs are at rest."""
         until(lambda: self.propels() == 0.0, 60.0)
         self.forget()
 

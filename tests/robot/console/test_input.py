@@ -49,7 +49,6 @@ class Input:
         self._browser.send("Input.dispatchKeyEvent", event | options)
 
     def tap(self, code: str, key: str, **options: Any) -> None:
-        """Press and release a key."""
         self.key("Down", code, key, **options)
         self.key("Up", code, key)
 

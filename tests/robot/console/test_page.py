@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Route
 
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.twin.robot import RunningRobot
@@ -121,53 +120,3 @@ def test_controls_are_large_and_do_not_overlap(
         assert apart, (one, other)
     picture = next(box for box in boxes if box[0] == "picture")
     assert picture[3] * picture[4] >= 0.25 * width * size["viewport"]["height"]
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str) -> None:
-    console = visit(car, color_scheme=scheme, reduced_motion="reduce")
-    console.await_state(picture="live")
-    poor = console.page.evaluate(
-        """() => {
-          const rgb = (text) => text.match(/[\\d.]+/g).map(Number);
-          const linear = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
-          const light = ([r, g, b]) =>
-            0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
-          const behind = (e) => {
-            for (; e; e = e.parentElement) {
-              const colour = rgb(getComputedStyle(e).backgroundColor);
-              if (colour.length < 4 || colour[3] > 0.5) return colour;
-            }
-            return [255, 255, 255];
-          };
-          return [...document.querySelectorAll('body *')].filter((e) =>
-            e.checkVisibility() && !e.closest(':disabled') && ![...e.querySelectorAll('*')].length
-            && e.textContent.trim())
-            .map((e) => {
-              const a = light(rgb(getComputedStyle(e).color)), b = light(behind(e));
-              const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-              return [e.id || e.className || e.tagName, ratio];
-            }).filter(([, ratio]) => ratio < 4.5);
-        }"""
-    )
-    assert poor == []
-
-
-def test_a_file_that_fails_to_load_is_requested_again(chromium: Browser, car: RunningRobot) -> None:
-    """The page reloads itself and keeps the key."""
-    context = chromium.new_context(ignore_https_errors=True)
-    page = context.new_page()
-    lost: list[str] = []
-
-    def lose_once(route: Route) -> None:
-        if lost:
-            route.continue_()
-        else:
-            lost.append(route.request.url)
-            route.abort()
-
-    page.route("**/codec.js", lose_once)
-    page.goto(f"https://127.0.0.1:{car.port}/#key={car.known.key}")
-    page.locator("body[data-link='open'][data-view='drive']").wait_for()
-    assert len(lost) == 1
-    context.close()

@@ -16,7 +16,6 @@ from tests.robot.daemon.running import Running, running
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Add the marker."""
     text = "plan(secured=False, **changes): plan of the daemon; secured: with TLS and a key"
     config.addinivalue_line("markers", text)
 

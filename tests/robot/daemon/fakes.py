@@ -61,7 +61,6 @@ class FakeGuard:
         self.state = msgspec.structs.replace(self.state, refused="", refused_seq=None)
 
     def kinds(self) -> list[str]:
-        """Return the kinds of the orders so far."""
         return [order.kind for order in self.orders]
 
     def _apply(self, order: Order) -> None:
@@ -100,16 +99,13 @@ class FakeCamera(Camera):
         self._frames: queue.Queue[Frame | str | int] = queue.Queue()
 
     def open(self, plan: CameraPlan) -> FakeCamera:
-        """Replace `open_camera`."""
         self.opened += 1
         return self
 
     def put(self, frame: Frame) -> None:
-        """Return this frame next."""
         self._frames.put(frame)
 
     def fail(self, why: str) -> None:
-        """Raise an error next."""
         self._frames.put(why)
 
     def read(self) -> Frame:
@@ -124,7 +120,6 @@ class FakeCamera(Camera):
                 raise RobotError("The camera is closed.")
 
     def close(self) -> None:
-        """End a waiting `read`."""
         self._frames.put(self.opened)
 
 

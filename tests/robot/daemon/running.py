@@ -99,12 +99,10 @@ class Client:
         return await self.expect(Welcome)
 
     async def take(self) -> Lease:
-        """Ask for control."""
         await self.send(Take())
         return await self.expect(Lease)
 
     async def obtain(self) -> None:
-        """Ask for control until it is given."""
         while not (await self.take()).mine:
             pass
 
@@ -134,7 +132,6 @@ class Running:
     pictures: int = 0
 
     def show(self) -> None:
-        """Make the camera deliver a new frame."""
         self.pictures += 1
         self.camera.put(Frame(picture(self.pictures), self.clock.now_ns()))
 
@@ -168,13 +165,11 @@ class Running:
 
     @contextlib.asynccontextmanager
     async def client(self, key: bytes = b"", **hello: Any) -> AsyncIterator[Client]:
-        """Connect and authenticate."""
         async with self.connect() as client:
             await client.greet(key, **hello)
             yield client
 
     async def arm(self, client: Client, emergency: int = 0) -> None:
-        """Send a request to arm in answer to a new observation."""
         seen = await client.observe()
         await client.send(Arm(answers=seen.seq, emergency=emergency))
 

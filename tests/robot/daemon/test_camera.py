@@ -27,7 +27,6 @@ class Watched:
         self.reader = FrameReader(plan, checks, self._frame, self._report)
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Wait for a condition."""
         with self._changed:
             assert self._changed.wait_for(condition, 20.0), (self.frames, self.reports)
 

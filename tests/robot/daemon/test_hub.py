@@ -27,7 +27,6 @@ def new_hub(ns: int = 50, **plan: Any) -> tuple[SessionHub, SteppedClock]:
 
 
 def observed(hub: SessionHub, frame_sent: int | None = 0) -> Observation:
-    """Build Ann's observation."""
     return hub.observation(ANN, 7, frame_sent)
 
 

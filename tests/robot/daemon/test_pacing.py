@@ -18,7 +18,6 @@ STEPPED = pytest.mark.plan(
 
 
 def stepped(robot: Running) -> SteppedClock:
-    """Return the robot's clock."""
     assert isinstance(robot.clock, SteppedClock)
     return robot.clock
 

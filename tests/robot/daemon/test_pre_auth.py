@@ -26,7 +26,6 @@ class Fake:
     dropped: int = 0
 
     def drop(self) -> None:
-        """Count the call."""
         self.dropped += 1
 
 

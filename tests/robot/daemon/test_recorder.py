@@ -145,17 +145,6 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(
     assert len(episode.steps) == taken - 1 == fits
 
 
-def test_an_error_of_the_disk_is_reported_once(tmp_path: Path) -> None:
-    (tmp_path / "kept").write_text("in the way")
-    recording = Recording(tmp_path / "kept")
-    for number in range(3):
-        recording.add(*step(number))
-    recording.listen(lambda: not recording.recorder.on)
-    (refusal,) = recording.refusals()
-    assert "Cannot write" in refusal
-    assert recording.told == [recording.state] == [RecorderState(text=refusal)]
-
-
 ADA, NET = Client(1, "Ada", "person"), Client(2, "net")
 
 
@@ -170,7 +159,6 @@ def seen(seq: int, at_ns: int, **changes: Any) -> messages.Observation:
 
 
 def frame(seq: int) -> Frame:
-    """Build a frame that encodes its number."""
     return Frame(b"jpeg %d" % seq, seq)
 
 
@@ -188,7 +176,6 @@ class Built(Recorder):
     def see(
         self, client: Client, observation: messages.Observation, frame: Frame | None = None
     ) -> Sent:
-        """Send an observation to a client."""
         self.observed(client, observation)
         return Sent(observation, frame)
 

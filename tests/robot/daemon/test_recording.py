@@ -57,7 +57,6 @@ async def drive(robot: Running, client: Client, first: int, count: int) -> list[
 
 
 def only(folder: Path) -> Path:
-    """Return the only episode of a folder."""
     (episode,) = (path for path in folder.iterdir() if not path.name.startswith("."))
     return episode
 

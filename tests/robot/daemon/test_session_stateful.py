@@ -81,7 +81,6 @@ class Robot(RuleBasedStateMachine):
         self.hub = SessionHub(car_plan(arming=arming), self.clock, self.orders.append)
 
     def connected(self) -> bool:
-        """Return True if any client is connected."""
         return bool(self.sessions)
 
     @rule(place=_places, role=st.sampled_from(("person", "program")))
@@ -141,7 +140,6 @@ class Robot(RuleBasedStateMachine):
 
     @rule(place=_places)
     def stop(self, place: int) -> None:
-        """Any client can stop the robot."""
         before = len(self.orders)
         if self.send(place, EmergencyStop(reason="because")):
             assert [order.kind for order in self.orders[before:]] == ["emergency"]
@@ -231,7 +229,6 @@ class Robot(RuleBasedStateMachine):
 
     @rule(milliseconds=st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
-        """Time passes."""
         self.clock.ns += milliseconds * 1_000_000
 
     @rule(garbage=st.binary(max_size=20), place=_places)
@@ -298,7 +295,6 @@ class Robot(RuleBasedStateMachine):
             assert commanded == self.allowed[-1][1]
 
     def forget_suggestion(self, place: int) -> None:
-        """Drop the suggestion of the client at a place."""
         if self.suggestion is not None and self.suggestion[0] == place:
             self.suggestion = None
 

@@ -21,7 +21,6 @@ def _asleep() -> dict[int, int]:
 
 
 def _width_us(hardware: FakeHardware, channel: int) -> float:
-    """Return the pulse width set in the chip's registers."""
     low, high = (hardware.bus.chips[0x40][0x06 + 4 * channel + i] for i in (2, 3))
     return (high << 8 | low) * 4.88
 

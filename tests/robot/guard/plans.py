@@ -74,5 +74,4 @@ def command(
     ttl_ms: int = 1_000,
     frame_ns: int | None = None,
 ) -> Order:
-    """A command that the daemon received now."""
     return Order("command", session, seq, now_ns, ttl_ms, frame_ns, values)

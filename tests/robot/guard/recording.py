@@ -41,11 +41,9 @@ class Record:
         return [json.loads(line) for line in text[: text.rfind("\n") + 1].splitlines()]
 
     def pins(self) -> Iterator[dict[str, Any]]:
-        """Return the lines about pins."""
         return (line for line in self.lines() if "pin" in line)
 
     def is_at_rest(self) -> bool:
-        """Return whether the last level of each pin is low."""
         return not any({line["pin"]: line["duty"] for line in self.pins()}.values())
 
 
@@ -69,7 +67,6 @@ class _Hardware:
         self._factory = MockFactory(pin_class=Pin)
 
     def pin_factory(self) -> MockFactory:
-        """Return the recorded mock pins."""
         return self._factory
 
     def close(self) -> None:

@@ -34,7 +34,6 @@ class Robot:
         return [pid for pid in pids if pid != self.process.pid]
 
     def drive(self) -> None:
-        """Wait until the robot drives."""
         until(lambda: any(line["duty"] > 0.0 for line in self.record.pins()))
 
     def kill(self, opened: str, number: signal.Signals) -> int:
@@ -44,7 +43,6 @@ class Robot:
         return before
 
     def commands(self) -> list[int]:
-        """Return the times at which the daemon sent commands."""
         return [line["t"] for line in self.record.lines() if "command" in line]
 
     def rested_ns(self, after_ns: int, pid: int | None = None) -> int:
@@ -71,7 +69,6 @@ class Robot:
         return max(found.values())
 
     def notes(self, key: str) -> list[Any]:
-        """Return all values recorded under a key."""
         return [line[key] for line in self.record.lines() if key in line]
 
 

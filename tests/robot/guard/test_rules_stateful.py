@@ -126,7 +126,6 @@ class _World(RuleBasedStateMachine):
 
     @rule(steps=st.integers(2, 30))
     def run_ticks(self, steps: int) -> None:
-        """Advance by several ticks."""
         for _ in range(steps):
             self.wait_for_the_rules()
             self.holds()
@@ -156,7 +155,6 @@ class _World(RuleBasedStateMachine):
 
     @rule()
     def halt(self) -> None:
-        """End the last command."""
         assert not self.rules.offer(Order("halt"), self.now_ns)
         self.acting = None
 
@@ -198,7 +196,6 @@ class _World(RuleBasedStateMachine):
 
     @rule(step_ns=_steps)
     def wait(self, step_ns: int) -> None:
-        """Advance the time."""
         self.now_ns += step_ns
 
     @rule()

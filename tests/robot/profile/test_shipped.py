@@ -19,7 +19,6 @@ SIDE = st.floats(-1.0, 1.0)
 
 
 def values(plan: GuardPlan, actions: Sequence[float]) -> dict[str, float]:
-    """Return the value of each output by name."""
     names = [output.name for output in plan.outputs]
     return dict(zip(names, output_values(plan, actions), strict=True))
 

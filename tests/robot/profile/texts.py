@@ -150,7 +150,6 @@ def changed(old: str, new: str, text: str = EVERYTHING) -> str:
 
 
 def read(text: str = EVERYTHING) -> Profile:
-    """Parse the text of a profile."""
     return read_profile(text, PATH)
 
 

@@ -44,7 +44,6 @@ class FakePi:
 
     @property
     def config(self) -> str:
-        """Content of its config.txt."""
         return (self.root / "boot/firmware/config.txt").read_text()
 
     def write(self, name: str, text: str) -> None:

@@ -84,15 +84,6 @@ def _changed(robot: Profile, **settings: object) -> Profile:
     return replace(robot, outputs=tuple(outputs))
 
 
-def test_another_bus_is_left_to_a_person(pi: FakePi) -> None:
-    """The overlay depends on its pins."""
-    plan = _changed(_blind("car-esc"), bus=3)
-    level, sentence = _install(pi, plan)["I2C bus 3"]
-    assert (level, "dtoverlay=i2c3" in sentence) == ("failed", True)
-    pi.write("dev/i2c-3", "")
-    assert _install(pi, plan)["I2C bus 3"][0] == "already"
-
-
 def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
     """A line below a filter, such as [pi5], applies to that model only; ours applies to all."""
     pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")
@@ -105,16 +96,6 @@ def test_a_rig_on_an_adapter(pi: FakePi) -> None:
     found = _levels(_install(pi, _blind("finger")))
     assert (found["latency timer"], found["I2C speed"], found["group dialout"]) == ("did",) * 3
     assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}
-
-
-@pytest.mark.parametrize(("raspi_config", "level"), [(True, "did"), (False, "failed")])
-def test_a_rig_on_the_headers_serial_port(pi: FakePi, raspi_config: bool, level: str) -> None:
-    """Only raspi-config knows how a model's port is freed from the console."""
-    if raspi_config:
-        pi.write("usr/bin/raspi-config", "")
-    found = _install(pi, _changed(_blind("finger"), device="/dev/serial0"))
-    assert found["serial port"][0] == level
-    assert ("enable_uart=1" in found["serial port"][1]) != raspi_config
 
 
 def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:

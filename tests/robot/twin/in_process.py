@@ -76,7 +76,6 @@ class LocalBoard(BoardClient):
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
         return self._closed
 
     def advance(self, now_ns: int) -> None:
@@ -93,11 +92,9 @@ class LocalBoard(BoardClient):
         raise RobotError("The time of a board in this process advances only by `advance`.")
 
     def pass_ns(self, ns: int) -> None:
-        """Advance time by some nanoseconds."""
         self.advance(self.t + ns)
 
     def post(self, function: str, *arguments: Any) -> None:
-        """Call a function of the board."""
         self.ask(None, function, *arguments)
 
     def ask(self, kind: Any, function: str, *arguments: Any) -> Any:
@@ -107,7 +104,6 @@ class LocalBoard(BoardClient):
         return called(self, *arguments) if takes_caller else called(*arguments)
 
     def close(self) -> None:
-        """Use the pins no more."""
         self._closed = True
 
 
@@ -126,7 +122,6 @@ class _Orders:
         return []
 
     def orders(self) -> tuple[list[Order], list[str]]:
-        """Return the orders given since the last call."""
         orders, self.waiting = self.waiting, []
         return orders, []
 
@@ -167,7 +162,6 @@ class InProcessRobot:
 
     @property
     def now_ns(self) -> int:
-        """Time of the robot in nanoseconds."""
         return self._board.t
 
     @property
@@ -224,7 +218,6 @@ class InProcessRobot:
         raise RobotError(f"The robot does not arm: {refused or orders.state.stop_reason}")
 
     def close(self) -> None:
-        """Bring the outputs to rest and let go of the pins."""
         if self._guard is not None:
             self._guard.close()
             self._board.hardware.close()

@@ -21,7 +21,6 @@ ACTIONS = (ActionPlan("steering"), ActionPlan("throttle", propels=True))
 def hbridge(
     name: str, part: str, pins: tuple[int, int], mix: dict[str, float], start: float = 0.0
 ) -> OutputPlan:
-    """A motor on an H-bridge."""
     settings = {"forward": pins[0], "backward": pins[1], "enable": -1, "pwm_hz": 50}
     return OutputPlan(name, "hbridge", part, mix, 0.0, {**settings, "start": start, "full": 1.0})
 
@@ -86,7 +85,6 @@ def guard_process(
 
 
 def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    """Wait until a condition holds."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
@@ -94,13 +92,11 @@ def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
 
 
 def steady(hardware: TwinHardware) -> SteadyClock:
-    """The clock of hardware in real time."""
     assert isinstance(hardware.clock, SteadyClock)
     return hardware.clock
 
 
 def granted(hardware: TwinHardware) -> GrantedClock:
-    """The clock of hardware in twin time."""
     assert isinstance(hardware.clock, GrantedClock)
     return hardware.clock
 

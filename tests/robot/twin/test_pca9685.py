@@ -10,7 +10,6 @@ from gpiozero import DigitalOutputDevice
 from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.drivers.pca9685 import SimulatedPca9685
 from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
@@ -39,32 +38,6 @@ bus.write_i2c_block_data(0x40, 0x06 + 4 * 3, [0, 0, 307 & 0xFF, 307 >> 8])
 print("pulses", flush=True)
 sys.stdin.read()
 """
-
-
-def _awake(chip: SimulatedPca9685) -> None:
-    chip.write(0xFE, [121])
-    chip.write(0x00, [0x21])
-
-
-def test_pulses_are_decoded_from_the_registers() -> None:
-    """A prescale of 121 gives 50 Hz, and 307 of 4096 counts about 1.5 ms."""
-    chip = SimulatedPca9685()
-    assert all(pulse.us == 0.0 for pulse in chip.pulses)
-    _awake(chip)
-    chip.write(0x06, [0, 0, 307 & 0xFF, 307 >> 8])
-    assert chip.pulses[0].us == pytest.approx(307 * 122 / 25.0)
-    assert chip.pulses[0].hz == pytest.approx(50.03, abs=0.01)
-    assert chip.read(0x06, 4) == [0, 0, 51, 1]
-
-
-def test_the_full_on_and_full_off_bits() -> None:
-    """Full off takes precedence over full on; ALL_LED registers act on each channel."""
-    chip = SimulatedPca9685()
-    _awake(chip)
-    chip.write(0xFA, [0, 0x10, 0, 0])
-    assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.pulses)
-    chip.write(0xFD, [0x10])
-    assert all(pulse.us == 0.0 for pulse in chip.pulses)
 
 
 def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written() -> None:

@@ -212,20 +212,6 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
     assert not bus.servos[1].has_torque
 
 
-def test_feetech_servos_find_their_turns_again() -> None:
-    """Lengths are right after each start, wherever within half a turn they stood."""
-    bench = _Bench(read(finger_text("Feetech")))
-    bench.drive(_FLEX, 60)
-    expected = bench.lengths_of_angles()
-    bench.rig.set_power(on=False)
-    bench.robot._advance(60 * _TICK_NS)
-    bench.robot.arm()
-    bench.drive(_REST, 1)
-    np.testing.assert_allclose(bench.lengths(), expected, atol=4e-3)
-    assert min(bench.lengths()) < -0.008
-    bench.robot.close()
-
-
 def test_a_missing_magnet_releases_all_tendons(tensed: _Bench) -> None:
     """Tendons go to the pretension, then to zero, and stay released until a person arms."""
     tensed.drive(_BENT, 25)

@@ -53,7 +53,6 @@ class Scene:
 
 
 def movements(robot: RunningRobot) -> int:
-    """Return how often a pin of the motors has left rest."""
     ledger = read_ledger(robot.ledger_path)
     return sum(line.kind == "pin" and bool(line.duty) for line in ledger)
 
@@ -74,5 +73,4 @@ def settle(robot: RunningRobot, key: bytes, wait_ns: int = 50_000_000) -> None:
 
 
 def key_of(robot: RunningRobot) -> bytes:
-    """Return the key of a robot."""
     return key_bytes((robot.folder / "credentials" / "key").read_text())

@@ -35,7 +35,6 @@ def proof(key: bytes, nonce: bytes, certificate: bytes, role: str) -> bytes:
 def frame(
     data: bytes, opcode: int = BINARY, *, end: bool = True, flags: int = 0, mask: bool = True
 ) -> bytes:
-    """Return a WebSocket frame (RFC 6455)."""
     return header(len(data), opcode, end=end, flags=flags, mask=mask) + data  # The mask is 0.
 
 
@@ -98,7 +97,6 @@ class Stranger:
         self.close()
 
     def close(self) -> None:
-        """Close the connection without a word."""
         self._socket.close()
 
     # Bytes.
@@ -123,7 +121,6 @@ class Stranger:
 
     @property
     def unread(self) -> bytes:
-        """Bytes that have arrived and were not read yet."""
         self.is_open(0.001)
         return self._received
 
@@ -248,7 +245,6 @@ class Stranger:
         self.arm()
 
     def drive(self, seq: int, *values: float, **fields: Any) -> None:
-        """Command in answer to a new observation."""
         self.send(
             "command", **({"seq": seq, "answers": self.observe()["seq"]} | fields), values=values
         )
@@ -261,6 +257,5 @@ class Stranger:
         return "closed"
 
     def now_ns(self) -> int:
-        """Return the robot's time."""
         self.send("ping", token=1)
         return self.expect("pong")["now_ns"]

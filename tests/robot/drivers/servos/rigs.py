@@ -139,11 +139,9 @@ class Rig(FakeHardware):
         return self.port
 
     def one(self, name: str) -> TendonServo:
-        """Return the servo of a tendon as the driver has it."""
         return self.bus.servos[NAMES.index(name) + 1]
 
     def twin(self, name: str) -> SimulatedServo:
-        """Return the simulated servo of a tendon."""
         return self.line.servos[NAMES.index(name) + 1]
 
     def prepare(self) -> Rig:
@@ -187,5 +185,4 @@ class Rig(FakeHardware):
 
     @property
     def faulty(self) -> list[str]:
-        """Names of the servos with a fault."""
         return [one.settings.name for one in self.bus.servos.values() if one.fault]
