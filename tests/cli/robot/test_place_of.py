@@ -48,18 +48,6 @@ def test_a_finger_of_a_gap() -> None:
         place_of(_shipped("lab-car"), "", (), "real-like")
 
 
-def test_lenses_apply_to_the_default_world() -> None:
-    """Lenses keep their order."""
-    place = place_of(_shipped("lab-car"), "", ("night", "dirt"))
-    assert place == course_place("corridor", "car", ("night", "dirt"))
-    assert place_of(_shipped("lab-car"), "yard", ()) == course_place("yard", "car")
-
-
-def test_the_room_takes_any_robot() -> None:
-    """`--world room` applies to vehicles with their own world too."""
-    assert place_of(_shipped("lab-car"), "room", ()) == Place()
-
-
 def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path) -> None:
     """If a world is requested, the error names the part that does not fit."""
     text = changed('part = "steering"', 'part = "rudder"')

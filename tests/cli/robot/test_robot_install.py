@@ -71,18 +71,6 @@ def test_a_dry_run_needs_the_unit_only(pi: FakePi, said: Said) -> None:
     assert pi.ran == []
 
 
-def test_the_profile_of_this_folder_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A shipped name is meant for the file of that name, if it exists."""
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(RobotError, match="`shapechanger robot init car` writes your own"):
-        RobotInstall("car").run()
-    Path("car.toml").touch()
-    with pytest.raises(RobotError, match=r"car\.toml in this folder is your own"):
-        RobotInstall("car").run()
-
-
 def test_who_is_refused(pi: FakePi, car: Profile, said: Said, tmp_path: Path) -> None:
     """Root, a unit of another profile or user, a robot without its key, and another computer."""
     with pytest.raises(RobotError, match="without sudo"):

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
+from shapechanger.cli.robot.check import ask_person
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.discovery import FoundRobot
 from shapechanger.robot.link.address import Address
@@ -302,3 +303,17 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
     assert "mine" in output
     assert warned.startswith("broken is skipped: ")
     assert warned.count("\n") == 1
+
+
+def test_questions_are_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only yes, no and the end of the input are answers."""
+    answers = iter(["", "maybe", "Y", "no"])
+
+    def answer(_: str) -> str:
+        try:
+            return next(answers)
+        except StopIteration:
+            raise EOFError from None
+
+    monkeypatch.setattr("builtins.input", answer)
+    assert [ask_person("Is it lit?") for _ in range(3)] == [True, False, None]

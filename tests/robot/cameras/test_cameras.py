@@ -225,14 +225,6 @@ def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) 
         camera.read()
 
 
-def test_a_webcam_without_the_frame_size_is_refused(tmp_path: Path) -> None:
-    kernel = _Kernel(tmp_path / "video0", size=(640, 480))
-    with pytest.raises(RobotError, match="list-formats-ext"):
-        V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)
-    with pytest.raises(RobotError, match="does not answer"):
-        open_camera(_plan("v4l2", device=str(tmp_path / "video1")))
-
-
 @pytest.fixture
 def pi(monkeypatch: pytest.MonkeyPatch) -> Mock:
     """Fake packages of a Pi camera, and the only camera that they open."""

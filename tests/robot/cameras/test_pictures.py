@@ -161,13 +161,6 @@ def test_a_stream_without_frames_is_refused() -> None:
         assert splitter.next() == _jpeg(7)
 
 
-def test_padding_of_a_frame_is_cut_off() -> None:
-    """Some cameras and phones write bytes after a frame."""
-    plan = CameraPlan("file", size=(32, 24))
-    for after in (bytes(99), b"\xff", b"\0more"):
-        assert checked_frame(_jpeg(1) + after, 0, plan).jpeg == _jpeg(1)
-
-
 def test_the_capture_time_is_read_from_the_comment() -> None:
     """Missing and malformed comments give None."""
     assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=1234567890123")) == 1234567890123

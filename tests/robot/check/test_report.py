@@ -67,12 +67,3 @@ def test_a_report_is_kept_whatever_happens(tmp_path: Path) -> None:
     assert "It ended early: it was interrupted." in third.read_text()
     with pytest.raises(OutputError, match="Cannot write"):
         write_report(_parts(bad), said.append, report / "below.txt")
-
-
-def test_without_a_file_nothing_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What nobody could measure is not bad."""
-    monkeypatch.chdir(tmp_path)
-    said: list[str] = []
-    assert write_report(_parts(Finding("drives", "unknown", "Not measured.")), said.append)
-    assert said[-1] == "\n0 good, 0 bad, 1 not measured."
-    assert not list(tmp_path.iterdir())

@@ -129,29 +129,6 @@ def test_missing_safety_hardware_is_reported(tmp_path: Path, car: Profile) -> No
     assert (bare.level, "Fit the one-shot" in bare.sentence) == ("bad", True)
 
 
-def test_only_the_devices_of_the_robot_are_checked(tmp_path: Path, car: Profile) -> None:
-    _write(tmp_path, "dev/gpiochip0")
-    bare = replace(car, sensors=())
-    assert [level for level, _ in _found(StandingRobot(bare, root=tmp_path))["devices"]] == ["good"]
-    with_board = replace(bare, outputs=(*car.outputs, _SERVO))
-    (_, (level, sentence)) = _found(StandingRobot(with_board, root=tmp_path))["devices"]
-    assert (level, "i2c-1" in sentence, "raspi-config" in sentence) == ("bad", True, True)
-
-
-def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
-    """A latency timer of 16 ms would make answers late."""
-    rig = replace(shipped("finger"), camera=None)
-    found = _on(tmp_path, rig)
-    assert found["latency timer"].level == "unknown"
-    assert "plug in the adapter" in found["devices"].sentence
-    _write(tmp_path, "dev/ttyUSB0")
-    for ms, level in (("16\n", "bad"), ("1\n", "good")):
-        _write(tmp_path, "sys/bus/usb-serial/devices/ttyUSB0/latency_timer", ms)
-        found = _on(tmp_path, rig)
-        assert found["latency timer"].level == level
-    assert found["devices"].level == found["enable line"].level == "good"
-
-
 def _hardware(where: str = "", act: Any = None) -> Any:
     """Return hardware and a camera without pins and buses, of which one method acts."""
     made = MagicMock(clock=Clock())

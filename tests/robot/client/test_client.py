@@ -116,16 +116,6 @@ def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
     person.arm()
 
 
-def test_events_are_returned_once(run: Run, connect: Connect) -> None:
-    robot = run()
-    client = connect(robot)
-    for i in range(300):
-        robot.send(m.Event(name="bump", text=f"Bump {i}.", at_ns=i))
-    client.ping()
-    assert [event.text for event in client.events()] == [f"Bump {i}." for i in range(44, 300)]
-    assert client.events() == []
-
-
 def test_an_emergency_stop_is_sent_before_closing(run: Run, connect: Connect) -> None:
     robot = run()
     client = connect(robot)

@@ -7,7 +7,6 @@ import pytest
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, read_episode
 from shapechanger.robot.link.messages import (
     MAX_PIECE,
-    Acknowledge,
     Browse,
     Command,
     Event,
@@ -207,16 +206,6 @@ async def test_recording_ends_when_the_last_person_leaves(robot: Running, tmp_pa
         assert "last person" in state.text
     await robot.end()
     assert "last person" in read_episode(only(tmp_path / "kept")).outcome
-
-
-async def test_the_state_is_broadcast_each_second(robot: Running) -> None:
-    async with robot.client(role="person") as person, robot.client() as program:
-        await robot.armed(person)
-        await recording(person)
-        await drive(robot, person, 1, 3)
-        await program.send(Acknowledge())
-        while (await program.expect(RecorderState)).steps < 2:
-            pass
 
 
 async def test_the_episode_is_closed_when_the_daemon_ends(robot: Running, tmp_path: Path) -> None:

@@ -79,11 +79,6 @@ def test_a_servo_board_needs_i2c(pi: FakePi, raspi_config: bool) -> None:
     assert _levels(_install(pi, _blind("car-esc")))["I2C"] == "already"
 
 
-def _changed(robot: Profile, **settings: object) -> Profile:
-    outputs = (replace(one, settings={**one.settings, **settings}) for one in robot.outputs)
-    return replace(robot, outputs=tuple(outputs))
-
-
 def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
     """A line below a filter, such as [pi5], applies to that model only; ours applies to all."""
     pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")

@@ -112,8 +112,3 @@ def test_opening_a_pin_releases_it_first(tmp_path: Path) -> None:
         released = [line for line in read_ledger(board.ledger_path) if line.released]
         assert [line.pin for line in released] == [22, 27]
         hardware.close()
-
-
-def test_connecting_without_a_board_names_the_path(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="No twin's board answers"):
-        connect(str(tmp_path / "nothing"))

@@ -6,12 +6,9 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from shapechanger.errors import RobotError
-from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
@@ -52,13 +49,6 @@ class _Bench:
 
     def state(self, name: str) -> float:
         return self.seen.state[self.names.index(name)]
-
-    def lengths(self) -> list[float]:
-        return [self.state(f"{name}/length") for name in TENDONS]
-
-    def lengths_of_angles(self) -> NDArray[np.float64]:
-        truth = self.world.truth()
-        return -MOMENT_ARMS @ np.array([truth[f"{name}/angle"] for name in JOINTS])
 
     def pulls(self) -> list[float]:
         return [servo.pulls_a for servo in self.rig.servos.values()]

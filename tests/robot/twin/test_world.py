@@ -103,18 +103,6 @@ def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, flo
         assert _clearance(pose) >= RADIUS - 1e-6
 
 
-@given(seed=_SEEDS)
-def test_a_start_has_room_ahead(seed: int) -> None:
-    world = DrivingWorld({"wheels"}, (8, 6), seed)
-    first = world.inputs()
-    assert not first.bumped
-    assert world.distance_m() > 1.0
-    _run(world, {"wheels": 1.0}, 0.2)
-    world.place(seed)
-    assert world.inputs().pose == first.pose
-    assert world.inputs().speed == 0.0
-
-
 def test_mixed_parts_are_refused() -> None:
     with pytest.raises(RobotError, match="No vehicle has all of these parts: rudder, wheels"):
         DrivingWorld({"wheels", "rudder"}, _SIZE, seed=1)

@@ -18,6 +18,7 @@ from shapechanger.robot.drivers.servos.settings import (
     ServoFamily,
     ServoSettings,
 )
+from shapechanger.robot.drivers.servos.simulation import SimulatedMotor
 from tests.robot.drivers.servos.rigs import feetech, servo, settings
 from tests.robot.drivers.servos.wire import DYNAMIXEL, FEETECH
 
@@ -190,3 +191,41 @@ def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
 
 def test_a_tendon_shorter_than_the_finger_allows_is_slack_at_once() -> None:
     assert "wound in by 61 mm" in _see(_one(servo("FDP")), 0, 0, -61)
+
+
+def _motor(model: str = "XL330-M077", direction: int = 1) -> SimulatedMotor:
+    made = (feetech if model == "STS3215" else servo)("FDP", model=model, direction=direction)
+    return SimulatedMotor(made)
+
+
+def _run(motor: SimulatedMotor, goal_a: float, volts: float, seconds: float) -> None:
+    """Drive a motor whose tendon is fixed at its end."""
+    for _ in range(round(seconds * 1000)):
+        motor.advance(goal_a, volts, 0.0, 1e-3)
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_the_no_load_speed_matches_the_data_sheet(name: str) -> None:
+    """At the stall current limit and without load, the motor reaches its data-sheet speed."""
+    model = MODELS[name]
+    motor = _motor(name)
+    motor.snapped = True
+    _run(motor, model.stall_a, model.volts, 3.0)
+    assert motor.speed * 60 / (2 * math.pi) == pytest.approx(model.no_load_rpm, rel=0.02)
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) -> None:
+    """A blocked tendon has the tension kt i / r, within the friction of the gears.
+
+    The tension can exceed the goal: the spool overshoots, and friction holds it there.
+    """
+    model = MODELS[name]
+    motor = _motor(name, direction)
+    amperes = 0.4 * model.stall_a
+    _run(motor, direction * amperes, model.volts, 1.5)
+    pull = model.torque_constant * amperes / 0.005
+    friction = MODELS[name].friction_nm / 0.005
+    assert motor.tension == pytest.approx(pull, abs=1.01 * friction)
+    assert motor.speed == 0.0

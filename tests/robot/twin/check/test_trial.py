@@ -89,14 +89,6 @@ def test_a_fault_is_a_check(
     assert found == (level, sentence)
 
 
-def test_faults_need_parts_of_a_robot() -> None:
-    assert not Bench(shipped("car")).lacks("")
-    assert Bench(shipped("car")).lacks("bumper") == "This robot has no bumper."
-    assert Bench(shipped("finger")).lacks("throttle") == "This robot has no throttle."
-    # Only a board makes the other faults.
-    assert {fault.needs for fault in FAULTS.values() if fault.on_pins} == {"", "one-shot"}
-
-
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A bench on pins without a robot, driver and network; `events` has its calls."""
