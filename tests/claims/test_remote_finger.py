@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import FingerError, PathError
-from shapechanger.finger.gap import GAPS, resolve_gap
+from shapechanger.finger.gap import resolve_gap
 from shapechanger.finger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.paths import as_path
@@ -115,16 +115,6 @@ def test_an_own_twin_defines_the_reward() -> None:
     env.close()
     env.close()
     assert supervisor.poll() is not None
-
-
-def test_each_seed_of_a_study_gets_another_rig() -> None:
-    """Applies when the gap is given without a finger seed."""
-    with gym.make("shapechanger/RemoteFinger-v1", twin="real-like") as many:
-        own: Any = many.unwrapped
-        assert own.individual == "finger_seed"
-        assert own.randomised_source() == {"gap": "wide", "reward": {"change": 5.0}}
-        assert own.motors.path == GAPS["real-like"].around.path
-        assert not own.side_by_side
 
 
 def test_ten_seconds_identify_the_finger() -> None:

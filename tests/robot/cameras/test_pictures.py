@@ -56,13 +56,6 @@ def test_barcode_survives_jpeg(
     assert read_barcode(simplejpeg.decode_jpeg(jpeg)) == number
 
 
-def test_barcode_that_does_not_fit_is_refused() -> None:
-    """Cells narrower than three pixels would not survive compression."""
-    with pytest.raises(RobotError, match="64 by 48 pixels is too small"):
-        draw_barcode(_picture(64, 48), 1)
-    assert read_barcode(_picture(64, 48)) is None
-
-
 def test_a_frame_of_the_wrong_size_is_refused() -> None:
     with pytest.raises(RobotError, match="32 by 24 pixels; the profile sets 160 by 120"):
         checked_frame(_jpeg(), 0, CameraPlan("file"))

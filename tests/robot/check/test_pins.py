@@ -10,8 +10,6 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.check.pins import (
     check_jumper,
     check_lamps,
-    lamps_of,
-    plan_of_pins,
     probed_pin,
 )
 from shapechanger.robot.check.report import Finding
@@ -54,18 +52,6 @@ def test_pins_of_the_robot_are_never_toggled(pair: tuple[int, int], user: str) -
         check_jumper(*pair, _PLAN)
 
 
-def test_the_plan_has_each_pin_with_its_position() -> None:
-    """A person compares it with the wires."""
-    assert plan_of_pins(_PLAN) == [
-        "pin          GPIO6 (31): bumper",
-        "pin          GPIO13 (33): bumper",
-        "pin          GPIO19 (35): enable line",
-        "pin          GPIO22 (15): drive forward",
-        "pin          GPIO26 (37): the emergency button",
-        "pin          GPIO27 (13): drive backward",
-    ]
-
-
 @pytest.mark.parametrize(
     ("kind", "probe", "text"),
     [("car", 27, "used by drive backward"), ("boat", 20, "needs a motor on an H-bridge")],
@@ -80,20 +66,6 @@ def test_probes_that_cannot_measure(kind: str, probe: int, text: str) -> None:
 def _lit(kind: str, pins: HeldPins, ask: Callable[[str], bool | None]) -> dict[str, Finding]:
     checks = check_lamps(shipped(kind), lambda: pins, ask, lambda _: None, shown_s=0.0)
     return {one.check: one for one in checks}
-
-
-@pytest.mark.parametrize(
-    ("kind", "places"),
-    [
-        ("car", ["GPIO22", "GPIO27", "GPIO4", "GPIO17", "GPIO19"]),
-        ("tank", [f"GPIO{pin}" for pin in (17, 27, 22, 23, 24, 25)]),
-        ("boat", ["GPIO18", "GPIO12"]),
-        ("truck", [f"channel {number} of the pca9685" for number in range(4)]),
-    ],
-)
-def test_each_output_has_its_leds(kind: str, places: list[str]) -> None:
-    """A motor has one for each direction, and one for its enable input."""
-    assert [lamp.place for lamp in lamps_of(shipped(kind))] == places
 
 
 def test_each_led_is_lit_alone(pins: HeldPins) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scripts.key_tables import with_keys
-from shapechanger.errors import ProfileError, RobotError
+from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.robot.drivers import chip
 from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
@@ -75,34 +75,6 @@ def test_chips_of_another_package_are_driven_on_the_twin() -> None:
         assert seen.action_applied[2] == horn
         assert wiring.read(robot.pins.levels, robot.now_ns)["horn"] == (horn, horn == 0.0)
     robot.close()
-
-
-@pytest.mark.usefixtures("_outside")
-@pytest.mark.parametrize(
-    ("old", "new", "text"),
-    [
-        ('"bh1750"', '"bh175"', "not 'bh175' (did you mean 'bh1750'?)"),
-        (
-            '"bh1750"\n',
-            '"bh1750"\naddress = 0x5D\n',
-            "address of [sensor.sky] must be a whole numb",
-        ),
-        ("pin = 4\n", "", "[output.horn] lacks the key 'pin', a BCM pin"),
-        (
-            "pin = 4\n",
-            "pin = 2\n",
-            "by bus of [output.steer] (line 25) and by pin of [output.horn]",
-        ),
-        ("pin = 4\n", "pim = 4\n", "[output.horn] has no key 'pim' (did you mean 'pin'?)"),
-        ('"relay"', '"bh1750"', "not 'bh1750'"),
-    ],
-)
-def test_mistakes_in_their_keys_are_named(old: str, new: str, text: str) -> None:
-    """Keys of another package are checked as ours: with line, reason and nearest spelling."""
-    assert _LINES.count(old) == 1
-    with pytest.raises(ProfileError, match=r"^lab-car\.toml, line \d+: ") as caught:
-        _read(_LINES.replace(old, new))
-    assert text in str(caught.value)
 
 
 def test_an_entry_point_must_name_a_chip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,8 +20,6 @@ from tests.robot.twin.robots import BUMPER, CAR, ENCODER
 
 _SINGLE = replace(ENCODER, settings={**ENCODER.settings, "b": -1})
 _DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
-_IMU = SensorPlan("imu", "mpu6050", "imu", {"bus": 1, "address": 0x68})
-_BATTERY = SensorPlan("battery", "ina219", "battery", {"bus": 1, "address": 0x40})
 
 
 class _Rig:
@@ -88,22 +86,3 @@ def test_the_distance_is_measured() -> None:
         rig.operator.set_distance(None, dead=True)
         with pytest.raises(RobotError, match="no echo"):
             rig.advance(2.0)
-
-
-def test_the_imu_measures_acceleration() -> None:
-    with _rig(_IMU) as rig:
-        assert rig.advance(0.05)["acceleration_x"] == pytest.approx(0.0, abs=0.01)
-        rig.motor.value = 1.0
-        assert rig.advance(0.03)["acceleration_x"] > 3.0
-        rig.operator.break_chip(1, 0x68)
-        with pytest.raises(RobotError):
-            rig.advance(0.02)
-
-
-def test_the_battery_sags_and_runs_down() -> None:
-    with _rig(_BATTERY) as rig:
-        idle = rig.advance(0.2)["battery"]
-        rig.motor.value = 1.0
-        assert 6.5 < rig.advance(0.2)["battery"] < idle - 0.2
-        rig.operator.set_battery(6.0)
-        assert rig.advance(0.2)["battery"] < 6.0

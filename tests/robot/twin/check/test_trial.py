@@ -20,7 +20,6 @@ from shapechanger.robot.twin.check.trial import (
     TrialResult,
     Watcher,
     fault_finding,
-    run_trials,
 )
 from tests.robot.check.held_pins import HeldPins, shipped
 
@@ -131,18 +130,6 @@ def test_a_person_is_asked_before_the_pins_are_made_safe(bench: Any) -> None:
         "Did a motor's LED light up, and are all of them out now (guard and supervisor killed)?",
         "closed",
     ]
-
-
-def test_a_probe_is_asked_first(bench: Any) -> None:
-    """If it never saw the motor driven, the trial is void; unmeasured promises are not kept."""
-    result = next(run_trials(bench, _fault(bench), 1))
-    assert (math.isnan(result.stopped_ms), result.kept) == (True, False)
-    asked: list[str] = []
-    watcher: Any = Watcher()
-    watcher.moves, watcher.rest_ms = (lambda: False), (lambda _: 7.0)
-    bench.watcher, bench.ask = (lambda: watcher), asked.append
-    result = next(run_trials(bench, _fault(bench), 1))
-    assert (result.stopped_ms, result.drove, result.kept, asked) == (7.0, False, False, [])
 
 
 def test_pins_that_stay_driven_are_bad(bench: Any) -> None:
