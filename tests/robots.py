@@ -104,9 +104,6 @@ def write_profile(folder: Path, text: str = CAR) -> Profile:
     return load_profile(path)
 
 
-
-
-
 BLIND_CAR = """\
 # A car without any sensor.
 
