@@ -107,3 +107,16 @@ def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: in
     clock.ns = 1
     hub.halt()
     assert observed(hub).commanded == ()
+
+
+def test_the_newest_suggestion_counts_until_it_expires() -> None:
+    hub, clock = new_hub(1, deadline_ms=250)
+    assert observed(hub).suggested == ()
+    hub.suggest(ANN, (0.1, 0.0))
+    clock.ns += 10 * MS
+    hub.suggest(SAC, (0.2, 0.0))
+    clock.ns += 250 * MS
+    seen = observed(hub)
+    assert (seen.suggested_by, seen.suggested) == ("sac", (0.2, 0.0))
+    clock.ns += 1
+    assert observed(hub).suggested == ()
