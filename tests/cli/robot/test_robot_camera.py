@@ -1,5 +1,6 @@
 """`shapechanger robot camera`: writes a camera's measured geometry into the profile."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from shapechanger.cli import main
 from shapechanger.robot.profile.load import load_profile
+from tests.demos.exchange.small import huge
 from tests.robots import CAR, write_profile
 from tests.vehicles.cameras.test_rectify import board_picture
 
@@ -80,3 +82,31 @@ def test_unsuitable_options_are_refused(
     assert message in capsys.readouterr().err
     assert profile.read_bytes() == before
     assert not Path("camera.jpg").exists()
+
+
+def test_shipped_profiles_and_invalid_images_are_refused(
+    profile: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "text.jpg").write_bytes(b"no picture")
+    (tmp_path / "noise.jpg").write_bytes(b"\xff\xd8\xff" + bytes(100))
+    (tmp_path / "bomb.jpg").write_bytes(huge())
+    with (tmp_path / "sparse.jpg").open("wb") as file:
+        file.truncate(1 << 33)
+    os.mkfifo(tmp_path / "pipe.jpg")
+    for robot, options, message in (
+        ("lab-car", ["--fovy", "50"], "comes with Shapechanger"),
+        (str(profile), ["--picture", "text.jpg"], "is not a JPEG"),
+        (str(profile), ["--picture", "none.jpg"], "Cannot read none.jpg"),
+        (str(profile), ["--picture", "noise.jpg"], "noise.jpg is not a JPEG, or is damaged"),
+        (str(profile), ["--picture", "bomb.jpg"], "more than the limit of 16777216"),
+        (str(profile), ["--picture", "sparse.jpg"], "Cannot read sparse.jpg: it has"),
+        (str(profile), ["--picture", "pipe.jpg"], "Cannot read pipe.jpg: it is not a regular file"),
+        (
+            str(profile),
+            ["--picture", "/dev/zero"],
+            "Cannot read /dev/zero: it is not a regular file",
+        ),
+    ):
+        with pytest.raises(SystemExit):
+            main(["robot", "camera", robot, *options])
+        assert message in capsys.readouterr().err
