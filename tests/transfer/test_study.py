@@ -30,7 +30,7 @@ from shapechanger.errors import (
 )
 from shapechanger.files import read_json
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.executor import Job, OnProgress, Serial
+from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import (
     STUDY_FILE,
@@ -204,7 +204,7 @@ def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-class _Planned:
+class _Planned(Executor):
     """An executor that keeps its jobs and runs none."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:

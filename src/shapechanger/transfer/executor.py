@@ -10,12 +10,12 @@ import threading
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, Final, Protocol
+from typing import Any, Final, Literal
 
 from shapechanger.errors import FailedRuns, OutputError, ShapechangerError, StudyError
 
@@ -48,8 +48,19 @@ class Job:
     attempts: int = 3
 
 
-class Executor(Protocol):
-    """Runs jobs."""
+Event = tuple[str, Literal["steps", "ended", "failed", "lost"], Any]
+"""Name of a job, what happened, and its steps, its error or how its process was lost."""
+
+
+class Executor:
+    """Runs jobs, each after those that it depends on.
+
+    A job that fails does not stop the others, except those that need its result. One whose process
+    is lost is repeated. A subclass states where jobs run.
+    """
+
+    # Number of jobs that run at the same time; None for all.
+    _most: int | None = None
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         """Run all jobs in order of their dependencies.
@@ -57,69 +68,73 @@ class Executor(Protocol):
         Args:
             jobs: The jobs.
             on_progress: Called with the progress of each.
+
+        Raises:
+            FailedRuns: If jobs have failed; all others are complete.
+            OutputError: If a job could not write its result; the others are ended.
         """
-        ...
+        waiting, running = list(jobs), dict[str, Job]()
+        ended = {name for job in jobs for name in job.after} - {job.name for job in jobs}
+        failed: dict[str, list[str]] = {}  # Names of jobs by reason.
+        steps, lost = Counter[str](), Counter[str]()
+        self._open(on_progress)
+        try:
+            while True:
+                free = None if self._most is None else self._most - len(running)
+                for job in [job for job in waiting if ended.issuperset(job.after)][:free]:
+                    waiting.remove(job)
+                    running[job.name], steps[job.name] = job, 0
+                    self._begin(job)
+                if not running:
+                    break
+                for name, kind, content in self._events():
+                    if kind == "steps":
+                        steps[name] = content
+                        on_progress(name, content, False)
+                        continue
+                    job = running.pop(name)
+                    if kind == "ended":
+                        ended.add(name)
+                        on_progress(name, steps[name], True)
+                        continue
+                    if isinstance(content, OutputError):
+                        raise content
+                    if kind == "lost":
+                        lost[name] += 1
+                        if lost[name] < job.attempts:
+                            waiting.append(job)
+                            continue
+                        times = "once" if job.attempts == 1 else f"{job.attempts} times, at last"
+                        content = f"its process was lost {times} with {content}"
+                    reason = str(content).strip().rstrip(".")
+                    failed.setdefault(reason, []).append(name)
+                    # At once, because the others may take hours.
+                    _log.error("%s failed: %s", name, reason.rpartition("\n")[2])
+        finally:
+            self._close()
+        if failed:
+            reasons = (f"{', '.join(names)} ({reason})" for reason, names in failed.items())
+            skipped = ", ".join(job.name for job in waiting)
+            raise FailedRuns(
+                f"These runs failed: {'; '.join(reasons)}. "
+                + (f"These need them: {skipped}. " if skipped else "")
+                + "All others have ended; the same command tries these again."
+            )
 
+    def _open(self, on_progress: OnProgress) -> None:
+        """Get ready for jobs."""
+        del on_progress
 
-class JobSchedule:
-    """Jobs that wait, have ended and have failed, in order of their dependencies.
+    def _begin(self, job: Job) -> None:
+        """Start a job."""
+        raise NotImplementedError
 
-    A job that fails does not stop the others, except those that need its result. One whose process
-    is lost is repeated.
-    """
+    def _events(self) -> Iterable[Event]:
+        """Wait for events of the jobs that run, and return them."""
+        raise NotImplementedError
 
-    def __init__(self, jobs: Sequence[Job]) -> None:
-        self._waiting = list(jobs)
-        self._ended = {name for job in jobs for name in job.after} - {job.name for job in jobs}
-        self._failed: dict[str, list[str]] = {}  # Names of jobs by reason.
-        self._lost: Counter[str] = Counter()
-
-    def start(self, most: int | None = None) -> list[Job]:
-        """Return jobs whose dependencies have ended; they wait no longer.
-
-        Args:
-            most: Number of jobs to return at most; None for all.
-        """
-        ready = [job for job in self._waiting if self._ended.issuperset(job.after)][:most]
-        for job in ready:
-            self._waiting.remove(job)
-        return ready
-
-    def end(self, job: Job) -> None:
-        """Record that a job has ended."""
-        self._ended.add(job.name)
-
-    def fail(self, job: Job, error: ShapechangerError | str) -> None:
-        """Record that a job has failed."""
-        if isinstance(error, OutputError):
-            raise error
-        reason = str(error).strip().rstrip(".")
-        self._failed.setdefault(reason, []).append(job.name)
-        # At once, because the others may take hours.
-        _log.error("%s failed: %s", job.name, reason.rpartition("\n")[2])
-
-    def lose(self, job: Job, how: str) -> None:
-        """Record that a job's process has ended by itself; the job waits again, or has failed."""
-        self._lost[job.name] += 1
-        if self._lost[job.name] < job.attempts:
-            self._waiting.append(job)
-        else:
-            times = "once" if job.attempts == 1 else f"{job.attempts} times, at last"
-            self.fail(job, f"its process was lost {times} with {how}")
-
-    def require_success(self) -> None:
-        """Raise if jobs have failed."""
-        if not self._failed:
-            return
-        reasons = "; ".join(
-            f"{', '.join(names)} ({reason})" for reason, names in self._failed.items()
-        )
-        skipped = ", ".join(job.name for job in self._waiting)
-        raise FailedRuns(
-            f"These runs failed: {reasons}. "
-            + (f"These need them: {skipped}. " if skipped else "")
-            + "All others have ended; the same command tries these again."
-        )
+    def _close(self) -> None:
+        """End all jobs that still run."""
 
 
 def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
@@ -136,24 +151,28 @@ def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
     return forward
 
 
-class Serial:
+class Serial(Executor):
     """Runs jobs one after another in this process, for debugging; raises what the first raises."""
 
-    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; see `Executor.run`."""
-        schedule = JobSchedule(jobs)
-        while ready := schedule.start(1):
-            job = ready[0]
+    _most = 1
 
-            def report(steps: int, name: str = job.name) -> None:
-                on_progress(name, steps, False)
+    def _open(self, on_progress: OnProgress) -> None:
+        self._on_progress = on_progress
 
-            job.function(*job.arguments, report)
-            schedule.end(job)
-            on_progress(job.name, 0, True)
+    def _begin(self, job: Job) -> None:
+        self._job = job
+
+    def _events(self) -> Iterable[Event]:
+        job = self._job
+
+        def report(steps: int) -> None:
+            self._on_progress(job.name, steps, False)
+
+        job.function(*job.arguments, report)
+        yield job.name, "ended", None
 
 
-class Processes:
+class Processes(Executor):
     """Runs jobs in worker processes of this machine, which end with their parent.
 
     Processes are spawned, not forked: a script that calls this must guard its start with
@@ -166,53 +185,38 @@ class Processes:
     def __init__(self, workers: int | None = None) -> None:
         if workers is not None and workers < 1:
             raise StudyError(f"A study needs at least one worker, got {workers}.")
-        self._workers = workers or os.cpu_count() or 1
+        self._most = workers or os.cpu_count() or 1
+        self._idle: list[_Worker] = []
+        self._busy: dict[Any, _Worker] = {}
 
-    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; see `Executor.run` and `JobSchedule`.
+    def _begin(self, job: Job) -> None:
+        worker = self._idle.pop() if self._idle else _Worker()
+        self._busy[worker.connection] = worker
+        worker.begin(job)
 
-        Raises:
-            FailedRuns: If jobs have failed; all others are complete.
-            OutputError: If a job could not write its result; the others are ended.
-        """
-        schedule = JobSchedule(jobs)
-        idle: list[_Worker] = []
-        busy: dict[Connection, _Worker] = {}
-        try:
-            while True:
-                for job in schedule.start(self._workers - len(busy)):
-                    worker = idle.pop() if idle else _Worker()
-                    busy[worker.connection] = worker
-                    worker.begin(job)
-                if not busy:
-                    break
-                for connection in wait(list(busy)):
-                    worker = busy[connection]  # pyright: ignore[reportArgumentType]
-                    kind, content = worker.receive()
-                    if kind == "steps":
-                        worker.steps = content
-                        on_progress(worker.job.name, worker.steps, False)
-                        continue
-                    del busy[worker.connection]
-                    if kind == "lost":
-                        schedule.lose(worker.job, f"exit code {worker.end()}")
-                        continue
-                    idle.append(worker)
-                    if kind == "failed":
-                        schedule.fail(worker.job, content)
-                        continue
-                    schedule.end(worker.job)
-                    on_progress(worker.job.name, worker.steps, True)
-        finally:
-            for worker in (*idle, *busy.values()):
-                worker.end()
-        schedule.require_success()
+    def _events(self) -> Iterable[Event]:
+        for connection in wait(list(self._busy)):
+            worker = self._busy[connection]
+            try:
+                kind, content = worker.connection.recv()
+            except (EOFError, ConnectionError):  # The latter if it has not read its job.
+                kind, content = "lost", f"exit code {worker.end()}"
+            if kind != "steps":
+                del self._busy[connection]
+                if kind != "lost":
+                    self._idle.append(worker)
+            yield worker.job, kind, content
+
+    def _close(self) -> None:
+        for worker in (*self._idle, *self._busy.values()):
+            worker.end()
+        self._idle, self._busy = [], {}
 
 
 class _Worker:
     """A process that runs jobs one after another."""
 
-    job: Job
+    job: str
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -220,19 +224,11 @@ class _Worker:
         self._process: BaseProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
         self._process.start()
         theirs.close()
-        self.steps = 0
 
     def begin(self, job: Job) -> None:
-        self.job, self.steps = job, 0
+        self.job = job.name
         with suppress(ConnectionError):  # A process that has ended is noticed when it is heard.
             self.connection.send((job.function, job.arguments))
-
-    def receive(self) -> tuple[str, Any]:
-        """Receive "steps" with their number, "failed" with the error, "ended" or "lost"."""
-        try:
-            return self.connection.recv()
-        except (EOFError, ConnectionError):  # The latter if it has not read its job.
-            return "lost", None
 
     def end(self) -> int | None:
         """End the process, and return its exit code; negative for a signal."""

@@ -12,11 +12,12 @@ import socket
 import subprocess
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any, Final
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError
-from shapechanger.transfer.executor import Job, JobSchedule, OnProgress, throttled
+from shapechanger.transfer.executor import Event, Executor, Job, OnProgress, throttled
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -34,10 +35,10 @@ _REPORT_EVERY_S: Final = 0.5
 _ray: Any = ray
 
 
-class RayCluster:
+class RayCluster(Executor):
     """Runs jobs on the nodes of a Ray cluster, one job per core.
 
-    A job whose worker or node is lost is repeated on another; see `JobSchedule`.
+    A job whose worker or node is lost is repeated on another.
 
     Args:
         address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for the one that
@@ -47,31 +48,54 @@ class RayCluster:
     def __init__(self, address: str | None = None) -> None:
         self._address = address
 
-    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; see `Executor.run`.
+    def _open(self, on_progress: OnProgress) -> None:
+        """Connect to the cluster.
 
         Raises:
-            StudyError: If the cluster does not answer.
-            FailedRuns: If jobs have failed; all others are complete.
-            OutputError: If a job could not write its result; the others are cancelled.
+            StudyError: If it does not answer.
         """
-        own = not _ray.is_initialized()
-        if own:
-            self._connect()
-        try:
-            _Session(jobs, on_progress).run()
-        finally:
-            if own:
-                _ray.shutdown()
+        del on_progress
+        self._is_own = not _ray.is_initialized()
+        if self._is_own:
+            if self._address not in (None, "auto", "local"):
+                _require_answer(str(self._address))
+            try:
+                _ray.init(address=self._address, logging_level="ERROR", log_to_driver=False)
+            except (ConnectionError, ValueError, RuntimeError, RayError) as error:
+                reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
+                raise _no_answer(self._address or "this machine", reason) from error
+        self._names: dict[Any, str] = {}
+        # On the node of this program, because other nodes may be lost.
+        here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=False)
+        board = _ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=here)(_Board)
+        self._board: Any = board.remote()
+        self._perform: Any = _ray.remote(num_cpus=1, max_retries=0)(_perform)
 
-    def _connect(self) -> None:
-        if self._address not in (None, "auto", "local"):
-            _require_answer(str(self._address))
-        try:
-            _ray.init(address=self._address, logging_level="ERROR", log_to_driver=False)
-        except (ConnectionError, ValueError, RuntimeError, RayError) as error:
-            reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
-            raise _no_answer(self._address or "this machine", reason) from error
+    def _begin(self, job: Job) -> None:
+        task = self._perform.remote(job.function, job.arguments, job.name, self._board)
+        self._names[task] = job.name
+
+    def _events(self) -> Iterable[Event]:
+        done, _ = _ray.wait(list(self._names), timeout=_REPORT_EVERY_S)
+        # The board may be being restarted; a study goes on without progress.
+        with suppress(RayError):
+            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_ANSWER_S)
+            for name in found.keys() & set(self._names.values()):
+                yield name, "steps", found[name]
+        for task in done:
+            name = self._names.pop(task)
+            try:
+                failure: ShapechangerError | str | None = _ray.get(task)
+            except RayError as error:  # The worker or its node is gone.
+                yield name, "lost", type(error).__name__
+                continue
+            yield name, "ended" if failure is None else "failed", failure
+
+    def _close(self) -> None:
+        for task in self._names:
+            _ray.cancel(task, force=True)
+        if self._is_own:
+            _ray.shutdown()
 
 
 def _require_answer(address: str) -> None:
@@ -95,70 +119,6 @@ def _no_answer(address: str, reason: str) -> StudyError:
         f"Ray at {address} does not answer ({reason}): start it with `ray start --head`, or give "
         "the --address that it prints."
     )
-
-
-class _Session:
-    """The jobs that run on a cluster, and their steps."""
-
-    def __init__(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        self._on_progress = on_progress
-        self._schedule = JobSchedule(jobs)
-        self._running: dict[Any, Job] = {}
-        self._steps: dict[str, int] = {}
-        self._board: Any = _new_board()
-        self._perform: Any = _ray.remote(num_cpus=1, max_retries=0)(_perform)
-
-    def run(self) -> None:
-        """Run until every job has ended or cannot start."""
-        try:
-            while self._start_ready() or self._running:
-                done, _ = _ray.wait(list(self._running), timeout=_REPORT_EVERY_S)
-                self._report()
-                for task in done:
-                    self._finish(self._running.pop(task), task)
-        except BaseException:
-            for task in self._running:
-                _ray.cancel(task, force=True)
-            raise
-        self._schedule.require_success()
-
-    def _start_ready(self) -> bool:
-        """Start the jobs whose dependencies have ended; return whether there were any."""
-        ready = self._schedule.start()
-        for job in ready:
-            self._steps[job.name] = 0
-            task = self._perform.remote(job.function, job.arguments, job.name, self._board)
-            self._running[task] = job
-        return bool(ready)
-
-    def _finish(self, job: Job, task: Any) -> None:
-        try:
-            failure: ShapechangerError | str | None = _ray.get(task)
-        except RayError as error:  # The worker or its node is gone.
-            self._schedule.lose(job, type(error).__name__)
-            return
-        if failure is not None:
-            self._schedule.fail(job, failure)
-            return
-        self._schedule.end(job)
-        self._on_progress(job.name, self._steps[job.name], True)
-
-    def _report(self) -> None:
-        try:
-            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_ANSWER_S)
-        except RayError:  # The board is being restarted; a study goes on without progress.
-            return
-        running = {job.name for job in self._running.values()}
-        for name, steps in found.items():
-            if name in running and steps != self._steps[name]:
-                self._steps[name] = steps
-                self._on_progress(name, steps, False)
-
-
-def _new_board() -> Any:
-    """Start the board on the node of this program, because other nodes may be lost."""
-    here = NodeAffinitySchedulingStrategy(_ray.get_runtime_context().get_node_id(), soft=False)
-    return _ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=here)(_Board).remote()
 
 
 class _Board:

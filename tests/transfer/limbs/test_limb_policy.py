@@ -22,7 +22,7 @@ from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import fitted, limb_envs
 from shapechanger.transfer.limbs.learner import LimbLearner
 from shapechanger.transfer.limbs.policy import LimbPolicy
-from shapechanger.transfer.methods import generalist
+from shapechanger.transfer.methods import basic
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
@@ -203,7 +203,7 @@ def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
 
 def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The generalist is evaluated before the first target step, and then learns there."""
-    monkeypatch.setattr(generalist, "BODIES", 4)
+    monkeypatch.setattr(basic, "BODIES", 4)
     short = {"max_episode_steps": 20}
     task = TransferTask(ANT.having(short), EXTENDED.having(short))
     plan = make_plan(

@@ -17,10 +17,9 @@ from shapechanger.policy import load_policy
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.methods import kickstart
-from shapechanger.transfer.methods.evolution import bodies_between
-from shapechanger.transfer.methods.kickstart import MappedTeacher
-from shapechanger.transfer.methods.shuffled_map import shuffle
+from shapechanger.transfer.methods import on_policy
+from shapechanger.transfer.methods.basic import bodies_between, shuffle
+from shapechanger.transfer.methods.on_policy import MappedTeacher
 from shapechanger.transfer.plan import Run, TransferTask
 from shapechanger.transfer.study import Study, run_study
 from tests.transfer.studies import BIG, SMALL, TINY, TINY_NORMALISED, tiny_plan
@@ -76,11 +75,11 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
         TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
     )
     plan = tiny_plan(settings, arms=("scratch", "kickstart"), steps=512, source_steps=512)
-    monkeypatch.setattr(kickstart, "_UNTIL", 1e9)  # Weights are kept.
+    monkeypatch.setattr(on_policy, "_UNTIL", 1e9)  # Weights are kept.
     observations = np.random.default_rng(0).normal(0.0, 0.1, (200, 4))
     away: list[float] = []
     for weight in (0.0, 1.0):
-        monkeypatch.setattr(kickstart, "_WEIGHT", weight)
+        monkeypatch.setattr(on_policy, "_WEIGHT", weight)
         out = tmp_path / f"weight-{weight:g}"
         run_study(plan, out, executor=Serial())
 

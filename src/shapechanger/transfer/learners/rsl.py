@@ -12,33 +12,27 @@ are the same as for other learners.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from typing import Any, Final, cast
 
+import gymnasium as gym
 import numpy as np
 
-from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.registry import MAKERS
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
-from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.identities import identities_in
-from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.algorithms import SpacesOnly
-from shapechanger.transfer.learners.evaluation import (
-    EVALUATION_SEED,
-    Evaluation,
-    evaluate,
-)
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
-from shapechanger.transfer.learners.sb3 import Sb3Learner, statistics_of
+from shapechanger.transfer.learners.sb3 import Progress, Sb3Learner
 
 try:
     import torch
     from rsl_rl.algorithms import PPO
-    from rsl_rl.env import VecEnv
+    from rsl_rl.env import VecEnv as RslEnvs
     from rsl_rl.models import MLPModel
     from rsl_rl.storage import RolloutStorage
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecNormalize
     from tensordict import TensorDict
     from torch import Tensor
 except ImportError as error:
@@ -53,7 +47,7 @@ _ADAMS_EPSILON: Final = 1e-5
 _CLIPPED_REWARD: Final = 10.0
 
 
-class RslVecEnv(VecEnv):
+class RslVecEnv(RslEnvs):
     """Worlds of `shapechanger.make_vec(backend="warp")` as rsl-rl's learners take them.
 
     Observations are in the group `policy`. A world whose episode has ended starts again in the same
@@ -139,72 +133,43 @@ class RslLearner(Sb3Learner):
         device = self.settings.device or ("cuda" if torch.cuda.is_available() else "cpu")
         return "CPU" if device == "cpu" else torch.cuda.get_device_name(device)
 
-    def train(
+    def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
+        """Return an env for the model and its statistics; its worlds are made in `_learn`."""
+        del env
+        spaces = SpacesOnly(one.observation_space, one.action_space)
+        return DummyVecEnv([lambda: spaces])
+
+    def _learn(
         self,
         env: EnvRef,
+        model: Any,
+        envs: VecEnv,
         steps: int,
-        seed: int,
-        *,
-        start: TrainedPolicy | None = None,
-        body_map: BodyMap | None = None,
-        on_evaluation: Callable[[Evaluation], None] = ignore,
-        on_steps: Callable[[int], None] = lambda steps: None,
-        callback: Any = None,
-    ) -> TrainedPolicy:
-        """Train a policy, evaluating it before the first step, along the way, and at the end."""
-        if callback is not None:
+        callbacks: list[BaseCallback],
+        progress: Progress,
+    ) -> None:
+        if callbacks:
             raise StudyError(f"{self.name} takes no callback of Stable-Baselines3.")
-        settings = self.settings
-        settings.require_budget(steps)
         made, rows = self._worlds(env)
         worlds = MAKERS.load("make_vec")(
             made.id,
-            settings.n_envs,
+            self.settings.n_envs,
             backend="warp",
-            device=settings.device or None,
+            device=self.settings.device or None,
             task_infos=False,
             **made.kwargs,
         )
-        eval_envs = self.evaluation_envs(env)
-        try:
-            one: Any = eval_envs[0]
-            identity = identities_in(env, one, settings)
-            layouts = layouts_of(one)
-            spaces = SpacesOnly(one.observation_space, learners_space(one.action_space))
-            envs: Any = self._with_statistics(DummyVecEnv([lambda: spaces]))
-            single = settings.for_one_env()
-            # Stable-Baselines3 leaves out types.
-            model: Any
-            model, explores = self._first_model(
-                envs, single, seed, start, body_map, env, layouts[0]
-            )
-            training = self._begin(worlds, seed, rows, model, envs)
-
-            def evaluated(done: int) -> None:
-                self.require_finite(model)
-                act = actor(model, statistics_of(envs), layouts[1])
-                episodes = settings.eval_episodes
-                on_evaluation(evaluate(act, eval_envs, EVALUATION_SEED, done, episodes=episodes))
-
-            whole, done = settings.whole_updates(steps), 0
-            following = np.inf if on_evaluation is ignore else settings.eval_every
-            if on_evaluation is not ignore:
-                evaluated(0)
-            while done < whole:
-                training.update(done, on_steps)
-                done += settings.update_steps
-                if following <= done < whole:
+        with closing(worlds):
+            training = self._begin(worlds, model.seed, rows, model, envs)
+            following = progress.every
+            while model.num_timesteps < steps:
+                training.update(model.num_timesteps, progress.on_steps)
+                model.num_timesteps += self.settings.update_steps
+                if following <= model.num_timesteps < steps:
                     training.write_back()
-                    evaluated(done)
-                    following += settings.eval_every
+                    progress.evaluate_now()
+                    following += progress.every
             training.write_back()
-            evaluated(done)
-            model.num_timesteps = done
-            return self._trained(model, envs, env, layouts, settings, seed, identity, explores)
-        finally:
-            worlds.close()
-            for one in eval_envs:
-                one.close()
 
     def _worlds(self, env: EnvRef) -> tuple[EnvRef, Any]:
         """Return the envs of all worlds as one, and the rows of each body; None without limbs."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, cast
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 
 from shapechanger.contract.env_ref import (
@@ -16,9 +18,7 @@ from shapechanger.contract.env_ref import (
     is_single_instance,
     layouts_of,
 )
-from shapechanger.errors import MissingExtra, PolicyError, SpaceMismatch, StudyError
-from shapechanger.identity import Identity
-from shapechanger.layout import Layout
+from shapechanger.errors import MissingExtra, PolicyError, StudyError
 from shapechanger.policy import PolicyCard, load_policy
 from shapechanger.transfer.actions import require_ranges
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
@@ -48,8 +48,6 @@ except ImportError as error:
 
 OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
-# Evaluates a model with the statistics of its envs, after so many steps.
-_Evaluate = Callable[[BaseAlgorithm, VecEnv, int], Evaluation]
 
 START_LOG_STD: Final = -1.0
 """Smallest logarithm of the standard deviation of an action, in half its range, at the start of
@@ -88,79 +86,72 @@ class Sb3Learner(Learner[Sb3Settings]):
         `steps` are rounded up to whole updates, `on_steps` is called after each step of all envs,
         and `callback` is one of Stable-Baselines3's for the training.
         """
-        settings = self.settings
-        settings.require_budget(steps)
-        # These import the module of the id, if it names one.
-        eval_envs = self.evaluation_envs(env)
-        identity = identities_in(env, eval_envs[0], settings)
-        if single := is_single_instance(eval_envs[0]):
-            # It is trained in the env that it is evaluated in.
-            settings = settings.for_one_env()
-            together: VecEnv = DummyVecEnv([lambda: eval_envs[0]])
-        else:
-            together = self._training_envs(env)
-        layouts = layouts_of(eval_envs[0])
-        episodes = settings.eval_episodes
-        first_seed = evaluation_seed(env, episodes)
-
-        def evaluate_model(model: BaseAlgorithm, envs: VecEnv, steps: int) -> Evaluation:
-            act = actor(model, statistics_of(envs), layouts[1])
-            return evaluate(act, eval_envs, first_seed, steps, episodes=episodes)
-
-        try:
-            scaled = with_scaled_actions(together, layouts[1], env.id)
-        except SpaceMismatch:
-            together.close()
-            raise
-        envs = self._with_statistics(VecMonitor(scaled))
-        try:
-            model, explores = self._first_model(
-                envs, settings, seed, start, body_map, env, layouts[0]
+        self.settings.require_budget(steps)
+        with ExitStack() as stack:
+            # These import the module of the id, if it names one.
+            eval_envs = self.evaluation_envs(env)
+            for each in eval_envs:
+                stack.callback(each.close)
+            one = eval_envs[0]
+            # A single instance is trained in the env that it is evaluated in.
+            is_single = is_single_instance(one)
+            settings = self.settings.for_one_env() if is_single else self.settings
+            observation, action = layouts_of(one)
+            card = PolicyCard(
+                env=env,
+                observation=observation,
+                action=action,
+                learner=self.name,
+                settings=settings,
+                seed=seed,
+                identity=identities_in(env, one, settings),
             )
-            evaluations = _PeriodicEvaluation(self, evaluate_model, single, on_evaluation, on_steps)
+            together = DummyVecEnv([lambda: one]) if is_single else self._training_envs(env, one)
+            stack.callback(together.close)
+            envs = self._with_statistics(VecMonitor(with_scaled_actions(together, action, env.id)))
+            model, explores = self._first_model(envs, card, start, body_map)
+            episodes = settings.eval_episodes
+            first_seed = evaluation_seed(env, episodes)
+
+            def evaluate_now() -> Evaluation:
+                self._require_finite(model)
+                act = actor(model, statistics_of(envs), action)
+                found = evaluate(act, eval_envs, first_seed, model.num_timesteps, episodes=episodes)
+                on_evaluation(found)
+                return found
+
+            # A third of the time of a finger's training is evaluation.
+            every = math.inf if on_evaluation is ignore else settings.eval_every
             # Before `learn`: it starts with a reset, which already changes the running statistics.
             if on_evaluation is not ignore:
-                on_evaluation(evaluate_model(model, envs, 0))
+                evaluate_now()
             callbacks: list[BaseCallback] = [] if callback is None else [callback]
             if start is not None and "off-policy" in settings.takes:
                 callbacks.append(_ActFirst(cast("Any", model).learning_starts))
-            callbacks.append(evaluations)
-            try:
-                cast("Any", model).learn(settings.whole_updates(steps), callback=callbacks)
-            except ValueError as error:  # PyTorch refuses distributions of NaN.
-                self.require_finite(model)
-                raise error
-            evaluations.evaluate_now()
-            return self._trained(model, envs, env, layouts, settings, seed, identity, explores)
-        finally:
-            envs.close()
-            for one in eval_envs:
-                one.close()
+            progress = Progress(evaluate_now, every, on_steps, restarts=is_single)
+            self._learn(env, model, envs, settings.whole_updates(steps), callbacks, progress)
+            evaluate_now()
+            card = msgspec.structs.replace(
+                card, steps=int(model.num_timesteps), start_log_std=explores
+            )
+            return TrainedPolicy(model, statistics_of(envs), card)
 
-    def _trained(
+    def _learn(
         self,
+        env: EnvRef,
         model: BaseAlgorithm,
         envs: VecEnv,
-        env: EnvRef,
-        layouts: tuple[Layout, Layout],
-        settings: Sb3Settings,
-        seed: int,
-        identity: dict[str, Identity],
-        explores: tuple[float, ...] | None,
-    ) -> TrainedPolicy:
-        """Return a trained model with its card and the statistics of its envs."""
-        card = PolicyCard(
-            env=env,
-            observation=layouts[0],
-            action=layouts[1],
-            learner=self.name,
-            settings=settings,
-            steps=int(model.num_timesteps),
-            seed=seed,
-            identity=identity,
-            start_log_std=explores,
-        )
-        return TrainedPolicy(model, statistics_of(envs), card)
+        steps: int,
+        callbacks: list[BaseCallback],
+        progress: Progress,
+    ) -> None:
+        """Train a model for whole updates in the envs that it was built with."""
+        del env, envs
+        try:
+            cast("Any", model).learn(steps, callback=[*callbacks, progress])
+        except ValueError as error:  # PyTorch refuses distributions of NaN.
+            self._require_finite(model)
+            raise error
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:
         """Evaluate a policy through the body map."""
@@ -193,8 +184,9 @@ class Sb3Learner(Learner[Sb3Settings]):
             )
         return card
 
-    def _training_envs(self, env: EnvRef) -> VecEnv:
-        """Make the parallel envs of a training."""
+    def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
+        """Make the parallel envs of a training; `one` is an env that evaluates."""
+        del one
         return training_vec_env(env, self.settings.n_envs, self.threads)
 
     def _adapted(
@@ -216,36 +208,33 @@ class Sb3Learner(Learner[Sb3Settings]):
     def _first_model(
         self,
         envs: VecEnv,
-        settings: Sb3Settings,
-        seed: int,
+        card: PolicyCard,
         start: TrainedPolicy | None,
         body_map: BodyMap | None,
-        env: EnvRef,
-        observation: Layout,
     ) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
-        """Return the model that a training begins with."""
+        """Return the model that a training begins with, and its `start_log_std`."""
+        settings: Any = card.settings
+        if "device" in settings.takes:
+            settings = settings.for_one_env()
         logs = None if self.tensorboard is None else str(self.tensorboard)
         if start is None or body_map is None:
-            return build_model(settings, envs, seed, logs), None
+            return build_model(settings, envs, card.seed, logs), None
         if start.normalisation is not None and isinstance(envs, VecNormalize):
             # The critic predicts rewards divided by these.
             envs.ret_rms = start.normalisation.reward.copy()
-        model = self._moved(envs, settings, seed, logs, start, body_map, env, observation)
+        model = self._moved(start, envs, settings, card, body_map, logs)
         return model, _explore(model, settings)
 
     def _moved(
         self,
+        source: TrainedPolicy,
         envs: VecEnv,
         settings: Sb3Settings,
-        seed: int,
-        tensorboard: str | None,
-        source: TrainedPolicy,
+        card: PolicyCard,
         body_map: BodyMap,
-        env: EnvRef,
-        observation: Layout,
+        logs: str | None,
     ) -> BaseAlgorithm:
         """The source policy in the target's shapes, with its statistics, ready for training."""
-        del env, observation
         arguments = dict(settings.model_arguments)
         arguments.pop("policy_kwargs", None)
         statistics = source.normalisation
@@ -254,13 +243,13 @@ class Sb3Learner(Learner[Sb3Settings]):
             body_map,
             envs,
             normalisation=None if statistics is None else statistics.observation,
-            seed=seed,
+            seed=card.seed,
             device="cpu",
-            tensorboard_log=tensorboard,
+            tensorboard_log=logs,
             **arguments,
         )
 
-    def require_finite(self, model: BaseAlgorithm) -> None:
+    def _require_finite(self, model: BaseAlgorithm) -> None:
         """Refuse a model whose weights are not all finite."""
         weights = cast("Any", model.policy).state_dict().values()
         if not all(torch.isfinite(one).all() for one in weights):
@@ -315,48 +304,49 @@ class _ActFirst(BaseCallback):
         return True
 
 
-class _PeriodicEvaluation(BaseCallback):
-    """Evaluates between updates, when the policy reflects all steps so far."""
+class Progress(BaseCallback):
+    """Counts steps, and evaluates between updates, when the policy reflects all steps so far.
+
+    Attributes:
+        evaluate_now: Evaluates and reports the present policy.
+        every: Steps between two evaluations.
+        on_steps: Called with the number of steps done.
+
+    Args:
+        evaluate_now: See the attribute.
+        every: See the attribute.
+        on_steps: See the attribute.
+        restarts: Whether an evaluation uses the training env, which then starts again.
+    """
 
     def __init__(
         self,
-        learner: Sb3Learner,
-        evaluate_model: _Evaluate,
-        single: bool,
-        on_evaluation: OnEvaluation,
+        evaluate_now: Callable[[], Evaluation],
+        every: float,
         on_steps: OnSteps,
+        *,
+        restarts: bool,
     ) -> None:
         super().__init__()
-        self._learner = learner
-        self._evaluate = evaluate_model
-        self._single = single
-        self._on_evaluation = on_evaluation
-        self._on_steps = on_steps
-        # A third of the time of a finger's training is evaluation.
-        self._next = math.inf if on_evaluation is ignore else learner.settings.eval_every
+        self.evaluate_now, self.every, self.on_steps = evaluate_now, every, on_steps
+        self._restarts = restarts
+        self._next = every
 
     def _on_step(self) -> bool:
-        self._on_steps(self.num_timesteps)
+        self.on_steps(self.num_timesteps)
         return True
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps >= self._next:
-            self.evaluate_now()
-            self._next += self._learner.settings.eval_every
-            if self._single:
-                # The evaluation has used the training env.
-                model = cast("Any", self.model)
-                model._last_obs = self.training_env.reset()
-                model._last_episode_starts = np.ones((self.training_env.num_envs,), bool)
-
-    def evaluate_now(self) -> None:
-        """Evaluate, log and report the current policy."""
-        self._learner.require_finite(self.model)
-        result = self._evaluate(self.model, self.training_env, self.num_timesteps)
-        self.logger.record("eval/mean_return", result.mean_return)
-        self.logger.record("eval/mean_length", result.mean_length)
-        if result.standing is not None:
-            self.logger.record("eval/standing", result.standing)
-        for name, value in result.terms.items():
+        if self.num_timesteps < self._next:
+            return
+        self._next += self.every
+        found = self.evaluate_now()
+        means = {"mean_return": found.mean_return, "mean_length": found.mean_length, **found.terms}
+        if found.standing is not None:
+            means["standing"] = found.standing
+        for name, value in means.items():
             self.logger.record(f"eval/{name}", value)
-        self._on_evaluation(result)
+        if self._restarts:
+            model = cast("Any", self.model)
+            model._last_obs = self.training_env.reset()
+            model._last_episode_starts = np.ones((self.training_env.num_envs,), bool)

@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from shapechanger.contract.env_ref import EnvRef, EnvTraits, each_body, layouts_of
 from shapechanger.errors import TransplantError
-from shapechanger.layout import Layout
+from shapechanger.policy import PolicyCard
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
@@ -41,7 +41,8 @@ class LimbLearner(Sb3Learner):
         """Make envs as rows, which have the bodies in turn."""
         return limb_envs(env, self.settings.eval_episodes, self.settings.room)
 
-    def _training_envs(self, env: EnvRef) -> VecEnv:
+    def _training_envs(self, env: EnvRef, one: gym.Env[Any, Any]) -> VecEnv:
+        del one
         settings = self.settings
         return LimbVecEnv(env, settings.n_envs, threads=self.threads, room=settings.room)
 
@@ -55,18 +56,16 @@ class LimbLearner(Sb3Learner):
 
     def _moved(
         self,
+        source: TrainedPolicy,
         envs: VecEnv,
         settings: Sb3Settings,
-        seed: int,
-        tensorboard: str | None,
-        source: TrainedPolicy,
+        card: PolicyCard,
         body_map: BodyMap,
-        env: EnvRef,
-        observation: Layout,
+        logs: str | None,
     ) -> BaseAlgorithm:
         del body_map
-        require_same_columns(source.card.layouts[0], observation, env.id)
-        model = build_model(settings, envs, seed, tensorboard)
+        require_same_columns(source.card.layouts[0], card.layouts[0], card.trained_in.id)
+        model = build_model(settings, envs, card.seed, logs)
         try:
             cast("Any", model.policy).load_state_dict(source.model.policy.state_dict())
         except RuntimeError as error:
