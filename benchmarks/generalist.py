@@ -30,8 +30,7 @@ from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.settings import LimbSettings
-from shapechanger.transfer.limbs.envs import fitted
-from shapechanger.transfer.limbs.learner import LimbLearner
+from shapechanger.transfer.limbs.envs import LimbLearner, fitted
 
 OUT: Final = Path("results", "generalist")
 RUNS: Final = Path("benchmarks", "results", "generalist-runs.json")

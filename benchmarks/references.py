@@ -202,8 +202,9 @@ def _floor(env: EnvRef) -> tuple[dict[str, dict[str, float]], list[str]]:
     try:
         measures = [measure.name for measure in measures_of(envs[0])]
         floor: dict[str, dict[str, float]] = {}
-        for label, draw in (("random actions", random_actions), ("the zero action", zero_actions)):
-            act = draw(envs[0].action_space, 0)
+        space = envs[0].action_space
+        acts = {"random actions": random_actions(space, 0), "the zero action": zero_actions(space)}
+        for label, act in acts.items():
             found = evaluate(act, envs, EVALUATION_SEED, episodes=EPISODES)
             floor[label] = {measure: found.value(measure) for measure in measures}
         return floor, measures

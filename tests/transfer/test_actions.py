@@ -87,14 +87,6 @@ def test_the_unit_of_an_actuator_does_not_change_learning(
         np.testing.assert_array_equal(other.model.action_space.high, [1.0])
 
 
-def test_a_range_that_is_not_symmetric_changes_only_rounding(tmp_path: Path) -> None:
-    _, curve = _trained(tmp_path, "ppo-balance", "share", _UNITS["share"])
-    policy, also = _trained(tmp_path, "ppo-balance", "bytes", _BYTES)
-    for mine, theirs in zip(curve, also, strict=True):
-        assert mine.mean_return == pytest.approx(theirs.mean_return, rel=1e-2)
-    assert 0.0 <= policy.act(np.zeros((1, 2)))[0, 0] <= 255.0
-
-
 @pytest.mark.parametrize("name", ["ppo-balance", "sac"])
 def test_a_policy_acts_in_the_units_of_the_env(tmp_path: Path, name: str) -> None:
     """Loaded from a file and exported as ONNX too."""

@@ -12,19 +12,18 @@ import pytest
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.files import from_builtins
 from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
+from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from shapechanger.vehicles import cloning
 from shapechanger.vehicles.cloning import CloneLearner, CloningSettings, record_demonstrations
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
-from tests.transfer.studies import BIG, curves
+from tests.transfer.studies import BIG
 
 _FRAMING = TINY_CLONING.clone.framing
 _LEARNER = CloneLearner("cloning", TINY_CLONING)
@@ -89,20 +88,6 @@ def test_a_clone_improves_with_each_budget(tmp_path: Path) -> None:
     assert [one.steps for one in found] == [0, 30, 60, 120]
     assert found[-1].mean_return > found[0].mean_return + 2.0
     assert set(found[-1].terms) == {"reward_middle", "reward_speed"}
-    assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
-
-
-def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
-    _, found = _cloned(tmp_path, 60)
-    _, last = _cloned(tmp_path, 60, only_last=True)
-    assert [one.steps for one in last] == [0, 60]
-    assert last[-1].mean_return == found[-1].mean_return
-
-
-def test_a_clone_can_start_from_another(tmp_path: Path) -> None:
-    policy, found = _cloned(tmp_path)
-    _, tuned = _cloned(tmp_path, 30, start=policy)
-    assert tuned[0].mean_return == found[-1].mean_return
     assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
 
 
@@ -185,24 +170,6 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
     assert again == study.of("scratch")[0].curve[-1].mean_return
 
 
-def test_a_study_that_was_killed_ends_with_the_same_numbers(
-    finished: tuple[Study, Path], tmp_path: Path
-) -> None:
-    study, out = finished
-    cut = tmp_path / "cut"
-    shutil.copytree(out, cut)
-    (cut / STUDY_FILE).unlink()
-    for name in ("scratch-1", "source-1", "fine-tune-1"):
-        (cut / "runs" / name / "run.json").unlink()
-    (cut / "runs" / "scratch-1" / "curve.jsonl").write_text("half a li")
-    (cut / "demonstrations" / "scratch-1.npz").unlink()
-    (cut / "demonstrations" / ".scratch-1.7.npz").write_bytes(b"half a pict")
-    kept = (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
-    resumed = run_study(_plan(), cut, executor=Serial())
-    assert curves(resumed) == curves(study)
-    assert (cut / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns == kept
-
-
 def test_settings_that_contradict_themselves_are_refused() -> None:
     """Budgets must grow, and episodes have at least one step."""
     for budgets in ((), (0, 5), (5, 5), (10, 5)):
@@ -217,17 +184,6 @@ def test_steps_are_rounded_up_to_a_budget() -> None:
     rounded = [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)]
     assert rounded == [30, 30, 60, 120, 120]
     assert (TINY_CLONING.steps, TINY_CLONING.eval_every) == (120, 30)
-
-
-def test_the_learner_is_found_by_name() -> None:
-    """The learner's settings round trip through the JSON of a plan."""
-    settings = learner_settings("cloning")
-    assert isinstance(settings, CloningSettings)
-    assert settings is LEARNERS["cloning"]
-    plan = _plan()
-    again = msgspec.json.decode(msgspec.json.encode(plan), type=Plan, dec_hook=from_builtins)
-    assert again == plan
-    assert isinstance(again.settings, CloningSettings)
 
 
 @pytest.mark.parametrize("order", [1, -1])

@@ -11,7 +11,7 @@ import pytest
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.network import CameraPolicy
 from shapechanger.errors import PolicyError, SpaceMismatch, StudyError
-from shapechanger.policy import Framing, load_policy, save_policy
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -92,20 +92,6 @@ def test_a_clone_of_another_source_is_refused(clone_file: Path, source: EnvRef, 
 def test_ppo_refuses_a_clone(clone_file: Path) -> None:
     with pytest.raises(PolicyError, match=r"dry\.safetensors is a clone .* tiny cannot train"):
         tiny_plan(source_policy=clone_file)
-
-
-def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
-    with pytest.raises(PolicyError, match=r"pole\.safetensors was trained with tiny, and a clone"):
-        _plan(ppo_file)
-
-
-def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
-    framing = Framing(height=10, width=20, top=0.0)
-    settings = msgspec.structs.replace(
-        QUICK_CLONING, clone=msgspec.structs.replace(QUICK_CLONING.clone, framing=framing)
-    )
-    with pytest.raises(PolicyError, match=r"takes images of 12 x 20 .* and cloning 10 x 20"):
-        _plan(clone_file, settings=settings)
 
 
 def test_a_clone_of_recordings_is_refused(tmp_path: Path) -> None:

@@ -14,16 +14,14 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import MlpPolicy
 
-from shapechanger.errors import PolicyError, StudyError, UnknownName
+from shapechanger.errors import PolicyError, StudyError
 from shapechanger.policy import load_policy, save_policy
-from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.export import export_onnx
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import ImportedSettings, OffPolicySettings, Sb3Settings
-from shapechanger.transfer.study import run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
 HERE = __name__
@@ -180,14 +178,6 @@ def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
     )
 
 
-def test_a_study_of_sac(tmp_path: Path) -> None:
-    """A study of SAC with scratch, zero-shot and fine-tune."""
-    study = run_study(
-        tiny_plan(settings_of("sac"), steps=64, source_steps=32), tmp_path, executor=Serial()
-    )
-    assert len(study.of("fine-tune")) == 2
-
-
 def test_a_file_of_settings(tmp_path: Path) -> None:
     """A TOML file names a preset or an algorithm; `--set` takes precedence."""
     path = tmp_path / "mine.toml"
@@ -220,21 +210,9 @@ def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, message:
         resolve_learner(str(path), {})
 
 
-def test_a_missing_file_of_settings_is_refused() -> None:
-    with pytest.raises(UnknownName, match="sac"):
-        resolve_learner("none.toml", {})
-
-
 def test_a_function_that_builds_something_else_is_refused() -> None:
     with pytest.raises(StudyError, match="returned str"):
         trained(f"{HERE}:not_a_model")
-
-
-def test_arguments_refused_by_a_class_give_one_sentence() -> None:
-    _, settings = resolve_learner("stable_baselines3:A2C", {"learning_rate": "fast"})
-    assert isinstance(settings, ImportedSettings)
-    with pytest.raises(StudyError, match="A2C refuses its arguments"):
-        Sb3Learner("mine", settings).train(SMALL, 10_000, 0, on_evaluation=_ignore)
 
 
 def test_a_training_that_diverges_is_refused() -> None:

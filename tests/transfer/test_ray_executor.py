@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -141,11 +140,3 @@ def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Pa
 def test_an_address_that_does_not_answer_is_one_sentence(address: str, text: str) -> None:
     with pytest.raises(StudyError, match=re.escape(text)):
         RayCluster(address).run([], lambda *_: None)
-
-
-@pytest.mark.timeout(60)
-def test_what_listens_but_is_no_ray_is_one_sentence() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-        with pytest.raises(StudyError, match="does not answer"):
-            RayCluster(f"127.0.0.1:{port}").run([], lambda *_: None)

@@ -18,9 +18,7 @@ from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv
 from shapechanger.transfer.learners.settings import RslPpoSettings
-from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.runs import learner_of
-from shapechanger.transfer.study import make_plan
 
 PENDULUM = EnvRef("shapechanger/InvertedPendulum-v1")
 SETTINGS = RslPpoSettings(
@@ -61,13 +59,6 @@ def test_a_short_training_balances_longer(tmp_path: Path) -> None:
     assert learner.origin(path).steps == 2048
 
 
-def test_a_study_records_what_steps_its_worlds() -> None:
-    """Versions of the packages on the device count, like the CPU's."""
-    task = TransferTask(PENDULUM, PENDULUM)
-    plan = make_plan(task, "rsl-ppo", SETTINGS, seeds=2, steps=2048, source_steps=2048)
-    assert {"mujoco-warp", "warp-lang", "rsl-rl-lib"} < plan.versions.keys()
-
-
 def test_a_policy_of_any_number_of_worlds_is_loaded(tmp_path: Path) -> None:
     """A device steps more worlds than there may be envs of other learners."""
     few = msgspec.structs.replace(SETTINGS, n_steps=2, batch_size=16, eval_every=16)
@@ -95,15 +86,6 @@ def test_what_the_adapter_promises() -> None:
     assert observations["policy"].abs().max() <= 0.01
     envs.episode_length_buf = torch.tensor([1, 0, 0, 0])
     assert envs.step(actions)[2].tolist() == [True, False, False, False]
-
-
-def test_actions_are_moved_to_the_edge_of_the_space() -> None:
-    """As in Stable-Baselines3, an action of any size acts as the nearest one of the space."""
-    states = []
-    for size in (3.0, 1e6):
-        envs = RslVecEnv(worlds(), seed=0)
-        states.append(envs.step(torch.full((4, 1), size))[0]["policy"])
-    assert torch.equal(*states)
 
 
 def test_what_it_refuses() -> None:

@@ -96,16 +96,6 @@ def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
     assert any("whose finger_seed is the index of the seed" in text for text in caveats(made))
 
 
-def test_a_failed_study_keeps_finished_runs(
-    study: tuple[Study, Path, list[Any]],
-) -> None:
-    made, out, moved = study
-    before = len(moved)
-    again = run_study(made.plan, out, executor=Serial())
-    assert len(moved) == before
-    assert again.summaries == made.summaries
-
-
 def test_a_failed_evaluation_costs_no_training(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -149,12 +139,6 @@ def test_default_arms() -> None:
 def test_a_target_that_cannot_adapt_its_source_is_refused() -> None:
     with pytest.raises(StudyError, match=r"identified needs a target that can adapt"):
         tiny_plan(arms=("scratch", "identified"))
-
-
-def test_only_what_is_needed_is_trained() -> None:
-    """Without an arm that uses a source policy none is trained."""
-    plan = tiny_plan(task=TransferTask(FINGER, REAL_LIKE), arms=("scratch", "randomised"))
-    assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", "randomised"}
 
 
 def test_an_exclusive_env_is_used_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -69,34 +69,6 @@ def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> 
         assert unchanged.curve[0].mean_length == tuned.curve[0].mean_length
 
 
-def test_the_study_file_reads_back(finished: tuple[Study, Path]) -> None:
-    study, out = finished
-    assert read_json(out / STUDY_FILE, Study, "") == study
-    assert json.loads((out / STUDY_FILE).read_text())["command"] == "test"
-
-
-def test_curves_are_written_as_they_grow(finished: tuple[Study, Path]) -> None:
-    """Each evaluation is a line of the run's curve file."""
-    study, out = finished
-    lines = (out / "runs" / "scratch-0" / "curve.jsonl").read_text().splitlines()
-    assert [json.loads(line)["steps"] for line in lines] == [0, 32, 64, 96]
-    assert [json.loads(line)["mean_return"] for line in lines] == [
-        e.mean_return for e in study.of("scratch")[0].curve
-    ]
-
-
-def test_seeds_make_different_runs(finished: tuple[Study, Path]) -> None:
-    study, _ = finished
-    seeds = [result.seed for result in study.runs]
-    assert len(set(seeds)) == len(seeds)
-
-
-def test_studies_are_reproducible(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    again = run_study(tiny_plan(), tmp_path / "again", executor=Serial())
-    assert curves(again) == curves(finished[0])
-    assert again.summaries == finished[0].summaries
-
-
 def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], tmp_path: Path) -> None:
     study, out = finished
     cut = tmp_path / "cut"
@@ -177,10 +149,6 @@ def test_wrong_arguments_are_refused_before_anything_is_trained(
 ) -> None:
     with pytest.raises(kind, match=message):
         tiny_plan(**arguments)
-
-
-def test_a_reward_term_can_be_the_measure() -> None:
-    assert tiny_plan(measure="reward_survive").measure == "reward_survive"
 
 
 @pytest.mark.parametrize("differs", ["seed", "versions"])

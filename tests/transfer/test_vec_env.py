@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from shapechanger.contract.env_ref import EnvRef
@@ -57,19 +56,6 @@ def test_options_are_each_envs_own() -> None:
     require_same(ours.reset(), theirs.reset())
     require_same(ours.get_attr("body"), theirs.get_attr("body"))
     require_same(ours.reset()[1].shape, theirs.reset()[1].shape)
-    ours.close()
-    theirs.close()
-
-
-def test_envs_are_reached_one_by_one() -> None:
-    ours, theirs = _pair(_PENDULUM, 1)
-    for one in (ours, theirs):
-        one.set_attr("mood", "good", indices=[0, 2])
-        assert one.get_attr("mood", indices=2) == ["good"]
-        assert one.env_is_wrapped(TimeLimit) == [True] * 3
-        assert [len(state) for state in one.env_method("state_vector", indices=[1])] == [4]
-        assert one.render_mode is None
-    assert ours.metadata == theirs.metadata
     ours.close()
     theirs.close()
 

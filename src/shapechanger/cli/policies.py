@@ -241,7 +241,7 @@ class PoliciesConvert:
     """Required, because the zip holds pickled objects: give it only if you trust its author."""
 
     def run(self) -> None:
-        from shapechanger.transfer.learners.convert import convert_zip  # PyTorch.
+        from shapechanger.transfer.learners.policy_file import convert_zip  # PyTorch.
 
         if not self.trust:
             raise StudyError(

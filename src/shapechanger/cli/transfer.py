@@ -24,7 +24,12 @@ from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.report.study import write_study_report
-from shapechanger.transfer.report.verdict import Findings, findings
+from shapechanger.transfer.report.verdict import (
+    measure_rows,
+    other_arms,
+    verdict,
+    weak_individuals,
+)
 from shapechanger.transfer.study import (
     Study,
     default_arms,
@@ -177,9 +182,8 @@ class Transfer(TwoEnvs, StudyRuns):
             raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
         except OutputError as error:
             raise OutputError(f"{error} {_way_on(plan, out)}".rstrip()) from error
-        found = findings(study)
-        _print(found)
-        report = write_study_report(study, out, found)
+        _print(study)
+        report = write_study_report(study, out)
         say(f"\nwrote {out / 'study.json'} and {report}")
 
 
@@ -218,14 +222,12 @@ def _way_on(plan: Plan, out: Path) -> str:
     return f"Runs that had ended are kept in {out}; go on with: {command_line()}"
 
 
-def _print(found: Findings) -> None:
+def _print(study: Study) -> None:
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
-    for row in [row for row in found.measures if row.target != "undefined"]:
+    for row in [row for row in measure_rows(study) if row.target != "undefined"]:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
     print_table(table, _FILE_WIDTH)
-    say(f"\n{found.verdict}")
-    if found.other_arms:
-        say(found.other_arms)
-    for sentence in found.weak:
+    say(f"\n{verdict(study)}")
+    for sentence in filter(None, (other_arms(study), *weak_individuals(study))):
         say(sentence)

@@ -163,7 +163,6 @@ def _evaluate_unskilled(plan: Plan, run: Run, learner: Learner[Any]) -> Evaluati
         for env in envs:
             stack.callback(env.close)
         # Each run draws its own actions and its own starts.
-        seed = plan.seed_of(run)
-        draw = random_actions if run.kind == "random" else zero_actions
-        act = draw(envs[0].action_space, seed)
+        seed, space = plan.seed_of(run), envs[0].action_space
+        act = random_actions(space, seed) if run.kind == "random" else zero_actions(space)
         return evaluate(act, envs, seed, episodes=plan.settings.eval_episodes)

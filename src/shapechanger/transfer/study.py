@@ -32,7 +32,7 @@ from shapechanger.errors import (
 from shapechanger.files import make_folder, read_json, write_json
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
-from shapechanger.transfer.identities import Identities, known, require_same_env, steady
+from shapechanger.transfer.identities import known, require_same_env, steady
 from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
@@ -53,7 +53,6 @@ from shapechanger.transfer.versions import (
     changes_between,
     identities_of_code,
     keep_models,
-    require_versions,
 )
 
 STUDY_FILE: Final = "study.json"
@@ -267,15 +266,14 @@ def make_plan(
             "python": platform.python_version(),
             **{name: version_of(name) for name in (*_PACKAGES, *settings.packages)},
         },
-        identity=_identities(traits, settings, arms),
+        identity=known(
+            {
+                "source": traits.source.identified.identity,
+                "target": traits.target.identified.identity,
+            }
+        )
+        | identities_of_code(settings, arms),
     )
-
-
-def _identities(traits: TaskTraits, settings: LearnerSettings, arms: Sequence[str]) -> Identities:
-    """Return the versions of the two envs, the learner and the methods."""
-    found = {"source": traits.source.identified, "target": traits.target.identified}
-    envs = known({part: each.identity for part, each in found.items()})
-    return envs | identities_of_code(settings, arms)
 
 
 def _measure(env: EnvRef, target: EnvTraits, name: str) -> Measure:
@@ -331,9 +329,6 @@ def run_study(
         raise StudyError("The source policy is not the one that this study was planned with.")
     traits = inspect_task(plan.task) if traits is None else traits
     shift = traits.shift
-    remedy = "Restore it, or start again with another --out; nothing was changed."
-    present = _identities(traits, plan.settings, plan.arms)
-    require_versions(plan, plan.identity, present, remedy)
     claim_folder(plan, out)
     keep_models(out, traits.source.identified, traits.target.identified)
     jobs: list[Job] = []

@@ -107,12 +107,6 @@ def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
             write_atomic(file, each.numbers)
 
 
-def require_versions(wanted: Plan, parts: Identities, found: Identities, remedy: str) -> None:
-    """Refuse parts that differ from a plan's."""
-    if text := differences(wanted, parts, found):
-        raise ForeignStudy(f"What this study was planned with has changed. {text}. {remedy}")
-
-
 def differences(plan: Plan, old: Identities, new: Identities) -> str:
     """Return how parts of a plan differ, in words; empty if they do not."""
     titles = {"source": f"{plan.task.source}", "target": f"{plan.task.target}"}
@@ -137,5 +131,8 @@ def require_planned(plan: Plan, run: Run) -> None:
             # A robot is not connected to once more.
             is_robot = plan.exclusive and part == "target"
             found[part] = parts[part] if is_robot else identify(ref).identity
-    remedy = "Restore it and run the same command again, or start again with another --out."
-    require_versions(plan, parts, found, remedy)
+    if text := differences(plan, parts, found):
+        raise ForeignStudy(
+            f"What this study was planned with has changed. {text}. Restore it and run the same "
+            "command again, or start again with another --out."
+        )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
-import gymnasium as gym
 import msgspec
 import numpy as np
 import pytest
@@ -19,8 +18,7 @@ from shapechanger.transfer.export import export_limbs
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import LimbSettings
-from shapechanger.transfer.limbs.envs import fitted, limb_envs
-from shapechanger.transfer.limbs.learner import LimbLearner
+from shapechanger.transfer.limbs.envs import LimbLearner, fitted, limb_envs
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.methods import basic
 from shapechanger.transfer.plan import TransferTask
@@ -111,21 +109,6 @@ def test_probabilities_of_drawn_actions(policy: TrainedPolicy) -> None:
     np.testing.assert_allclose(predicted, policy.act(rows.numpy()))
 
 
-def test_training_changes_what_it_does() -> None:
-    """Two updates on many bodies move every layer of the network."""
-    before: dict[str, Any] = {}
-
-    def keep(evaluation: Evaluation) -> None:
-        del evaluation
-
-    learner = _learner(n_epochs=2)
-    trained = learner.train(FEW, 64, 0, on_evaluation=keep)
-    fresh = learner.train(FEW, 32, 0, on_evaluation=keep)
-    before = _net(fresh).state_dict()
-    for name, weights in _net(trained).state_dict().items():
-        assert not torch.equal(weights, before[name]), name
-
-
 def test_a_file_fits_any_body(policy: TrainedPolicy, tmp_path: Path) -> None:
     """A saved policy acts in an ant that has more limbs than any that it was trained in."""
     path = tmp_path / "ants.safetensors"
@@ -144,14 +127,6 @@ def test_a_file_fits_any_body(policy: TrainedPolicy, tmp_path: Path) -> None:
     assert found[0].steps == 0
     assert tuned.card.action.size == 12
     assert tuned.card.start_log_std is not None
-
-
-def test_a_file_of_bodies_that_differ_can_be_read(tmp_path: Path) -> None:
-    """The card has room for all bodies, also for those that no evaluation has met."""
-    some = ANT.having({"bodies": ["Ant", "ExtendedAnt"], "max_episode_steps": 20})
-    trained = _learner(eval_episodes=1).train(some, 32, 0, on_evaluation=lambda _: None)
-    save_policy(trained, tmp_path / "ants.safetensors")
-    assert load_policy(tmp_path / "ants.safetensors").card.action.size == 12
 
 
 def test_a_training_keeps_the_scale_of_its_rewards(policy: TrainedPolicy) -> None:
@@ -229,27 +204,6 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.M
     curve = study.of("generalist")[0].curve
     assert [evaluation.steps for evaluation in curve] == [0, 64]
     assert curve[0].mean_return != study.of("scratch")[0].curve[0].mean_return
-
-
-def test_a_generalist_needs_limbs_and_a_family() -> None:
-    """The arm is refused with other learners, and between families."""
-    settings = TINY
-    with pytest.raises(StudyError, match="generalist needs two bodies of one family"):
-        make_plan(
-            TransferTask(ANT, EnvRef("shapechanger/HalfCheetah-v1")),
-            "limbs",
-            settings,
-            seeds=2,
-            arms=("scratch", "generalist"),
-        )
-
-
-def test_the_env_of_a_policy_is_many_bodies() -> None:
-    envs = limb_envs(FEW, 3)
-    bodies = [env.unwrapped.spec.kwargs["body"] for env in envs]  # pyright: ignore[reportOptionalMemberAccess]
-    assert bodies[0] == bodies[2] != bodies[1]
-    assert len({env.observation_space.shape for env in envs}) == 1
-    assert isinstance(envs[0].action_space, gym.spaces.Box)
 
 
 def test_onnx_of_a_body_equals_pytorch(tmp_path: Path) -> None:

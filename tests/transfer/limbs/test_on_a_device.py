@@ -12,7 +12,6 @@ import torch
 
 import shapechanger
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.errors import StudyError, TransplantError, UnknownName
 from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
 from shapechanger.policy import load_policy, save_policy
@@ -29,10 +28,6 @@ ANT: Final = EnvRef("shapechanger/Ant-v1", {"max_episode_steps": 20})
 EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1", {"max_episode_steps": 20})
 # Bodies of 12 and of 8 limbs, whose observations have 137 and 105 numbers.
 BOTH: Final = ANT.having({"bodies": ["ExtendedAnt", "Ant"]})
-PENDULUMS: Final = EnvRef(
-    "shapechanger/InvertedPendulum-v1",
-    {"bodies": ["InvertedPendulum", "BigInvertedPendulum"]},
-)
 TINY: Final = RslLimbSettings(
     n_envs=3,
     n_steps=16,
@@ -181,19 +176,3 @@ def test_the_file_acts_in_an_unseen_body(policy: TrainedPolicy, tmp_path: Path) 
         expected = acting.rows.actions(loaded.act(acting.rows.of(observation[None])))
     exported = load_policy(tmp_path / "ant.onnx")
     np.testing.assert_allclose(exported.act(observation[None]), expected, atol=1e-5)
-
-
-def test_what_it_refuses(policy: TrainedPolicy) -> None:
-    """More bodies than worlds, other families, tasks and devices that are not there."""
-    with pytest.raises(StudyError, match=r"2 bodies need as many envs, .* --set n_envs=2"):
-        _learner(n_envs=1).train(BOTH, 48, 0, on_evaluation=print)
-    mixed = ANT.having({"bodies": ["Ant", "HalfCheetah"]})
-    with pytest.raises(UnknownName, match="No body of the family Ant matches 'HalfCheetah'"):
-        _learner().train(mixed, 48, 0, on_evaluation=print)
-    cheetah = EnvRef("shapechanger/HalfCheetah-v1")
-    with pytest.raises(TransplantError, match=r"of another family than .*HalfCheetah-v1"):
-        _learner().train(cheetah, 48, 0, start=policy, body_map=_NO_MAP, on_evaluation=print)
-    with pytest.raises(UnknownName, match=r"No device matches 'cuda:99'\. .*There are: cpu"):
-        _learner(device="cuda:99").train(BOTH, 48, 0, on_evaluation=print)
-    with pytest.raises(StudyError, match="or give the rows of each body's limbs"):
-        RslVecEnv(_worlds(["Ant", "ExtendedAnt"]).envs)

@@ -16,7 +16,6 @@ from shapechanger.errors import StudyError
 from shapechanger.policy import load_policy
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.methods import on_policy
 from shapechanger.transfer.methods.basic import bodies_between, shuffle
 from shapechanger.transfer.methods.on_policy import MappedTeacher
@@ -117,17 +116,6 @@ def test_intermediate_bodies_grow() -> None:
     np.testing.assert_allclose(lengths, [0.6, 0.9], rtol=1e-5)
 
 
-def test_intermediate_bodies_may_have_other_spaces() -> None:
-    (between,) = bodies_between(ANT, EXTENDED, 1)
-    made = between.make()
-    assert made.action_space.shape == (12,)
-    made.close()
-    (back,) = bodies_between(EXTENDED, ANT, 1)
-    made = back.make()
-    assert made.action_space.shape == (12,)
-    made.close()
-
-
 def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
     """Evolution from Ant to ExtendedAnt, with a rule for the new motors."""
     short = {"max_episode_steps": 20}
@@ -150,26 +138,6 @@ def test_bodies_of_two_families_are_refused() -> None:
     task = TransferTask(finger, finger.having({"gap": "real-like"}))
     with pytest.raises(StudyError, match="evolution needs two bodies of one family"):
         tiny_plan(task=task, arms=("scratch", "evolution"))
-
-
-@pytest.mark.parametrize(
-    ("arm", "needs"),
-    [
-        ("frozen-trunk", "PPO"),
-        ("kickstart", "PPO"),
-        ("evolution", "a learner of Stable-Baselines3"),
-    ],
-)
-def test_clones_are_refused(arm: str, needs: str) -> None:
-    """Methods for Stable-Baselines3 refuse cloning when the study is planned."""
-    cars = TransferTask(EnvRef("shapechanger/Car-v1"), EnvRef("shapechanger/Tank-v1"))
-    with pytest.raises(StudyError, match=f"{arm} needs {needs}"):
-        tiny_plan(learner_settings("cloning"), task=cars, arms=("scratch", arm))  # type: ignore[arg-type]
-
-
-def test_learners_by_trial_are_refused() -> None:
-    with pytest.raises(StudyError, match="rehearsal needs a learner that clones demonstrations"):
-        tiny_plan(TINY, arms=("scratch", "rehearsal"))
 
 
 def test_a_network_without_a_trunk_is_refused() -> None:
@@ -195,14 +163,6 @@ def test_a_shuffled_map_has_the_same_rules() -> None:
         moved = sum(a.rule != b.rule for a, b in zip(ours, theirs, strict=True))
         assert moved > len(ours) // 2
     assert shuffle(right, np.random.default_rng(0)) == wrong
-
-
-def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) -> None:
-    made, _ = study
-    plan = tiny_plan(_DEEP, arms=("scratch", "shuffled-map"), steps=32, source_steps=32)
-    shuffled = run_study(plan, tmp_path / "study", executor=Serial())
-    start = shuffled.of("shuffled-map")[0].curve[0]
-    assert start.mean_return != made.of("fine-tune")[0].curve[0].mean_return
 
 
 def test_a_randomised_source_draws_intermediate_bodies(tmp_path: Path) -> None:

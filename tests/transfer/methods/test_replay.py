@@ -25,7 +25,7 @@ from shapechanger.transfer.methods.replay import (
 )
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import run_study
-from tests.transfer.studies import SMALL, TINY, tiny_plan
+from tests.transfer.studies import SMALL, tiny_plan
 from tests.transfer.test_learners import SHORT
 
 
@@ -105,12 +105,6 @@ def test_mapped_transitions_are_those_of_the_target() -> None:
         np.testing.assert_array_equal(
             theirs.observations[:, sees.slices[name]], ours.observations[:, seen.slices[name]]
         )
-
-
-@pytest.mark.parametrize("arm", ["prefilled-replay", "off-dynamics"])
-def test_learners_without_a_replay_buffer_are_refused(arm: str) -> None:
-    with pytest.raises(StudyError, match=f"{arm} needs a learner with a replay buffer"):
-        tiny_plan(TINY, arms=("scratch", arm))
 
 
 def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:

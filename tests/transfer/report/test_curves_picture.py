@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -39,14 +38,6 @@ def test_drawings_are_reproducible(study: Study) -> None:
     assert drawing == learning_curves(study, "target")["target"]
     assert "<dc:date>" not in drawing
     assert "<metadata>" not in drawing
-
-
-def test_matplotlib_settings_are_ignored(study: Study) -> None:
-    """The user's rcParams neither affect the drawing nor change."""
-    plain = learning_curves(study, "target")
-    with mpl.rc_context({"lines.linewidth": 9.0, "axes.facecolor": "black", "font.size": 4.0}):
-        assert learning_curves(study, "target") == plain
-        assert mpl.rcParams["font.size"] == 4.0
 
 
 @pytest.mark.parametrize("name", STUDIES)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from shapechanger.reports.numbers import (
-    count,
     interval_text,
     list_text,
     number,
@@ -40,10 +39,6 @@ def test_the_sign_is_that_of_the_rounded_number() -> None:
     assert number(0.001, 2, signed=True) == "0.00"
     assert number(-0.001, 2, signed=True) == "0.00"
     assert number(2e11, signed=True) == "+2.000e11"
-
-
-def test_steps_are_whole() -> None:
-    assert count(12_345.4) == "12,345"
 
 
 @pytest.mark.parametrize(

@@ -50,15 +50,6 @@ def test_every_pair_has_a_cell(page: str) -> None:
     assert reader.headings[1] == "Fine-tune against scratch"
 
 
-def test_colours_follow_the_gain(page: str) -> None:
-    """Gains are blue and losses orange, both light enough for text."""
-    colours = [part.partition('"')[0] for part in page.split('style="background: #')[1:]]
-    assert len(colours) == 6
-    parts = [tuple(int(colour[i : i + 2], 16) for i in (0, 2, 4)) for colour in colours]
-    assert sum(red > blue for red, _, blue in parts) == 1
-    assert all(sum(part) > 300 for part in parts)
-
-
 def test_methods_are_compared_by_target_and_over_all(page: str) -> None:
     """The page has interquartile means and probabilities of improvement, with intervals."""
     words = Reader(page).words
@@ -126,12 +117,6 @@ def test_names_are_escaped() -> None:
         suite_html("none", {}, seeds=5)
 
 
-def test_arms_of_some_studies_are_listed(pairs: Mapping[str, Study]) -> None:
-    fewer = make_study(source=ANTS[0], target=ANTS[1], arms=("scratch", "fine-tune"))
-    studies = {**pairs, "Ant-to-BigAnt": fewer}
-    assert "only in 5 of 6 studies" in Reader(suite_html("ants", studies, seeds=5)).words
-
-
 def test_without_learning_there_are_no_scores() -> None:
     """The table is empty, and the verdict counts the study as showing nothing."""
     flat = rising(0.0, 0.0, 1e3, noise=0.0)
@@ -142,19 +127,3 @@ def test_without_learning_there_are_no_scores() -> None:
     }
     words = Reader(suite_html("flat", studies, seeds=5)).words
     assert "1 show nothing" in words
-
-
-def test_missing_pairs_are_marked(pairs: Mapping[str, Study]) -> None:
-    studies = {name: study for name, study in pairs.items() if name != "Ant-to-BigAnt"}
-    words = Reader(suite_html("ants", studies, seeds=5)).words
-    assert words.count("not run") == 1
-    assert words.count("same body") == 3
-
-
-def test_flags_are_not_part_of_a_name() -> None:
-    """Arguments such as `put_back` are left out of the names of envs."""
-    source, target = (EnvRef(env.id, {"put_back": True}) for env in ANTS[:2])
-    page = suite_html("ants", {"Ant-to-BigAnt": make_study(source=source, target=target)}, seeds=5)
-    words = Reader(page).words
-    assert "BigAnt" in words
-    assert "BigAnt True" not in words

@@ -90,10 +90,6 @@ def test_seeds_without_spread_are_not_called_unclear() -> None:
     )
 
 
-def test_a_flat_study_says_nothing_of_its_arms() -> None:
-    assert other_arms(make_study(scratch=FLAT, fine_tune=FLAT, zero_shot=FLAT[:, :1])) == ""
-
-
 def test_a_study_is_flat_only_if_no_arm_learns() -> None:
     low = rising(0.0, 1.0, 3000.0, noise=0.1)
     assert not is_flat(make_study(scratch=low))

@@ -192,9 +192,8 @@ def random_actions(space: gym.Space[Any], seed: int) -> Act:
     return lambda observations: np.stack([space.sample() for _ in observations])
 
 
-def zero_actions(space: gym.Space[Any], seed: int) -> Act:
-    """Return a policy that always takes the action nearest to zero; `seed` is not used."""
-    del seed
+def zero_actions(space: gym.Space[Any]) -> Act:
+    """Return a policy that always takes the action nearest to zero."""
     box = cast("gym.spaces.Box", space)
     action = np.clip(np.zeros(box.shape, box.dtype), box.low, box.high)
     return lambda observations: np.stack([action] * len(observations))

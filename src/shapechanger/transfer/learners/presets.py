@@ -26,6 +26,19 @@ def _tables() -> dict[str, dict[str, Any]]:
     return tomllib.loads(Path(__file__).with_name("presets.toml").read_text("utf-8"))
 
 
+class _Presets(Mapping[str, LearnerSettings]):
+    """Shipped settings, keyed by name; each is read when it is asked for."""
+
+    def __getitem__(self, name: str) -> LearnerSettings:
+        return _preset(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_tables())
+
+    def __len__(self) -> int:
+        return len(_tables())
+
+
 @cache
 def _preset(name: str) -> LearnerSettings:
     table = _tables()[name]
@@ -34,21 +47,6 @@ def _preset(name: str) -> LearnerSettings:
         table = {**_tables()[like], **{n: v for n, v in table.items() if n != "like"}}
     values = {key: value for key, value in table.items() if key not in _ABOUT}
     return _converted(name, KINDS.load(table["kind"]), values)
-
-
-class _Presets(Mapping[str, LearnerSettings]):
-    """Shipped settings, keyed by name; each is read on first access."""
-
-    def __getitem__(self, name: str) -> LearnerSettings:
-        if name not in _tables():
-            raise KeyError(name)
-        return _preset(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_tables())
-
-    def __len__(self) -> int:
-        return len(_tables())
 
 
 LEARNERS: Final[Mapping[str, LearnerSettings]] = _Presets()

@@ -142,7 +142,7 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
     room: int = 0
 
     takes = frozenset[Takes]({"trial", "callback", "many bodies"})
-    learner = "shapechanger.transfer.limbs.learner:LimbLearner"
+    learner = "shapechanger.transfer.limbs.envs:LimbLearner"
     policy_class = "shapechanger.transfer.limbs.policy:LimbPolicy"
     _ours = (*PpoSettings._ours, "network", "room")
 

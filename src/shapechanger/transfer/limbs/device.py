@@ -18,8 +18,7 @@ from torch import Tensor, nn
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.rsl import GROUP, RslLearner, RslTraining, RslVecEnv
-from shapechanger.transfer.limbs.envs import bodies_in_turn, together
-from shapechanger.transfer.limbs.learner import LimbLearner
+from shapechanger.transfer.limbs.envs import LimbLearner, bodies_in_turn, together
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.limbs.rows import LimbRows
 
@@ -43,7 +42,7 @@ class DeviceRows:
     def of(self, observations: Any) -> Tensor:
         """Return the rows of all worlds, flattened, shape (n, (room + 1) * width)."""
         parts = [
-            rows.unrounded(observations[i] if self._apart else observations[numbers])
+            rows.of(observations[i] if self._apart else observations[numbers])
             for i, (numbers, rows) in enumerate(self._batches)
         ]
         return self._gathered(parts)
@@ -54,7 +53,7 @@ class DeviceRows:
         Args:
             limbs: A number from -1 to 1 for each limb, shape (n, room).
         """
-        parts = [rows.unrounded_actions(limbs[numbers]) for numbers, rows in self._batches]
+        parts = [rows.actions(limbs[numbers]) for numbers, rows in self._batches]
         return parts if self._apart else self._gathered(parts)
 
     def _gathered(self, parts: list[Tensor]) -> Tensor:

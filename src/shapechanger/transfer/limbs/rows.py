@@ -70,36 +70,28 @@ class LimbRows:
     low: _Floats
     high: _Floats
 
-    def of(self, observation: NDArray[Any]) -> NDArray[np.float32]:
+    def of(self, observation: Any) -> Any:
         """Return the rows of observations.
 
         Args:
-            observation: Shape (..., observations).
+            observation: Shape (..., observations); a tensor if the arrays are tensors of a device.
 
         Returns:
-            Shape (..., (room + 1) * width).
+            Shape (..., (room + 1) * width): float32, or a tensor.
         """
-        return self.unrounded(observation).astype(np.float32)
+        return _single((observation * self.scale + self.offset) @ self.selection + self.constant)
 
-    def unrounded(self, observation: Any) -> Any:
-        """Return the same in the precision of the arrays, which may be tensors of a device."""
-        return (observation * self.scale + self.offset) @ self.selection + self.constant
-
-    def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
+    def actions(self, limbs: Any) -> Any:
         """Return a body's own actions.
 
         Args:
             limbs: A number from -1 to 1 for each limb, shape (..., room).
 
         Returns:
-            Shape (..., actions).
+            Shape (..., actions): float32, or a tensor.
         """
-        return self.unrounded_actions(limbs).astype(np.float32)
-
-    def unrounded_actions(self, limbs: Any) -> Any:
-        """Return the same in the precision of the arrays."""
         share = 0.5 * (limbs[..., self.actuators] + 1.0)
-        return self.low + share * (self.high - self.low)
+        return _single(self.low + share * (self.high - self.low))
 
     @staticmethod
     def stacked(each: Sequence[LimbRows]) -> LimbRows:
@@ -134,6 +126,11 @@ class LimbRows:
             features += [Feature(f"{name}: {kind}", "1", element=element) for kind in own]
         actions = [Feature(f"{name}: action", "1", -1.0, 1.0) for name in names[1:]]
         return Layout(tuple(features)), Layout(tuple(actions))
+
+
+def _single(numbers: Any) -> Any:
+    is_array = isinstance(numbers, np.ndarray)
+    return numbers.astype(np.float32) if is_array else numbers
 
 
 def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:

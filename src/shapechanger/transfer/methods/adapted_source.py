@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from contextlib import closing
-from typing import Any, Final
+from typing import Any
 
 from shapechanger.contract.env_ref import EnvTraits
 from shapechanger.files import write_json
 from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import Method, MethodRun
-
-# The env in the folder of the run.
-_SOURCE: Final = "source.json"
 
 
 class AdaptedSource(Method):
@@ -31,7 +28,7 @@ class AdaptedSource(Method):
             with closing(run.source.make()) as source, closing(run.target.make()) as target:
                 adapted = self.arguments(source.unwrapped, target.unwrapped, run.seed)
             env = run.source.having(adapted)
-            write_json(run.folder / _SOURCE, env)
+            write_json(run.folder / "source.json", env)
             policy = run.train(env, run.source_steps)
             run.save(policy)
         run.report(run.evaluate(policy))

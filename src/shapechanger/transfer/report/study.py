@@ -25,9 +25,14 @@ from shapechanger.transfer.report.verdict import (
     TIME_TO_THRESHOLD,
     TOTAL_REWARD_GAIN,
     ArmRow,
-    Findings,
     MeasureRow,
-    findings,
+    arm_rows,
+    caveats,
+    machine_text,
+    measure_rows,
+    other_arms,
+    verdict,
+    weak_individuals,
 )
 from shapechanger.transfer.study import Study
 
@@ -44,23 +49,21 @@ def study_html(
     study: Study,
     pictures: Pictures | None = None,
     picture_note: str = "",
-    found: Findings | None = None,
 ) -> str:
     """Render the report of a study."""
     from shapechanger.transfer.report.curves import learning_curves  # Matplotlib.
 
     plan = study.plan
-    found = findings(study) if found is None else found
-    measures, arms = found.measures, found.arms
+    measures, arms = measure_rows(study), arm_rows(study)
     summary = next(iter(study.summaries.values()))
     notes = list(dict.fromkeys(row.note for row in measures if _defined(row) and row.note))
     return render(
         Path(__file__).with_name("study.html"),
         title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
         plan=plan,
-        verdict=found.verdict,
-        other_arms=found.other_arms,
-        weak=found.weak,
+        verdict=verdict(study),
+        other_arms=other_arms(study),
+        weak=weak_individuals(study),
         headline_arm=study.headline_arm,
         cards=_cards(study, measures),
         bodies=_bodies(study, pictures) if pictures is not None else [],
@@ -71,7 +74,7 @@ def study_html(
         summary=summary,
         reference=summary.reference,
         number=number,
-        caveats=found.caveats,
+        caveats=caveats(study),
         good=f"{100.0 * GOOD:.0f} %",
         arms=[
             (
@@ -93,7 +96,7 @@ def study_html(
             for name, value in msgspec.structs.asdict(cast("Any", plan.settings)).items()
         ],
         command=study.command,
-        machine=found.machine,
+        machine=machine_text([study]),
         wall_time=_duration(sum(result.wall_s for result in study.runs)),
         runs=[
             (r.run.name, r.seed, count(r.curve[-1].steps), len(r.curve), _duration(r.wall_s))
@@ -102,7 +105,7 @@ def study_html(
     )
 
 
-def write_study_report(study: Study, out: Path, found: Findings | None = None) -> Path:
+def write_study_report(study: Study, out: Path) -> Path:
     """Write the report of a study, without images of the bodies if they cannot be rendered."""
     path = out / "report.html"
     pictures, note = None, ""
@@ -110,7 +113,7 @@ def write_study_report(study: Study, out: Path, found: Findings | None = None) -
         pictures = _pictures(study.plan.task.source, study.plan.task.target)
     except RenderError as error:
         note = str(error)
-    write_atomic(path, study_html(study, pictures, note, found).encode())
+    write_atomic(path, study_html(study, pictures, note).encode())
     return path
 
 
@@ -218,10 +221,9 @@ def _measure_table(arm: str, rows: tuple[MeasureRow, ...], notes: list[str]) -> 
 
 def _terms(arms: tuple[ArmRow, ...]) -> dict[str, Any]:
     """The reward terms of each kind of run; no rows if no env reports any."""
-    kinds = {"random": "random actions", "source": "source policy"}
     names = dict.fromkeys(name for row in arms for name in row.terms)
     return {
-        "header": ("Term", *(kinds.get(row.kind, row.kind) for row in arms)),
+        "header": ("Term", *(_ARMS.get(row.kind, row.kind).partition(",")[0] for row in arms)),
         "rows": [
             (
                 name.removeprefix("reward_"),

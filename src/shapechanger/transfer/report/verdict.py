@@ -58,31 +58,6 @@ class MeasureRow(NamedTuple):
     note: str
 
 
-class Findings(NamedTuple):
-    """All that a study has found, as text."""
-
-    verdict: str
-    other_arms: str
-    weak: list[str]
-    measures: tuple[MeasureRow, ...]
-    arms: tuple[ArmRow, ...]
-    caveats: tuple[str, ...]
-    machine: str
-
-
-def findings(study: Study) -> Findings:
-    """Return all that a study has found, as text."""
-    return Findings(
-        verdict(study),
-        other_arms(study),
-        weak_individuals(study),
-        measure_rows(study),
-        arm_rows(study),
-        caveats(study),
-        machine_text([study]),
-    )
-
-
 def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
     """Format every measure of every arm other than scratch, gains first."""
     rows: list[MeasureRow] = []
