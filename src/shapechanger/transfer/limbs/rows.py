@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import msgspec
@@ -129,8 +129,9 @@ class LimbRows:
 
 
 def _single(numbers: Any) -> Any:
-    is_array = isinstance(numbers, np.ndarray)
-    return numbers.astype(np.float32) if is_array else numbers
+    if not isinstance(numbers, np.ndarray):
+        return numbers
+    return cast("NDArray[Any]", numbers).astype(np.float32)
 
 
 def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
