@@ -388,5 +388,5 @@ def _auc(score: NDArray[np.floating], of: NDArray[np.bool_], against: NDArray[np
 
 def _pictures(data: Dataset) -> NDArray[np.uint8]:
     if data.pictures is None:
-        raise ValueError("The real frames have no pictures.")
+        raise ValueError("The real frames have no images.")
     return data.pictures

@@ -101,7 +101,7 @@ def write_atomic(path: Path, content: bytes, mode: int | None = None) -> None:
     Args:
         path: The file.
         content: Its new content.
-        mode: Its permissions from the start; None for those of the old one.
+        mode: Its permissions from the start; None for the permissions of the old file.
 
     Raises:
         OutputError: If it cannot be written.
@@ -171,7 +171,7 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
     Args:
         path: The file.
         kind: Type of the content.
-        remedy: What the user can do on failure, as the end of a sentence.
+        remedy: Advice for the user on failure, as the end of a sentence.
 
     Raises:
         CorruptStudy: If the file cannot be read or has other content.

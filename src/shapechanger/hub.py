@@ -154,7 +154,7 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         for name, about in listed.items():
             if sha256_of(folder / name) != about.sha256:
                 raise HubError(
-                    f"{name} of {repo} does not have the SHA-256 that {_LIST} says: it was changed."
+                    f"{name} of {repo} does not have the SHA-256 in {_LIST}: it was changed."
                 )
     return str(found.sha)
 
@@ -191,10 +191,10 @@ def _hub(repo: str, kind: Kind) -> Generator[Any]:
         raise
     except PermissionError as error:
         raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
-    except Exception as error:  # Of the transport, too, whose package differs between versions.
+    except Exception as error:  # Also errors of the transport, which depend on the version.
         code = getattr(getattr(error, "response", None), "status_code", 0)
         codes = {
-            401: f"The Hub wants to know who asks for {repo}: {_LOG_IN}.",
+            401: f"The Hub requires a login for {repo}: {_LOG_IN}.",
             403: f"The Hub forbids this for {repo}: use a token that may write to it.",
         }
         missing = (

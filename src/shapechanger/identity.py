@@ -1,4 +1,4 @@
-"""What an env, a method or a learner is made of: the model of its robot, and the user's own files.
+"""Identity of an env, a method or a learner: hashes of the robot's model and of the user's files.
 
 A study, a policy and a robot are known by names: an id, a path, `module:Name`. Those stay the same
 when a file is edited. Identities tell such versions apart, so that runs of two of them are never
@@ -29,7 +29,7 @@ from shapechanger.registry import MODELS
 if TYPE_CHECKING:
     import gymnasium as gym
 
-# Files that a compiled model holds the meaning of, comments left out.
+# Model files, which the fingerprint of the compiled model covers, without comments.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 _MOST_CHANGES: Final = 4  # Named in a message.
 _NAMED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
@@ -49,10 +49,10 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     Attributes:
         model: Fingerprint of its compiled model, see `shapechanger.morphology.certificate`; empty
             without one.
-        sensed: The same for parts that decide no motion and may be observed: sensors, keyframes,
-            sites and, where frames are observed, all that is drawn.
-        files: The first 16 hex digits of the SHA-256 of each own file that it needs, by its place
-            below the folder that it is imported from, or its name.
+        sensed: The same for parts that do not affect motion but may be observed: sensors,
+            keyframes, sites and, if frames are observed, all visible parts.
+        files: The first 16 hex digits of the SHA-256 of each user file that it needs, keyed by the
+            path in the folder that it is imported from, or by its name.
     """
 
     model: str = ""
@@ -60,7 +60,7 @@ class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
     files: dict[str, str] = {}
 
     def changes_to(self, other: Identity, numbers: Iterable[str] = ()) -> str:
-        """Return in words how another version differs; empty if it is the same.
+        """Describe how another version differs; empty if it is the same.
 
         Models are compared where both are known.
 

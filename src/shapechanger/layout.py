@@ -44,7 +44,7 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
 
     Attributes:
         name: Path from the element to the quantity, such as `hip_1/angle` or `shank_4/contact/fx`.
-        unit: SI unit of the number as the env returns it; "1" for a dimensionless number.
+        unit: SI unit of the number; "1" for a dimensionless number.
         low: Smallest value, in `unit`; minus infinity for none. Limits of joints are soft: a
             contact or a motor can press a joint a little beyond them.
         high: Largest value, in `unit`; infinity for none.

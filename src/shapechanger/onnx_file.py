@@ -27,7 +27,7 @@ def export_network(
         network: A module whose `forward(*given)` takes the inputs in their order.
         inputs: An example of each input by name, a tensor of shape (2, ...); the first axis stands
             for any number.
-        card: Card of the policy, whose last shape names the output; written without settings.
+        card: Card of the policy; its last shape names the output. It is written without settings.
         path: The file.
         **facts: Further metadata.
 

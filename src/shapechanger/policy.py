@@ -40,7 +40,7 @@ _LENGTH_BYTES: Final = 8
 _MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON takes twenty times as much memory.
 MAX_BYTES: Final = 2**28
 """Size of the largest file that is read."""
-_LONGEST: Final = 200  # Of a reason, characters.
+_LONGEST: Final = 200  # Longest reason, characters.
 _MAX_MEMBERS: Final = 32  # Bounds the work that a forged card can cause.
 
 
@@ -173,7 +173,7 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
             PolicyError: If it learned from recordings.
         """
         if self.env is None:
-            raise PolicyError("This policy learned from recordings of no env.")
+            raise PolicyError("This policy learned from recordings without an env.")
         return self.env
 
     @property
@@ -204,7 +204,7 @@ class PolicyCard(msgspec.Struct, frozen=True, kw_only=True):
         return shapes | {"output": [len(net.classes) or self.action_size]}
 
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
-        """Refuse a robot, an env or data whose layouts differ from a clone's.
+        """Refuse a robot, an env or data with layouts that differ from the layouts of a clone.
 
         Args:
             actions: Layout of its actions.
@@ -312,19 +312,19 @@ class OnnxPolicy(Policy):
 def load_policy(path: str | PathLike[str], algorithm: str = "") -> Any:
     """Load a policy of any kind; no code in the file is run.
 
-    Each kind is a `Policy`, with a `card` that tells its origin, and `act`, from observations of
-    shape (n, ...) to actions of shape (n, m). ONNX files need no PyTorch.
+    Each kind is a `Policy`, with a `card` that describes its origin, and `act`, from observations
+    of shape (n, ...) to actions of shape (n, m). ONNX files need no PyTorch.
 
     Args:
         path: A file that a training, a study, a cloning or `shapechanger policies export` wrote,
-            read once: a later change of it changes nothing.
+            read once: later changes of it have no effect.
         algorithm: Your algorithm, a class or function as `module:name`, that the file may
             name. A file alone may only name classes of models, of Stable-Baselines3, sb3-contrib
             or a module that is already imported.
 
     Raises:
-        PolicyError: If the file is missing, is no policy, or has been changed.
-        MissingExtra: If what the kind needs is not installed.
+        PolicyError: If the file is missing, is not a policy, or has been changed.
+        MissingExtra: If a package that the kind needs is not installed.
     """
     file = Path(path)
     exported = file.suffix == ".onnx"
@@ -442,7 +442,7 @@ def read_network(path: Path) -> tuple[PolicyCard, Network]:
     options = runtime.SessionOptions()
     # One policy is small: more threads would only wait for one another.
     options.intra_op_num_threads = 1
-    options.log_severity_level = 4  # What is wrong is raised, too.
+    options.log_severity_level = 4  # Errors are raised instead of being logged.
     session = runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     facts = session.get_modelmeta().custom_metadata_map
     if ONNX_CARD not in facts:

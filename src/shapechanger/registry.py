@@ -1,4 +1,4 @@
-"""Parts that packages add by name: learners, transfer methods and kinds of policies.
+"""Registries of parts that packages can add: learners, transfer methods and kinds of policies.
 
 A part ships with Shapechanger, is registered by a module that has been imported, or is an entry
 point of an installed package. It is imported when it is first asked for.
@@ -17,10 +17,10 @@ _Part = TypeVar("_Part")
 
 
 class Registry(Generic[_Part]):
-    """Parts of one kind by name.
+    """Parts of one kind, keyed by name.
 
     Args:
-        kind: What a part is, for messages, such as "method".
+        kind: Noun for a part, for messages, such as "method".
         group: Group of the entry points, such as "shapechanger.methods".
         shipped: Places of the parts that ship, `module:attribute` below `shapechanger`, by name.
     """

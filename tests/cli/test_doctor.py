@@ -60,9 +60,7 @@ def test_a_renderer_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
     """A crash of the driver ends its own process only."""
     died = SimpleNamespace(returncode=-11, stdout="", stderr="")
     monkeypatch.setattr(subprocess, "run", lambda *command, **options: died)
-    assert findings({"mujoco": "4.0.0"})["pictures"] == Finding(
-        "pictures", "bad", "exit status -11"
-    )
+    assert findings({"mujoco": "4.0.0"})["images"] == Finding("images", "bad", "exit status -11")
 
 
 @pytest.mark.system
@@ -75,7 +73,7 @@ def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     assert any(
         line.startswith(f"good  machine: shapechanger {version('shapechanger')}") for line in lines
     )
-    assert any(line.startswith("good  pictures: Drew 480 x 480 with") for line in lines)
+    assert any(line.startswith("good  images: Drew 480 x 480 with") for line in lines)
     assert not any("BAD" in line for line in lines)
 
 

@@ -52,7 +52,7 @@ def test_ascii_output_replaces_missing_letters() -> None:
         (
             ["envs", "render", "Ant", "--out", "ant.png"],
             {"MUJOCO_GL": "disable"},
-            "With MUJOCO_GL=disable nothing can be drawn: set it to one of egl, osmesa, glfw",
+            "MuJoCo cannot render with MUJOCO_GL=disable: set it to one of egl, osmesa, glfw",
         ),
         (
             ["envs", "render", "Ant", "--out", "ant.png"],

@@ -79,4 +79,4 @@ def test_other_policies_are_exported_for_their_own_body(tmp_path: Path, cli: Cli
     """A body with a policy that fits only one is refused."""
     export = ("policies", "export", POLICIES["reach"], "--env", "Finger")
     answer = cli.refused(*export, "--out", tmp_path / "finger.onnx")
-    assert "Only a policy of limbs fits another body" in answer
+    assert "Only a limb policy can be exported for another body" in answer

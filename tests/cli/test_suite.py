@@ -108,7 +108,7 @@ def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> 
         assert (out / name / "report.html").stat().st_size > 10_000
         command = json.loads((out / name / "study.json").read_text())["command"]
         assert command == f"shapechanger suite run vehicles --seeds 2 --out {out}"
-    assert "of 6 pairs fine-tune reached what scratch ends with in less than half of" in output
+    assert "of 6 pairs fine-tune reached the final value of scratch in less than half of" in output
 
 
 def test_a_stopped_suite_resumes_to_the_same_numbers(

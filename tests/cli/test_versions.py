@@ -52,7 +52,7 @@ def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(folder: Path,
         for command, *more in (("evaluate",), ("play", "--out", "film.mp4")):
             told = " ".join(cli.refused("policies", command, _POLICY, *more).split())
             assert words in told
-            assert "give the present one with --env" in told
+            assert "give --env to try the policy" in told
         cli.output(*evaluate, "--env", "b.xml@cliown_task:Hold")
         (folder / file).write_text(was)
     cli.output(*evaluate)

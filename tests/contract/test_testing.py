@@ -143,7 +143,7 @@ Single = _env(
 
 # Each env with the promise that it breaks, and the message of the exam.
 _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
-    (Liar, passes_gymnasiums_checker, "Gymnasium's checker says: .*not within the observ"),
+    (Liar, passes_gymnasiums_checker, "Gymnasium's checker reports: .*not within the observ"),
     (Unseeded, is_deterministic, "same seed and actions differ"),
     (Moody, is_deterministic, "same seed and actions differ"),
     (Forgetful, is_deterministic, "same seed and actions differ"),

@@ -110,7 +110,7 @@ def test_mujoco_gl_takes_precedence(choice: str) -> None:
     assert _output(_installed() + _CHOOSE, MUJOCO_GL=choice) == choice
     run = run_python(_CHOOSE, MUJOCO_GL=choice.upper())
     assert run.stderr.splitlines()[-1] == (
-        f"shapechanger.errors.RenderError: With MUJOCO_GL={choice.upper()} nothing can be drawn: "
+        f"shapechanger.errors.RenderError: MuJoCo cannot render with MUJOCO_GL={choice.upper()}: "
         "set it to one of egl, osmesa, glfw, or unset it."
     )
 

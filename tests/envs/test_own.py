@@ -342,5 +342,5 @@ def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
 def test_models_without_joints_are_refused(dog: Path) -> None:
     """Motors would not help."""
     dog.write_text('<mujoco><worldbody><body><geom size=".1"/></body></worldbody></mujoco>')
-    with pytest.raises(MorphologyError, match=r"dog\.xml has no joints, so nothing of it can move"):
+    with pytest.raises(MorphologyError, match=r"dog\.xml has no joints, so it cannot move"):
         shapechanger.from_mjcf(dog)

@@ -83,7 +83,7 @@ def test_a_task_is_found_by_name_class_function_or_object() -> None:
         ("no_such_module:Task", None, TaskError, "is not found: No module named 'no_such_module'"),
         (f"{__name__}:Stil", None, UnknownName, "Did you mean 'Still'"),
         ("walk", {"speed": 1.0}, TaskError, "The task 'walk' cannot be made: .*'speed'"),
-        (climb, {"speed": 1.0}, TaskError, "'climb' is no class, so it takes no options"),
+        (climb, {"speed": 1.0}, TaskError, "'climb' is not a class, so it takes no options"),
         (f"{__name__}:NOTHING", None, TaskError, "has no method `reward"),
         ("subprocess:Popen", {"args": ["false"]}, TaskError, "'subprocess:Popen' has no method"),
         (object(), None, TaskError, "The task 'object' has no method `reward"),

@@ -194,7 +194,7 @@ def test_a_file_of_settings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("learning_rate = 1e-4", "must name what it starts from"),
+        ("learning_rate = 1e-4", "must name a starting point"),
         ('preset = "sca"', "Did you mean 'sac'"),
         ('preset = "sac"\nlearning_rat = 1e-4', "Did you mean 'learning_rate'"),
         ("preset = ", "cannot be read"),

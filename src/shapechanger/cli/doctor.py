@@ -1,4 +1,4 @@
-"""The command `shapechanger doctor`: what works on this machine, and how to mend the rest."""
+"""The command `shapechanger doctor`: check the installation, and suggest repairs."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ print(f"{width} x {height} with {os.environ.get('MUJOCO_GL', 'glfw')}")
 
 @dataclass(frozen=True)
 class Doctor:
-    """Say what works on this machine, and how to mend what does not.
+    """Check the installation on this machine, and suggest repairs.
 
     `shapechanger robot check PROFILE` checks a robot.
     """
@@ -118,7 +118,7 @@ def _extra(parsed: Sequence[Requirement], extra: str, installed: Callable[[str],
 
 
 def _drawing() -> Results:
-    """Yield whether MuJoCo draws an image, and with which library."""
+    """Check whether MuJoCo can render an image, and report the OpenGL library."""
     done = subprocess.run(
         [sys.executable, "-c", _DRAW],
         capture_output=True,
@@ -168,19 +168,19 @@ def _ray() -> Results:
 
 
 def _gpio(dev: Path) -> Results:
-    """Yield whether this machine has pins that a robot could use."""
+    """Check whether this machine has GPIO pins that a robot could use."""
     chips = sorted(dev.glob("gpiochip*"))
     if not chips:
-        yield "unknown", "None here: robots run as twins, on simulated pins."
+        yield "unknown", "No GPIO on this machine: robots run as twins, on simulated pins."
     elif any(os.access(chip, os.R_OK | os.W_OK) for chip in chips):
-        yield "good", "`shapechanger robot check PROFILE` checks a robot's."
+        yield "good", "`shapechanger robot check PROFILE` checks the pins of a robot."
     else:
         remedy = "run `sudo usermod -aG gpio $USER` and log in again"
         yield "bad", f"{chips[0]} may not be opened: {remedy}."
 
 
 _PACKAGES: Final = (
-    ("pictures", "mujoco", _drawing),
+    ("images", "mujoco", _drawing),
     ("films", "imageio-ffmpeg", _films),
     ("torch", "torch", _torch),
     ("warp", "warp-lang", _warp),

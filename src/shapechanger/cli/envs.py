@@ -61,7 +61,7 @@ class EnvsShow(OneEnv):
 
 @dataclass(frozen=True, kw_only=True)
 class EnvsCompare(TwoEnvs):
-    """Compare two envs: what the shift from one to the other changes."""
+    """Compare two envs, and list the changes from one to the other."""
 
     def run(self) -> None:
         from_, to = self.refs()

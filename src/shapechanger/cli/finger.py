@@ -45,13 +45,12 @@ class FingerIdentify:
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
     """The log, as `shapechanger finger record` writes it."""
     out: Path | None = None
-    """File for the parameters, such as finger.json: what an env of the finger takes as
-    `parameters`."""
+    """File for the parameters, such as finger.json, which finger envs take as `parameters`."""
     report: Path | None = None
     """The page to write; by default next to the log."""
     geared: bool = False
-    """Take the motors for geared servos, as the shipped rig has, where the log says nothing about
-    them. A log that `record` has written of a rig says it by itself."""
+    """Assume geared servos, as in the shipped rig, if the log does not describe the motors. Logs
+    that `record` has written of a rig describe them."""
 
     def run(self) -> None:
         page = self.report or self.log.with_name(f"{self.log.stem}.html")

@@ -1,4 +1,4 @@
-"""What pushing to the Hugging Face Hub takes: options, and the page of a repository."""
+"""Shared parts of the commands that push to the Hugging Face Hub: options and README."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from shapechanger.layout import Layout
 
 RepoName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="REPO")]
 Public = Annotated[
-    bool, tyro.conf.arg(help="Let everybody read a new repository; it is private, if not given.")
+    bool, tyro.conf.arg(help="Make a new repository public; it is private if not given.")
 ]
 Revision = Annotated[
     str, tyro.conf.arg(help="Commit, branch or tag; the newest commit if not given.")
@@ -19,7 +19,7 @@ Revision = Annotated[
 
 
 def features_text(layout: Layout | None, more: str = "") -> str:
-    """Return the features of a layout with their units, in Markdown; `more` stands in for none."""
+    """Return the features of a layout with their units, in Markdown; `more` without a layout."""
     if layout is None:
         return more
     return f"{layout.size} numbers: " + ", ".join(f"`{feature}`" for feature in layout)
@@ -34,7 +34,7 @@ def readme(
     command: str,
     usage: str,
 ) -> str:
-    """Return a README of the Hub, whose head is YAML."""
+    """Return a README for the Hub, with a YAML header."""
     cells = {name: " ".join(str(value).replace("|", "\\|").split()) for name, value in rows.items()}
     table = "\n".join(f"| {name} | {cell} |" for name, cell in cells.items())
     parts = [

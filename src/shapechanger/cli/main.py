@@ -180,7 +180,7 @@ def find_command(arguments: Sequence[str]) -> tuple[list[str], type | Group]:
     for word in arguments:
         if isinstance(found, str) or word.startswith("-"):
             break
-        name = word.replace("_", "-")  # As tyro.
+        name = word.replace("_", "-")  # tyro converts names in the same way.
         if name not in found.commands:
             group = " ".join(("shapechanger", *words))
             raise UnknownName(f"command of `{group}`", word, found.commands)
@@ -230,7 +230,7 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         if not word.startswith("--"):
             continue
         given, equals, _ = word.partition("=")
-        option = given.replace("_", "-")  # As tyro.
+        option = given.replace("_", "-")  # tyro converts names in the same way.
         if option not in options:
             raise UnknownName(f"option of `{said}`", given, sorted(options))
         # Without a value, one of several values would mean its default.

@@ -62,7 +62,7 @@ class Watching:
                     observation, reward, terminated, truncated, info = acting.step(action)
                     worth, steps = worth + float(reward), steps + 1
                     over = terminated or truncated
-                    if terminated and (reason := info.get("stop_reason")):  # Of a vehicle.
+                    if terminated and (reason := info.get("stop_reason")):  # Only vehicles have it.
                         why = f": {reason}"
                     if out is not None:
                         frames.append(cast("NDArray[Any]", env.render()))
@@ -80,8 +80,8 @@ class Play(Watching):
     """Id of the env, such as BigAnt."""
     policy: Path | None = None
     """A policy that `train`, a study or `policies export` has written, or `reference` for the one
-    that ships for the env; random actions if not given. One of another body acts through the body
-    map of same names."""
+    that ships for the env; random actions if not given. A policy for another body acts through the
+    body map that matches names."""
     body: Body = ""
 
     def run(self) -> None:
@@ -92,13 +92,12 @@ class Play(Watching):
 def acting_in(
     env: gym.Env[Any, Any], file: Path, learner: str = "", trained_in: EnvRef | None = None
 ) -> tuple[gym.Env[Any, Any], Act]:
-    """Return an env as a policy senses it, and the policy."""
+    """Return an env with the observations that a policy takes, and the policy as a function."""
     policy = load_any_policy(file, learner)
     card: PolicyCard = policy.card
     if trained_in is not None and ENV in card.identity:
         remedy = (
-            "Train it again, or give the present one with --env, as another env that the policy "
-            "is tried in."
+            "Train it again, or give --env to try the policy in the present version of the env."
         )
         now = identify_env(env, trained_in.id).identity
         require_same_env(card.identity, trained_in, now, file, remedy)
@@ -110,13 +109,13 @@ def acting_in(
 
 
 def load_any_policy(file: Path, learner: str = "") -> Any:
-    """Load a policy of any kind, which may name a learner of the user's own."""
+    """Load a policy of any kind; its learner may be in a module of the user."""
     allow_own_modules(learner)
     return load_policy(file, learner)
 
 
 def _fitting(env: gym.Env[Any, Any], card: PolicyCard) -> gym.Env[Any, Any]:
-    """Return an env with a policy's layouts, through the body map of same names if needed."""
+    """Return an env with a policy's layouts, through the body map that matches names if needed."""
     settings: Any = card.settings
     if settings is not None and "many bodies" in settings.takes:
         from shapechanger.transfer.limbs.envs import fitted  # PyTorch.

@@ -46,20 +46,20 @@ class _InEnv(_OfPolicy):
     """Options of a command for a policy in an env."""
 
     env: str = ""
-    """Id of another env, if it acts through the body map of same names; by default the one of its
-    training."""
+    """Id of another env, in which the policy acts through the body map that matches names; the env
+    that it was trained in if not given."""
     body: Body = ""
 
     def ref(self) -> EnvRef:
-        """Return the env that is named, else the one in which the policy was trained."""
+        """Return the env that the user named, or else the one that the policy was trained in."""
         if self.env:
             return driven(env_ref(self.env, self.body))
         env = load_any_policy(self.file, self.learner).card.env
         if env is None:
-            raise StudyError(f"{self.file} learned from recordings of no env: name one with --env.")
-        # A policy of many bodies is seen in the family's own.
+            raise StudyError(f"{self.file} learned from recordings without an env: give --env.")
+        # A policy for many bodies is shown in the family's default body.
         trained_in = single_body(env)
-        # The env of a policy may be of the user's own, or have a task that is.
+        # The env, or its task, may come from a module of the user.
         allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
         if self.body and "path" in trained_in.kwargs:
             return driven(trained_in.having({"body": self.body}))
@@ -68,7 +68,7 @@ class _InEnv(_OfPolicy):
 
 @dataclass(frozen=True, kw_only=True)
 class PoliciesShow(_OfPolicy):
-    """Print where a policy comes from, and what it senses and does."""
+    """Print a policy's origin, observation and action."""
 
     def run(self) -> None:
         policy = load_any_policy(self.file, self.learner)
@@ -80,7 +80,7 @@ class PoliciesShow(_OfPolicy):
         if hasattr(policy, "normalisation"):
             lines["normalised"] = "no" if policy.normalisation is None else "yes"
         if card.clone is not None:
-            lines["picture"] = card.clone.eyes
+            lines["image"] = card.clone.eyes
         lines["observation"] = ", ".join(card.observation.names) if card.observation else "none"
         lines["action"] = ", ".join(card.action.names if card.action else STEERING)
         for part, identity in card.identity.items():
@@ -95,7 +95,7 @@ class PoliciesShow(_OfPolicy):
 
 
 def origin_of(card: PolicyCard) -> dict[str, str]:
-    """Return the facts of a policy's origin from its card, keyed by name."""
+    """Return the origin of a policy from its card: env, learner, steps, seed and version."""
     return {
         "env": str(card.env or "recorded"),
         "learner": card.learner,
@@ -151,7 +151,7 @@ class PoliciesEvaluate(_InEnv):
     """Play a policy for some episodes, and print its measures."""
 
     episodes: int = 10
-    """Number of episodes; they start like every evaluation's."""
+    """Number of episodes; they have the same starts as every evaluation."""
 
     def run(self) -> None:
         if self.episodes < 1:
@@ -173,7 +173,7 @@ class PoliciesEvaluate(_InEnv):
 
 @dataclass(frozen=True, kw_only=True)
 class PoliciesPlay(_InEnv, Watching):
-    """Watch a policy in the env of its training, in a window or as a video."""
+    """Watch a policy in the env that it was trained in, in a window or as a video."""
 
     def run(self) -> None:
         self.show(self.ref(), self.file, trained_in=not (self.env or self.body))
@@ -183,8 +183,8 @@ class PoliciesPlay(_InEnv, Watching):
 class PoliciesExport(_InEnv):
     """Export a policy for other programs, which need neither PyTorch nor Shapechanger.
 
-    A robot runs a clone on board. --env and --body name the body that a policy of limbs is exported
-    for; other policies are exported for their own.
+    Exported clones can run on board a robot. --env and --body select the body that a limb policy
+    is exported for; other policies are exported for the body that they were trained on.
     """
 
     out: Path
@@ -208,7 +208,7 @@ class PoliciesExport(_InEnv):
                     export_limbs(policy, env, ref, self.out)
             elif self.env or self.body:
                 raise StudyError(
-                    "Only a policy of limbs fits another body than its own: leave out --env and "
+                    "Only a limb policy can be exported for another body: leave out --env and "
                     "--body."
                 )
             else:
@@ -217,7 +217,7 @@ class PoliciesExport(_InEnv):
 
 
 def _learned_with(card: PolicyCard, net: CloneNetwork) -> tuple[str, float | None]:
-    """Return the body and the rate of a clone's demonstrations, as far as its card tells."""
+    """Return the body and the rate of a clone's demonstrations, as far as its card has them."""
     if card.env is None:
         return net.body, net.control_hz
     # Waypoints are the same in all bodies.
@@ -309,7 +309,7 @@ class PoliciesPull:
 def _policy_card(file: Path, repo: str) -> str:
     card = load_policy(file).card
     rows: dict[str, object] = {**origin_of(card), "SHA-256": hub.sha256_of(file)}
-    seen = "" if card.clone is None else f"picture ({card.clone.eyes})"
+    seen = "" if card.clone is None else f"image ({card.clone.eyes})"
     done = ", ".join(STEERING)
     return readme(
         repo,

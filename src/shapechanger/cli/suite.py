@@ -212,7 +212,7 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
     table = Table("study", "runs", "steps", "at work", box=None)
     complete = True
     for path in sorted(out.glob(f"*/{PLAN_FILE}")):
-        # The methods may be modules of the current folder, as where the suite runs.
+        # Methods may be modules of the current folder, as they are for the process that runs them.
         allow_own_modules(*planned_arms(path.parent))
         plan = read_plan(path.parent, f"{path.parent} is kept as it is")
         ended, done, total = 0, 0, 0
@@ -313,8 +313,8 @@ def _print_outcomes(found: list[StudyOutcome]) -> None:
     halves = sum(outcome.halves for outcome in found)
     arms = " or ".join(dict.fromkeys(outcome.arm for outcome in found))
     say(
-        f"Gains are of {arms} over scratch, in scores (0: what takes no skill, 1: the "
-        "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
-        f"On {halves} of {len(found)} pairs {arms} reached what scratch ends with in less than "
+        f"Gains are of {arms} over scratch, in scores (0: no skill, 1: the target's reference, or "
+        "the end of the best arm), with 95 % intervals over seeds.\n"
+        f"On {halves} of {len(found)} pairs {arms} reached the final value of scratch in less than "
         "half of scratch's steps."
     )

@@ -1,4 +1,4 @@
-"""`shapechanger transfer | methods`: a transfer study, and the methods that it can compare."""
+"""`shapechanger transfer | methods`: run a transfer study, and list transfer methods."""
 
 from __future__ import annotations
 
@@ -48,22 +48,22 @@ _FILE_WIDTH: Final = 120
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRuns:
-    """Options of a command that runs studies; the study or the suite states what is not given."""
+    """Options of a command that runs studies; None for the default of the study or the suite."""
 
     seeds: int | None = None
-    """Runs of each arm; the suite's own number, or 5, if not given."""
+    """Runs of each arm; the suite's number, or 5, if not given."""
     steps: int | None = None
-    """Target steps of a run; the suite's or the learner's own number if not given."""
+    """Target steps of a run; the suite's or the learner's number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; the suite's or the learner's own number if not given: half
-    as many as target steps, and more for a rig. With --source-policy, the steps of arms that train
-    their own policy, such as identified."""
+    """Source steps of a source policy; the suite's or the learner's number if not given: half as
+    many as target steps, and more for a rig. With --source-policy, the steps of arms that train
+    another source policy, such as identified."""
     seed: int | None = None
-    """Number that the seeds of all runs are drawn from; the suite's own, or 0, if not given."""
+    """Number that the seeds of all runs are drawn from; the suite's number, or 0, if not given."""
     executor: Literal["processes", "ray"] = "processes"
     """Where runs run: in processes of this machine, or on a Ray cluster."""
     address: str | None = None
-    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
+    """Address of the Ray cluster: 10.0.0.1:6379 or auto; Ray on this machine if not given."""
     workers: int | None = None
     """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
@@ -81,7 +81,7 @@ class StudyRuns:
 
 
 def run_showing_progress(plan: Plan, folder: Path, runs: Iterable[Run], **more: Any) -> Study:
-    """Run a study with its progress; `runs` are those that have not ended before."""
+    """Run a study and show its progress; `runs` are the runs that have not ended yet."""
     # An evaluation counts as one step.
     with StudyProgress({run.name: max(1, plan.steps_of(run.kind)) for run in runs}) as progress:
         return run_study(plan, folder, on_progress=progress, command=command_line(), **more)
@@ -126,7 +126,7 @@ class Transfer(TwoEnvs, StudyRuns):
             raise StudyError(f"--arms names {', '.join(twice)} more than once.")
         if self.map and (self.rule or self.units != "same"):
             raise MapError(
-                "The file of --map says all of the body map: leave out --rule and --units, or "
+                "The file of --map defines the whole body map: leave out --rule and --units, or "
                 "--map."
             )
         allow_own_modules(self.learner, *self.arms)
@@ -214,7 +214,7 @@ def _name(env: EnvRef) -> str:
 
 
 def _way_on(plan: Plan, out: Path) -> str:
-    """Tell how to resume an interrupted study; empty if it had not started."""
+    """Return how to resume an interrupted study; empty if it had not started."""
     if not is_folder_of(plan, out):
         return ""
     if len(unfinished_runs(plan, out)) == len(plan.runs()):

@@ -1,19 +1,19 @@
 """Envs as values, and the facts that transfer reads from an env.
 
-An env is recognised by its attributes to have more than Gymnasium's interface:
+Beyond Gymnasium's interface, an env may have these attributes; their presence enables features:
 
 - `observation_layout`, `action_layout` and `measures`: see `EnvTraits`.
-- `demonstrator(seed)`: an expert for its task, a `TaskDemonstrator`, whose mistakes `seed` decides.
-- `taught_by(act, seed)`: the same, of a policy of another env with the id `teacher_env`. `act` maps
-  that env's observations, (n, k), to actions, (n, m).
+- `demonstrator(seed)`: an expert for its task, a `TaskDemonstrator`; `seed` draws its mistakes.
+- `taught_by(act, seed)`: a `TaskDemonstrator` from a policy of the env with the id `teacher_env`.
+  `act` maps observations of that env, (n, k), to actions, (n, m).
 - `hold_out()`: draws its surroundings from now on from a set that training never uses.
 - `family_name`: the continuous family of its body. `arguments_towards(target, alpha)` returns
-  arguments that make a body at `alpha`, 0 to 1, of the way to a target env's;
-  `arguments_between(target)`, those that draw a body on this way at each reset; and
-  `drawn_bodies(count, seed, split)`, bodies of a part of the family as JSON.
+  arguments for the body that lies at `alpha`, 0 to 1, between this body and the target's;
+  `arguments_between(target)` returns arguments that draw such a body at each reset; and
+  `drawn_bodies(count, seed, split)` returns bodies from a split of the family, as JSON.
 - `tree`: the trunk and the limbs of its body, a `shapechanger.morphology.tree.Tree`.
-- `randomised_source()` and `identified_source(seed)`: arguments of a source env that randomise its
-  body over those that this env may have, or identify it from motions of this env.
+- `randomised_source()` and `identified_source(seed)`: arguments of a source env whose body is
+  randomised over the bodies that this env may have, or is identified from motions of this env.
 - `certify_shift(source, target)`: the certificate of the change between two envs.
 """
 
@@ -79,7 +79,7 @@ class EnvRef(msgspec.Struct, frozen=True):
 
 
 class BodyDraw(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Bodies of a family, as the argument `bodies` of an env that stands for many.
+    """Bodies to draw from a family: the argument `bodies` of an env with many bodies.
 
     Attributes:
         split: Part of the family: "train", "interpolation", "extrapolation" or "composition".
@@ -93,11 +93,11 @@ class BodyDraw(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def each_body(env: EnvRef) -> list[EnvRef]:
-    """Return one env for each of the bodies that an env stands for.
+    """Return one env for each body in the argument `bodies` of an env.
 
     Args:
         env: An env; its argument `bodies` is a list of bodies as JSON, or a `BodyDraw` as a
-            mapping. Without one it stands for itself.
+            mapping. Without the argument, the env itself is the only one.
 
     Raises:
         StudyError: If `bodies` is neither, or the env's body belongs to no family.
@@ -145,11 +145,11 @@ class EnvTraits:
         observation_space: Its space.
         action_space: Its space.
         exclusive: Whether only one run at a time may use the env, as a robot.
-        individual: Name of the argument that selects one of several individuals; may be empty.
+        individual: Name of the argument that selects one of several robots; may be empty.
         has_demonstrator: Whether it has an expert for its task.
         adapts_source: Whether it can adapt its source.
         family: Name of the continuous family that its body belongs to; may be empty.
-        measures: What a policy is measured by, the default first.
+        measures: The metrics of a policy, the default first.
         identified: The version of its robot and of the user's own files.
     """
 
@@ -204,7 +204,7 @@ def hold_out(env: gym.Env[Any, Any]) -> None:
 
 
 def is_single_instance(env: gym.Env[Any, Any]) -> bool:
-    """Return whether only one instance can exist, as of a robot: `side_by_side = False`."""
+    """Return whether only one instance can exist (`side_by_side = False`), such as of a robot."""
     return not getattr(env.unwrapped, "side_by_side", True)
 
 

@@ -1,7 +1,7 @@
 """Caps, slew, duty cycles and the reflexes of motion, as functions of a plan without a clock.
 
 The guard calls them on a robot, and a simulation of the robot calls them too, so that both move
-the same way. They need the standard library alone.
+the same way. They use only the standard library.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def aimed(action: ActionPlan, value: float) -> float:
 
 
 def clipped(action: ActionPlan, value: float) -> bool:
-    """Return whether a command's value lies outside the caps; with three levels none does."""
+    """Return whether a command's value lies outside the caps; never for three levels."""
     is_inside = action.low - _SAME <= value <= action.high + _SAME
     return action.levels == "any" and not is_inside
 
@@ -176,7 +176,7 @@ class Propulsion:
         return push / len(self._rests) if self._rests else 0.0
 
     def speed(self, values: Sequence[float]) -> float | None:
-        """Return the speed that the profile gives for this push, m/s; None if it gives none."""
+        """Return the speed that the profile states for this push, m/s; None if unknown."""
         if not self._known:
             return None
         known = [(self._actions[i], values[i]) for i in self._known]
@@ -184,7 +184,7 @@ class Propulsion:
 
 
 class MotionReflexes:
-    """Reflexes that hold a robot back from what it touches, nears or pushes against.
+    """Reflexes that stop motion towards objects that the robot touches, nears or pushes against.
 
     Attributes:
         bump: Contacts of the bumpers.

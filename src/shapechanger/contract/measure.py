@@ -10,9 +10,9 @@ import msgspec
 class Measure(msgspec.Struct, frozen=True):
     """A number of an episode, larger is better.
 
-    The return adds up what an env pays for, which often includes being alive: an ant that stands
-    still earns 1,000. A measure tells the skill alone. Envs declare theirs as the attribute
-    `measures`; the first is the default of a study.
+    The return often includes a reward for survival: an ant that stands still earns 1,000. A measure
+    quantifies only skill. Envs declare their measures as the attribute `measures`; the first one is
+    the default of a study.
 
     Attributes:
         name: Name, such as "forward speed".

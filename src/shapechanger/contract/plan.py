@@ -1,8 +1,8 @@
 """Plan of a robot: its actions, outputs, sensors and limits, as a profile states them.
 
-The guard of the robot and simulations of it move within the same plan. These are tables of a
-profile (`shapechanger.robot.profile`) with the bounds that it checks: the guard loads nothing but
-msgspec and its drivers. They cross from the command line to the guard as JSON.
+The guard of a robot and its simulations use the same plan. The classes are tables of a profile
+(`shapechanger.robot.profile`), with bounds that are checked when it is loaded. They are in this
+module because the guard imports only msgspec and its drivers, and are sent to the guard as JSON.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class ActionPlan:
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Return the keys that contradict others, and what is wrong, as the end of a sentence."""
+        """Yield each key that contradicts others, and an explanation that ends a sentence."""
         if self.one_sided and self.low < 0.0:
             yield "low", "must be 0 to 1, because it is one-sided"
         if not self.low < self.high:
@@ -156,7 +156,7 @@ class LimitPlan:
         "stall_s": "speed",
         "bump_hold_ms": "bump",
     }
-    """What a sensor must measure for a limit, keyed by the limit."""
+    """Quantity that a sensor must measure, keyed by the limit that needs it."""
 
 
 @dataclass(frozen=True, slots=True)

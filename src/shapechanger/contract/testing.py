@@ -46,13 +46,13 @@ def _require(kept: bool, sentence: str) -> None:
 def passes_gymnasiums_checker(make: MakeEnv) -> None:
     """Passes Gymnasium's `check_env`."""
     with warnings.catch_warnings(), make() as env:
-        # Advice on spaces with another range than -1 to 1 is no failure.
+        # Advice on spaces with another range than -1 to 1 is not a failure.
         warnings.filterwarnings("ignore", message=".*symmetric and normalized space.*")
         warnings.filterwarnings("ignore", message=".*(minimum|maximum) value is -?infinity.*")
         try:
             check_env(env.unwrapped, skip_render_check=True)
         except (AssertionError, gym.error.Error) as error:
-            raise BrokenPromise(f"Gymnasium's checker says: {error}") from error
+            raise BrokenPromise(f"Gymnasium's checker reports: {error}") from error
 
 
 def is_deterministic(make: MakeEnv) -> None:
@@ -106,7 +106,7 @@ def pickles(make: MakeEnv) -> None:
 def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
     """The reward is the sum of the terms in `info`.
 
-    Their names are `reward_...`, or `..._penalty` as of negative costs in Gymnasium.
+    Their names are `reward_...`, or `..._penalty` for negative costs, as in Gymnasium.
     """
     infos: list[dict[str, Any]] = []
     for step, (_, reward) in enumerate(_rollout(make(), infos)[1:]):
@@ -116,7 +116,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
             f"The simulation diverges at step {step + 1} of random actions: give the actuators a "
             "narrower range, motors of a rig a smaller gear, or the model a shorter time step.",
         )
-        # A mapping has all terms together, or their sources.
+        # A mapping contains all terms together, or their sources.
         named = (value for name, value in info.items() if is_reward_term(name))
         terms = [float(value) for value in named if not isinstance(value, Mapping)]
         _require(bool(terms), "info reports no reward terms.")

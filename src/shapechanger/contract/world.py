@@ -69,7 +69,7 @@ class Readings:
 class World(Protocol):
     """A vehicle and its surroundings.
 
-    A class that derives from it inherits a body that neither moves nor sees.
+    By default, the vehicle neither moves nor sees; subclasses override the methods.
 
     Attributes:
         resting_v: Voltage of the battery without load.
@@ -90,7 +90,7 @@ class World(Protocol):
         ...
 
     def put_back(self) -> None:
-        """Put the vehicle, after a collision, at a free place nearby, at rest."""
+        """Put the vehicle at rest at a free place nearby, after a collision."""
         self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
@@ -112,5 +112,5 @@ class World(Protocol):
         return 0.0
 
     def picture(self) -> NDArray[np.uint8]:
-        """Picture of the front camera, RGB, shape (height, width, 3)."""
+        """Image of the front camera, RGB, shape (height, width, 3)."""
         return np.zeros((120, 160, 3), np.uint8)

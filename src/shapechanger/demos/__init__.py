@@ -3,7 +3,7 @@
 ```
 episodes/      the format on disk; standard library only, because robots record too
 recording.py   record any Gymnasium env
-drivers.py     who drives while recording: an expert, a policy, or a policy with corrections
+drivers.py     drivers of recordings: an expert, a policy, or a policy with corrections
 dataset.py     episodes as NumPy arrays
 statistics.py  how far the rate of a recording varies
 report.py      the page of a recording

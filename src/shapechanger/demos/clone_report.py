@@ -139,8 +139,8 @@ def _observes(policy: Clone) -> str:
     return "; ".join(parts)
 
 
-# Collisions per 100 m of clones of a car's simulated expert in corridors that they had not seen, by
-# the minutes of its driving: of all clones, and of the worst seed where there were three. Measured
+# Collisions per 100 m in unseen corridors, of clones of a car's simulated expert, keyed by the
+# minutes of demonstrations: mean of all clones, and the worst of three seeds, or None. Measured
 # over 9 km each by `python -m benchmarks.run corrections`.
 EXPERT: Final = {2: (3.52, 5.89), 4: (1.06, 1.63), 10: (0.84, None)}
 # The same after half of the minutes were corrections of a clone's own driving.
@@ -152,8 +152,8 @@ def outlook(card: PolicyCard) -> str:
     """Return sentences on the collisions to expect of a cloned driver, and on the next step.
 
     Returns:
-        "" if the policy does not steer by images, or its card has no `learned_s`. The rates are
-        those of a car in corridors; no other clones were measured in this way.
+        "" if the policy does not steer by images, or its card has no `learned_s`. The rates were
+        measured with a car in corridors; no other clones were measured in this way.
     """
     learned_s = card.data.get("learned_s", 0.0)
     names = () if card.action is None else card.action.names
@@ -184,8 +184,8 @@ def outlook(card: PolicyCard) -> str:
     )
     return (
         f"It learned from {minutes:.1f} minutes of driving, so expect {expected} per 100 m where "
-        "it has not driven. That is what clones of a car's simulated expert had in corridors "
-        "(docs/cloning.md); a person with keys is less steady, so expect more of its clone. "
+        "it has not driven. These rates were measured with clones of a car's simulated expert in "
+        "corridors (docs/cloning.md); clones of a person who drives by keys collide more often. "
         f"Next: {record}let it drive and correct it (`demos record ENV --driver POLICY "
         "--corrected-by expert`, or take over at the console of a robot), merge, and train again: "
         f"{CORRECTED[length]:.1f} per 100 m after {length // 2} minutes of driving and "

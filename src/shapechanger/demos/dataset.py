@@ -28,7 +28,7 @@ from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 
 DEMONSTRATORS: Final = ("person", "expert")
-"""Drivers from whose steps policies learn."""
+"""Drivers whose steps policies are trained on."""
 
 _StepAndImage = tuple[Step, bytes | None]
 
@@ -42,7 +42,7 @@ class Dataset:
 
     Attributes:
         pictures: Red, green and blue, shape (n, H, W, 3); None without images.
-        states: Shape (n, k), NaN where nothing measured a value; None without states.
+        states: Shape (n, k), NaN for unmeasured values; None without states.
         actions: Decided actions, shape (n, m), in the order of the layout.
         episodes: Number of steps of each episode, in order; each positive.
         times_s: Time of each step since the start of its episode, s, shape (n,).
@@ -72,12 +72,12 @@ class Dataset:
 
     def __repr__(self) -> str:
         """Describe the shapes instead of printing the arrays."""
-        seen = "no pictures" if self.pictures is None else f"pictures {self.pictures.shape[1:]}"
+        seen = "no images" if self.pictures is None else f"images {self.pictures.shape[1:]}"
         return f"Dataset({len(self)} steps of {len(self.episodes)} episodes, {seen})"
 
     @property
     def duration_s(self) -> float:
-        """Length by the times, s; the last step of an episode takes the inverse of the rate."""
+        """Duration, s; the last step of an episode lasts one period."""
         ends = np.cumsum(self.episodes)
         begins = ends - np.asarray(self.episodes)
         total = float((self.times_s[ends - 1] - self.times_s[begins]).sum())
@@ -98,7 +98,7 @@ class Dataset:
 
 
 def merged(datasets: Sequence[Dataset]) -> Dataset:
-    """Return the steps of several datasets of one kind; other attributes are the first one's."""
+    """Return the steps of several datasets of one kind, with other attributes from the first."""
 
     def joined(name: str) -> Any:
         arrays = [getattr(data, name) for data in datasets]
@@ -226,7 +226,10 @@ def _chosen(
 
 
 def _times_s(steps: Sequence[Step], hz: float, name: str) -> tuple[NDArray[np.float64], bool]:
-    """Return the time of each step, s, and whether all are known; or else from the rate."""
+    """Return the time of each step, s, and whether all times were recorded.
+
+    If not, times are computed from the rate.
+    """
     indices = np.array([step.index for step in steps])
     known = [step.captured_ns for step in steps if step.captured_ns is not None]
     if len(known) < len(steps):

@@ -30,16 +30,16 @@ EXPERT: Final = "expert"
 Act = Callable[[Any], NDArray[np.float32]]
 """A policy: maps an observation to an action, shape (n,)."""
 
-# The expert takes over where any value of the two actions, such as the steering, has differed by
-# more than this, for so many seconds without interruption;
+# The expert takes over if a value of the two actions, such as the steering, has differed by more
+# than _APART for _APART_S seconds without interruption.
 _APART: Final = 0.6
 _APART_S: Final = 0.3
-# at once where an obstacle ahead would be reached within this time at the present speed, s, and the
-# policy does not brake;
+# It takes over at once if an obstacle ahead would be reached within this time at the present speed,
+# s, and the policy does not brake.
 _NEAR_S: Final = 0.4
-# and where the vehicle has stood still for this long, s, because nothing is learned from that.
+# It takes over if the vehicle has stood still for this long, s: such steps would be useless.
 _STILL_S: Final = 2.0
-# It hands back where no value has differed by more than this, for so many seconds without
+# It hands back if no value has differed by more than _AGREE for _AGREE_S seconds without
 # interruption, with no obstacle near.
 _AGREE: Final = 0.3
 _AGREE_S: Final = 1.0
@@ -54,9 +54,9 @@ class DriverDecision(NamedTuple):
 
     Attributes:
         carried_out: Action to pass to the env, shape (n,).
-        decided: Step with the action to record as decided, which differs where a demonstrator errs
-            on purpose; its driver; and the action of a policy while somebody else drives.
-        remark: Text of a mark to set; "" for none.
+        decided: Step with the action to record as decided, which differs if a demonstrator errs on
+            purpose; its driver; and the action of a policy while the expert drives.
+        remark: Text of a mark to set; "" for no mark.
     """
 
     carried_out: NDArray[np.float32]
@@ -65,23 +65,23 @@ class DriverDecision(NamedTuple):
 
 
 class Pilot:
-    """Who drives while recording: an expert, a policy, or a policy that an expert corrects.
+    """Driver of a recording: an expert, a policy, or a policy that an expert corrects.
 
-    The intended action of an expert is recorded as decided. It errs on purpose now and then, so
-    that a learner sees recoveries; the erroneous action is what the outputs carry out. While it
-    corrects a policy, it makes no mistakes.
+    The intended action of an expert is recorded as decided. The expert errs on purpose now and
+    then, so that a learner sees recoveries; the env executes the erroneous action. While it
+    corrects a policy, the expert makes no mistakes.
 
-    A policy is corrected where it is dangerous, not where it is slow: of a value such as the
-    throttle, everything from rest to the expert's value counts as agreement.
+    A policy is corrected if it is dangerous, not if it is slow: for a value such as the throttle,
+    any value from rest to the expert's value counts as agreement.
 
     Args:
-        env: The env; dangers are seen in its `world`, if it has one.
+        env: The env; dangers are detected in its `world`, if it has one.
         act: The policy; None to let the expert drive.
         expert: The expert; None to let the policy drive uncorrected.
 
     Attributes:
         steps: Number of decisions of a corrected policy and its expert.
-        corrected: Number of those that were the expert's.
+        corrected: Number of decisions of the expert.
         takeovers: How often the expert took over.
     """
 
@@ -91,7 +91,7 @@ class Pilot:
         self._act, self._expert = act, expert
         self._period_s = 1.0 / float(env.metadata.get("render_fps") or 20.0)
         self._world = getattr(env.unwrapped, "world", None)
-        # Where each value of an action is slowest; NaN if it has no speed, such as the steering.
+        # Slowest value of each part of an action; NaN for parts without a speed, such as steering.
         rests = [_RESTS.get(name, math.nan) for name in layouts_of(env)[1].names]
         self._rests = np.array(rests, np.float32)
         self._corrects, self._lasted = False, 0
@@ -127,7 +127,7 @@ class Pilot:
         return DriverDecision(right, corrected, remark)
 
     def _change(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> str:
-        """Change the driver where it is time; return why, or "" without a change."""
+        """Change the driver if it is time; return the reason, or "" without a change."""
         gap, danger = self._gap(wanted, right), self._danger(wanted)
         if self._corrects:
             is_time, least_s = gap <= _AGREE and not danger, _AGREE_S
@@ -149,7 +149,7 @@ class Pilot:
         return float(np.abs(wanted - agreed).max())
 
     def _danger(self, action: NDArray[np.float32]) -> str:
-        """Return the danger of an action in the env's world, in words; "" for none."""
+        """Describe the danger of an action in the env's world; "" without danger."""
         world = self._world
         if world is None:
             return ""
@@ -171,7 +171,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
     Args:
         env: The env to drive in.
         driver: `EXPERT`, or the file of a policy.
-        corrected_by: `EXPERT` to let it take over where the policy would go wrong; "" for nobody.
+        corrected_by: `EXPERT` to let it take over if the policy goes wrong; "" for no corrections.
         seed: Seed of the expert's mistakes.
 
     Raises:
@@ -208,7 +208,7 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
         return lambda seen: fitting(acts(seen))
     if (policy.card.observation, policy.card.action) != layouts_of(env):
         raise DemosError(
-            f"{path} was trained in {policy.card.env}, which senses or moves something else than "
+            f"{path} was trained in {policy.card.env}, whose observations or actions differ from "
             f"{name_of(env)}."
         )
     return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))

@@ -1,4 +1,4 @@
-"""Pictures: JPEGs of unknown origin, checked before they are decoded, and actions drawn below.
+"""Decode and encode JPEG images, with checks of untrusted ones, and draw actions below them.
 
 simplejpeg is imported on first use, because recordings without images need no decoder.
 """
@@ -40,7 +40,7 @@ def decode_picture(jpeg: bytes, name: str) -> NDArray[np.uint8]:
         MissingExtra: If simplejpeg is not installed.
     """
     picture_size(jpeg, name)
-    # Strict by default: a truncated image is an error, not filled up with grey.
+    # Strict by default: a truncated image is an error, instead of being filled with grey.
     return _decoded("decode_jpeg", jpeg, name, colorspace="RGB")
 
 
@@ -121,7 +121,7 @@ def overlay(picture: NDArray[np.uint8], step: Step, layout: Layout) -> NDArray[n
     """Return an image with the action of its step below it, one bar per value.
 
     A bar starts at 0, or at the bound nearest to 0: steering to the left is a bar to the left. Its
-    colour shows the driver; a white line shows what a policy wanted while somebody else drove.
+    colour shows the driver; a white line shows the action of a policy while another driver drove.
 
     Args:
         picture: Shape (h, w, 3).

@@ -1,8 +1,8 @@
 """Record episodes of any Gymnasium env, one per reset.
 
-Besides observations and actions, a step keeps what the env provides: in `info`, `captured_ns`,
-`decided_ns`, `action_applied`, `intervene_action`, `absent` (names of missing state values),
-`reward_terms`, `stop_reason`, `truncated_because` and `is_success`; on the unwrapped env,
+In addition to observations and actions, a step keeps these if the env has them: in `info`,
+`captured_ns`, `decided_ns`, `action_applied`, `intervene_action`, `absent` (names of missing state
+values), `reward_terms`, `stop_reason`, `truncated_because` and `is_success`; on the unwrapped env,
 `newest_jpeg` (bytes of the image as received), `record_clock` and `welcome`.
 """
 
@@ -28,7 +28,7 @@ from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.layout import Layout
 
 _PICTURE_DIMENSIONS: Final = 3
-_QUALITY: Final = 95  # Of images that an env returns as arrays, percent.
+_QUALITY: Final = 95  # JPEG quality of images that an env returns as arrays, percent.
 
 
 Numbers = tuple[float, ...]
@@ -77,14 +77,14 @@ class ObservationEncoder:
         return {self._alone: observation} if self._alone else observation
 
     def encode(self, observation: Any, info: Mapping[str, Any]) -> tuple[bytes | None, Numbers]:
-        """Return the image and the state of an observation as they are recorded.
+        """Return the image and the state of an observation in the recorded form.
 
         Args:
             observation: Observation of the env.
             info: The info that came with it.
 
         Returns:
-            The JPEG, None without images; and the values, NaN where nothing measured one.
+            The JPEG, None without images; and the values, NaN for unmeasured ones.
         """
         parts = self.parts(observation)
         jpeg: bytes | None = None
@@ -104,24 +104,24 @@ def name_of(env: gym.Env[Any, Any]) -> str:
 
 
 _SECRET: Final = frozenset({"key"})
-"""Arguments of envs that must not leave this machine with a recording."""
+"""Secret arguments of envs, which are left out of recordings."""
 
 
 class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
-    """Wrapper that records what is observed and done in an env.
+    """Wrapper that records the observations and actions of an env.
 
-    A step holds an observation, the action decided for it, and the outcome. Where a person
+    A step holds an observation, the action decided for it, and the outcome. If a person
     intervened (`info["intervene_action"]`), the person's action is recorded as decided, and the
-    action passed to `step` as what a policy wanted.
+    action passed to `step` as the action of a policy.
 
-    If a step cannot be written, the wrapper stops the env with one action that moves nothing, and
-    `step` raises the error; everything written before is complete.
+    If a step cannot be written, the wrapper stops the env with one action at rest, and `step`
+    raises the error; all earlier steps are complete.
 
     Args:
         env: Its observations are an image, a state, or a Dict of `image` and `state`; it has
             layouts.
         recording: Folder of the recording; created if missing.
-        driver: Who decides the actions passed to `step`.
+        driver: Kind of driver that decides the actions passed to `step`.
         about: Further fields of the header, such as `robot`, `body`, `source` and `notes`.
 
     Attributes:
@@ -149,19 +149,19 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self.path: Path | None = None
         self.steps = 0
         self.episodes = 0
-        # From a reset to the end of the episode, its header; its writer from the first step on.
+        # Header of the episode, from a reset to the end; its writer, from the first step on.
         self._header: EpisodeHeader | None = None
         self._writer: EpisodeWriter | None = None
-        # Of the next step: image, state and time of the observation; decision, if it was set.
+        # For the next step: image, state and time of the observation; decision, if it was set.
         self._seen: tuple[bytes | None, Numbers, int | None] = None, (), None
         self._decision: Step | None = None
 
     def decide(self, decision: Step) -> None:
-        """Set the decision for the next step, where it differs from the action passed to `step`.
+        """Set the decision for the next step, if it differs from the action passed to `step`.
 
         Args:
-            decision: The intended `action`, which is to be learned; its `driver`; and what a policy
-                `wanted` while somebody else drives.
+            decision: The intended `action`, which is to be learned; its `driver`; and the action
+                `wanted` by a policy while another driver drives.
         """
         self._decision = decision
 
@@ -191,8 +191,8 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         if self._header is None:
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
         jpeg, state, captured_ns = self._seen
-        writer, self._writer = self._writer, None  # In case that the next one cannot be created.
-        if writer is None or writer.is_full:  # An unwritable folder is found before anything moves.
+        writer, self._writer = self._writer, None  # In case the next one cannot be created.
+        if writer is None or writer.is_full:  # Check the folder before the env moves.
             writer = (
                 EpisodeWriter.create(self._recording, self._header)
                 if writer is None
@@ -253,7 +253,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             outcome: How the episode ended; "" if unspecified.
 
         Raises:
-            OutputError: If the header cannot be written; all steps are on disk all the same.
+            OutputError: If the header cannot be written; all steps are on disk nevertheless.
         """
         writer, self._writer = self._writer, None
         self._header = self._decision = None
@@ -271,7 +271,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         spec, inner, layout = self.env.spec, self.env.unwrapped, self._encoder.state_layout
         jpeg, _, captured_ns = self._seen
         kwargs = spec.kwargs if spec else {}
-        robot = getattr(inner, "welcome", None)  # Of a robot on the network, or an emulated one.
+        robot = getattr(inner, "welcome", None)  # Only envs of robots on the network have it.
         facts = ("robot", "body", "camera_pitch_deg", "camera_fovy_deg")
         fields: dict[str, Any] = {
             **{name: getattr(robot, name) for name in facts if hasattr(robot, name)},
@@ -292,7 +292,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
 
     def _give_up(self, why: ShapechangerError, *, over: bool) -> None:
         """Stop the env, and close the episode, even if either fails."""
-        # The action that moves nothing: 0, or the bound nearest to 0.
+        # The action at rest: 0, or the bound nearest to 0.
         box = cast("gym.spaces.Box", self.env.action_space)
         still = np.clip(np.zeros(box.shape), box.low, box.high).astype(np.float32)
         try:
@@ -321,5 +321,5 @@ def _outcome(step: Step, info: Mapping[str, Any]) -> str:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values as JSON can hold them; others as their `str`."""
+    """Return values for JSON; unsupported ones become their `str`."""
     return cast("dict[str, Any]", json.loads(json.dumps(dict(values), default=str)))

@@ -23,8 +23,8 @@ _WITHOUT_CAMERA: Final = (40, 480, 3)
 def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
     """Replay an episode in an env from the recorded seed, and return sentences on the differences.
 
-    The applied actions are replayed where they are known, because the frames follow from them; the
-    expert's intended actions may differ.
+    Applied actions are replayed if they are known, because they caused the frames; the intended
+    actions of an expert may differ.
     """
     header, kept = episode.header, episode.kept
     states: list[NDArray[np.float64]] = []  # Differences.
@@ -47,7 +47,7 @@ def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
         while not over and played < len(kept):
             step = kept[played]
             jpeg, state = encoder.encode(observation, info)
-            if encoder.state_layout == header.states:  # Others differ in meaning.
+            if encoder.state_layout == header.states:  # Other layouts cannot be compared.
                 states.append(np.abs(np.subtract(state, step.state)))
             if (before := episode.jpeg(step)) is not None and jpeg is not None:
                 old, new = decode_picture(before, step.frame), decode_picture(jpeg, "of the env")

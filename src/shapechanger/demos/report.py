@@ -29,7 +29,7 @@ _MAX_WIDTH: Final = 200  # Pixels; wider images are downsampled.
 
 _COLOURS: Final = {driver: "#{:02x}{:02x}{:02x}".format(*COLOURS[driver]) for driver in DRIVERS}
 _DROPPED: Final = "#d5d9de"
-# Colours of the numbers of an action, by Okabe and Ito, as those of the drivers.
+# Colours of the numbers of an action, by Okabe and Ito, like the colours of drivers.
 _TRACE_COLOURS: Final = ("#1b1f24", "#d55e00", "#cc79a7", "#56b4e9")
 _MAX_POINTS: Final = 1000
 

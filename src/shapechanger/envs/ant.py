@@ -2,7 +2,7 @@
 
 The model is `ant.xml` of Gymnasium (MIT). The bodies come from the original Shapechanger release
 (2017); the edits below reproduce its masses, inertias, ranges, gears and lengths exactly. The third
-segments of the release had no motors; here they have, and `ExtendedAntPassive` is the body without.
+segments of the release had no motors. They have motors here, except in `ExtendedAntPassive`.
 """
 
 from __future__ import annotations
@@ -100,9 +100,9 @@ ANT: Final = Family(
 
 
 # An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
-# m, where Gymnasium has 1.0, and BigAnt one of 1.80 m, where the 2017 release had 2.0.
+# m, where Gymnasium has 1.0, and BigAnt a ceiling of 1.80 m, where the release of 2017 had 2.0.
 _HIGHEST_STANDS: Final = 1.9
-# All start at 0.75 m, and small ants fall from there: they must not be unhealthy before they land.
+# All ants start at 0.75 m, and small ants fall from there: they must stay healthy until they land.
 _HIGHEST_STARTS: Final = 1.3
 
 _sum: Final = np.add.reduce
@@ -133,15 +133,15 @@ class _Ant(Binding):
         self._main_xy = memoryview(self.main_xy)
 
     def remember(self) -> bytes:
-        """Return the main body's place, which `conclude` needs from before the physics."""
+        """Return the main body's position before the physics step, which `conclude` needs."""
         return self._main_xy.tobytes()
 
 
 class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Run forwards on four legs: Gymnasium's `Ant-v5` with any body of the ant family.
 
-    Actions, observations, rewards and infos equal `Ant-v5`'s. An ant with more joints has larger
-    spaces.
+    Actions, observations, rewards and infos are equal to `Ant-v5`. An ant with more joints has
+    larger spaces.
 
     ## Action space
     `Box(-1, 1, (8,), float32)`: torques of the motors divided by their gear of 150 N·m. An action
@@ -328,7 +328,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             *(self._forward_reward_weight, self._healthy_reward),
             *(self._ctrl_cost_weight, self._contact_cost_weight),
         )
-        # Numbers of other types give results of other types; their representations differ too.
+        # Keep the types of the numbers, so that results have equal types and representations.
         return sys.intern(repr(shared))
 
     def conclude(
@@ -353,7 +353,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             observed.append(clipped[:, one.forces.shape[1] :])
         observations = np.concatenate(observed, axis=1, out=out)
         contact_cost = self._contact_cost_weight * _sum(np.square(clipped, out=clipped), axis=1)
-        with np.errstate(over="ignore", invalid="ignore"):  # As with Python's own numbers.
+        with np.errstate(over="ignore", invalid="ignore"):  # Python numbers do not warn either.
             velocity = (main_xy - main_xy_before) / one.dt
             upright = is_upright(after[:, 2], after[:, 4], after[:, 5], low, high)
             # Rounded as `dot` rounds, which need not be as NumPy rounds a sum of products.

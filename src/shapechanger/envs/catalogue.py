@@ -13,15 +13,15 @@ from shapechanger.errors import UnknownName
 
 NAMESPACE: Final = "shapechanger"
 
-# Envs of robots on the network: two of a finger on a rig, with the layouts of `Finger-v1` and
-# `FingerTrack-v1`; of a robot whose body is unknown until it answers; and of a vehicle with the
-# camera and the action of all vehicles.
+# Envs of robots on the network: two for a finger on a rig, with the layouts of `Finger-v1` and
+# `FingerTrack-v1`; one for a robot whose body is unknown until it answers; and one for a vehicle
+# with the camera and the action that all vehicles share.
 REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
 REMOTE_FINGER_TRACK: Final = "shapechanger/RemoteFingerTrack-v1"
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
 OWN_ROBOT: Final = "shapechanger/OwnRobot-v1"
-"""Id of the env of a robot and a task of the user's own, from a file."""
+"""Id of the env for a user's robot, from a file, with an optional task of the user."""
 
 MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 """Suffixes of files of users' robots."""
@@ -32,7 +32,7 @@ VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = {
     "shapechanger/Truck-v1": ("truck", "front wheels that steer and a trailer, in a yard"),
     "shapechanger/Boat-v1": ("boat", "propeller and rudder, in a harbour"),
 }
-"""Vehicle and summary by id; all have the same task, and their bodies form no family."""
+"""Vehicle and summary, keyed by id; all have the same task, and their bodies form no family."""
 
 
 def _variants(suffix: str, summary: str) -> Mapping[str, tuple[str, str]]:
@@ -43,10 +43,10 @@ def _variants(suffix: str, summary: str) -> Mapping[str, tuple[str, str]]:
 
 
 RANGES_ENVS: Final = _variants("Ranges", "the same, seeing distances; fast")
-"""Vehicle and summary by id, for the same task on distances instead of images."""
+"""Vehicle and summary, keyed by id, for the same task with distances instead of images."""
 
 WAYPOINT_ENVS: Final = _variants("Waypoint", "camera and action the same for all")
-"""Vehicle and summary by id, for the same task with waypoints as actions."""
+"""Vehicle and summary, keyed by id, for the same task with waypoints as actions."""
 
 
 class TaskEntry(msgspec.Struct, frozen=True):
@@ -77,7 +77,7 @@ FINGER_ENVS: Final[Mapping[str, TaskEntry]] = {
     "shapechanger/Finger-v1": _finger("reach:FingerReachEnv", "reach a point", 100),
     "shapechanger/FingerTrack-v1": _finger("track:FingerTrackEnv", "follow a path", 250),
 }
-"""Envs of the finger by id."""
+"""Envs of the finger, keyed by id."""
 
 
 class CatalogueEntry(msgspec.Struct, frozen=True):
@@ -157,7 +157,7 @@ def _odrl_entry(name: str) -> CatalogueEntry:
 CATALOGUE: Final = {entry.id: entry for entry in (_entry(*row) for row in _BODIES)}
 
 ODRL_ENVS: Final = {entry.id: entry for entry in map(_odrl_entry, odrl_bodies())}
-"""Envs with the bodies of ODRL by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
+"""Envs of ODRL, keyed by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
 
 # Envs whose bodies form no family, except the vehicle on the network.
 _TASK_IDS: Final = (
@@ -188,7 +188,7 @@ def register_all() -> None:
             _EPISODE_STEPS,
             reward_threshold=entry.reward_threshold,
             vector_entry_point=f"shapechanger.envs.make_vec:{entry.name}",
-            # Their own step requires a reset, and the tests check the envs.
+            # These envs check that `reset` was called, and the tests check the envs.
             order_enforce=entry.family not in _TUNED,
             disable_env_checker=entry.family in _TUNED,
             kwargs={"body": entry.body} if entry.body else {},
@@ -197,7 +197,7 @@ def register_all() -> None:
     _register(OWN_ROBOT, "shapechanger.envs.own:OwnRobotEnv", _EPISODE_STEPS, **vectors)
     for envs, kind, steps in (
         (VEHICLE_ENVS, "vehicle:VehicleEnv", _EPISODE_STEPS),
-        (RANGES_ENVS, "ranges:RangesEnv", 400),  # A learner meets more courses.
+        (RANGES_ENVS, "ranges:RangesEnv", 400),  # Short, so that learners see more courses.
         (WAYPOINT_ENVS, "vehicle:WaypointEnv", _EPISODE_STEPS),
     ):
         for env_id, (vehicle, _) in envs.items():

@@ -1,4 +1,4 @@
-"""Check the arguments of envs, their actions, and the envs, seeds and options of a vector env."""
+"""Check arguments and actions of envs, and the envs, seeds and options of vector envs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shapechanger.errors import (
     check_seed,
 )
 
-# Kinds of NumPy dtypes: booleans, integers and floats; a batch refuses booleans, as Gymnasium.
+# Kinds of NumPy dtypes: booleans, integers and floats; like Gymnasium, batches refuse booleans.
 _NUMBERS: Final = "biuf"
 _BATCH_NUMBERS: Final = "iufc"
 _LONGEST_BODY: Final = 60
@@ -102,7 +102,7 @@ def check_arguments(
     Args:
         env: Class of the env; its Gymnasium base class defines the arguments.
         family: Name of the family, for messages.
-        own: Arguments of every env that Gymnasium's constructors lack, with their defaults.
+        own: Arguments that all envs have in addition to Gymnasium's, with their defaults.
         arguments: Arguments keyed by name.
 
     Raises:
@@ -176,7 +176,7 @@ def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
 
 
 def _space(env: gym.Env[Any, Any], side: str) -> tuple[Any, tuple[str, ...]]:
-    """Return a space and the names of its numbers; none for an env without layouts."""
+    """Return a space and the names of its numbers; () for an env without layouts."""
     layout = getattr(env.unwrapped, f"{side}_layout", None)
     return getattr(env, f"{side}_space"), () if layout is None else tuple(layout.names)
 
@@ -232,7 +232,7 @@ def masked_options(
 
     Raises:
         TypeError: If the mask is not an array of booleans.
-        ValueError: If the mask has another shape, or is true nowhere.
+        ValueError: If the mask has another shape, or is all false.
     """
     if options is None or "reset_mask" not in options:
         return None, options

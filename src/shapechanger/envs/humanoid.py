@@ -30,7 +30,7 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Walk forwards on two legs with arms and a waist: `Humanoid-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Humanoid-v5`'s.
+    Actions, observations, rewards and infos are equal to `Humanoid-v5`.
 
     ## Action space
     `Box(-0.4, 0.4, (17,), float32)`: torques of the motors divided by their gears: 300 N·m for the
@@ -102,10 +102,10 @@ class HumanoidEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     sum(force^2)` of the contact forces and torques, which is at most 10.
 
     ## Start
-    Gymnasium's pose, with each joint moved to its nearest limit where the model puts it beyond, and
-    the trunk high enough for the feet, with uniform noise of `reset_noise_scale` (0.01). Joints
-    stay inside their limits and feet above the floor. The knees start at their limit, bent by 2
-    degrees, where Gymnasium's start straight.
+    Gymnasium's pose, with joints beyond a limit moved to the limit, and the trunk high enough for
+    the feet, with uniform noise of `reset_noise_scale` (0.01). Joints stay inside their limits and
+    feet above the floor. The knees start at their limit, bent by 2 degrees, whereas Gymnasium's
+    start straight.
 
     ## End
     Terminated when the torso is below 1 m or above 2 m. For other bodies these heights scale with

@@ -76,8 +76,8 @@ def contact_features(
 def inertia_features(model: mujoco.MjModel) -> list[Feature]:
     """Return ten features per body except the world: MuJoCo's `cinert`, in world axes.
 
-    `body/inertia/xx` ... `yz`, its inertia about the centre of mass of the whole, kg·m²; `mx` to
-    `mz`, its mass times its distance from there, kg·m; and `mass`, kg.
+    `body/inertia/xx` ... `yz`: its inertia about the centre of mass of the whole model, kg·m²; `mx`
+    to `mz`: its mass times its distance from there, kg·m; and `mass`, kg.
     """
     quantities = {axes: "kg·m²" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
     quantities |= {"mx": "kg·m", "my": "kg·m", "mz": "kg·m", "mass": "kg"}
@@ -87,8 +87,8 @@ def inertia_features(model: mujoco.MjModel) -> list[Feature]:
 def twist_features(model: mujoco.MjModel) -> list[Feature]:
     """Return six features per body except the world: MuJoCo's `cvel`, in world axes.
 
-    `body/twist/wx` ... `wz`, its angular velocity, rad/s, and `vx` ... `vz`, the velocity at the
-    centre of mass of the whole of a point fixed to it, m/s.
+    `body/twist/wx` ... `wz`: its angular velocity, rad/s. `vx` ... `vz`: its velocity at the centre
+    of mass of the whole model, m/s.
     """
     quantities = {f"w{axis}": "rad/s" for axis in "xyz"} | {f"v{axis}": "m/s" for axis in "xyz"}
     return _of_each_body(model, "twist", quantities)
@@ -106,8 +106,8 @@ def drive_features(model: mujoco.MjModel) -> list[Feature]:
 def action_layout(model: mujoco.MjModel) -> Layout:
     """Return a feature per control.
 
-    `actuator/motor` with its gear as gain; `actuator/target` of a servo, the position or velocity
-    that it drives its joint to.
+    `actuator/motor` has its gear as gain; `actuator/target` is the position or velocity to which a
+    servo drives its joint.
     """
     features: list[Feature] = []
     for a in range(model.nu):
@@ -150,7 +150,7 @@ def _servo_unit(model: mujoco.MjModel, actuator: int, kind: mujoco.mjtJoint | No
 
 
 def _joints(model: mujoco.MjModel) -> Iterator[tuple[mujoco.mjtJoint, Element, int]]:
-    """Yield kind and number of each joint, and its name: of its body for a free or ball joint."""
+    """Yield kind, number and name of each joint; free and ball joints have their body's name."""
     for j in range(model.njnt):
         kind, body = _J(model.jnt_type[j]), model.body(model.jnt_bodyid[j]).name
         is_axis = kind in _POSITION_UNIT
@@ -164,7 +164,7 @@ def _of_each_body(
     low: float = -math.inf,
     high: float = math.inf,
 ) -> list[Feature]:
-    """Return a feature `body/block/quantity` per body except the world and quantity with a unit."""
+    """Return features `body/block/quantity` for each body except the world, and each quantity."""
     names = [model.body(b).name for b in range(1, model.nbody)]
     return [
         Feature(f"{name}/{block}/{quantity}", unit, low, high, Element("body", name))

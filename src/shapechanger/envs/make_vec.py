@@ -1,8 +1,8 @@
 """Make a vector env from an id.
 
-Gymnasium calls a vector entry point without its id, and the JSON of a spec holds a string rather
-than a function. So each name of the catalogue is an attribute of this module too, such as
-`shapechanger.envs.make_vec:BigAnt`: `make_vec` with the id filled in.
+Gymnasium calls a vector entry point without its id, and the JSON of a spec needs a string instead
+of a function. So each name of the catalogue is also an attribute of this module, such as
+`shapechanger.envs.make_vec:BigAnt`, which is `make_vec` with this id.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from shapechanger.errors import UnknownName, VectorEnvError
 if TYPE_CHECKING:
     from shapechanger.envs.warp.env import WarpVectorEnv
 
-# Arguments that a backend does not have, with the reason.
+# Reasons why a backend does not have an argument, keyed by the argument.
 _REFUSED: Final = {
     "threads": dict.fromkeys(("device", "pool", "nconmax", "njmax"), "use backend='warp'"),
     "warp": {
         "threads": "all worlds are stepped at once",
-        "render_mode": "nothing is drawn on the device; render the same body with gymnasium.make",
-        "towards": "a reset draws no body by itself; hand it with options={'bodies': [...]}",
+        "render_mode": "a device cannot render; render the same body with gymnasium.make",
+        "towards": "a reset does not draw bodies; pass them as options={'bodies': [...]}",
     },
 }
 
@@ -66,30 +66,30 @@ def make_vec(
     """Make a vector env of one id; `gymnasium.make_vec` returns the same.
 
     Args:
-        env_id: A registered id; of the catalogue its name alone, such as `BigAnt`, will do. The
-            envs of any other class must not share what they change, as they step in threads.
+        env_id: A registered id, or a name of the catalogue, such as `BigAnt`. Envs of other
+            classes must not share mutable state, because they step in threads.
         num_envs: How many envs.
         backend: `threads` steps CPU envs with a few threads; `warp` steps worlds on a device, with
             tensors as results (see `shapechanger.envs.warp.WarpVectorEnv`).
         threads: How many threads step the envs, including the caller's; 1 starts none. None for as
             many as the cores that this process may use. The results do not depend on it.
-        device: Of the backend `warp`: `cpu`, `cuda:0`, ...; None for the first GPU, or the CPU
+        device: With the backend `warp`: `cpu`, `cuda:0`, ...; None for the first GPU, or the CPU
             if there is no GPU.
         bodies: One body per env instead of one for all. With threads, lengths and masses may
-            differ, spaces may not; on a device they may, too. Bodies of fingers, on a device alone,
-            are their parameters.
-        pool: Of the backend `warp`, instead of `bodies`: any number of bodies, which are compiled
+            differ, but spaces may not; on a device, spaces may differ too. Bodies of fingers, on a
+            device only, are their parameters.
+        pool: With the backend `warp`, instead of `bodies`: any number of bodies, which are compiled
             once and stay on the device. Each start of an episode draws one of them.
-        nconmax: Of the backend `warp`: how many contacts a world has memory for. None for as many
-            as it can ever have; with less memory steps are faster, and if a world ever has more
-            contacts a warning says so.
+        nconmax: With the backend `warp`: number of contacts that a world has memory for. None for
+            the largest possible number; steps are faster with less memory, and a warning is given
+            if a world has more contacts.
         njmax: The same for rows of constraints.
-        task_infos: Of the backend `warp`: whether steps return the infos of the CPU env, which
-            cost time and no learner reads.
+        task_infos: With the backend `warp`: whether steps return the infos of the CPU env, which
+            take time and are not used by learners.
         autoreset_mode: When to reset an env whose episode has ended, see Gymnasium; None for
-            `NEXT_STEP` with threads and `SAME_STEP`, the only one there, on a device.
+            `NEXT_STEP` with threads, and for `SAME_STEP`, the only mode there, on a device.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
-            On a device they are always copies.
+            On a device, observations are always copies.
         **arguments: Arguments of `gymnasium.make`, such as `render_mode` or `max_episode_steps`.
 
     Raises:

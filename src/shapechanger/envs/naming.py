@@ -1,4 +1,4 @@
-"""Envs as users name them: ids, short names, files of robots, and the learner tuned for each."""
+"""Resolve the names of envs that users give: ids, short names and files of robots."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ def short_name(env_id: str) -> str:
 def allow_own_modules(*names: str | None) -> None:
     """Let names such as `my_methods:warm-start` import modules of the current folder.
 
-    Only names that the user gives may do so: the name of a class in a policy's file must not find a
-    module in the same folder.
+    Only names that the user gives may import modules: a class named in a policy's file must not be
+    found in the same folder.
     """
     here = str(Path.cwd())
     own = any(name and (":" in name or name.endswith(".toml")) for name in names)
     if own and here not in sys.path:
-        sys.path.append(here)  # Worker processes take over the path.
+        sys.path.append(here)  # Worker processes inherit the path.
 
 
 def default_learner(env: EnvRef) -> str:
@@ -85,7 +85,7 @@ def default_learner(env: EnvRef) -> str:
 
 
 def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
-    """Return a vehicle's env as studies use it, which resets the vehicle after a collision."""
+    """Return a vehicle's env with the options of studies, which put it back after a collision."""
     if lenses and env.id not in VEHICLE_ENVS:
         raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
     if env.id not in {*VEHICLE_ENVS, *WAYPOINT_ENVS, *RANGES_ENVS}:

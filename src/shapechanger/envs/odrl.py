@@ -2,30 +2,29 @@
 
 ODRL publishes one model file per task; the names are its files'. These edits give bodies
 that move equally: masses, inertias, joints, geoms, limits, frictions and gravity agree to 1e-12, in
-the world's frame at the start pose. The origins of some bodies, which move nothing, lie elsewhere.
+the world's frame at the start pose. The origins of some bodies differ, without any effect.
 
 ODRL's own files of these robots were not at hand; all 80 targets were read on 2026-11-25 in two
 conversions by others, which agree where both were read:
 
 - `comp_flow_jax/envs/assets_v3/*.xml` of github.com/xingcw/CompositeFlow, commit 322fe9a: ODRL's
-  files as MuJoCo 2.3.3 has written them, with six digits (ants, half cheetahs, and some of the
-  other two). Of the hopper and the walker ODRL's have `coordinate="global"`, which MuJoCo has
-  removed since.
+  files, written by MuJoCo 2.3.3 with six digits (ants, half cheetahs, and some of the other two).
+  ODRL's files of the hopper and the walker have `coordinate="global"`, which MuJoCo has removed.
 - `env/mujoco/assets/{hopper,walker2d}_*.xml` of
   github.com/shivambhagat79/off-dynamics-explorative-rl, commit b13843f: hoppers and walkers in
   local coordinates and round numbers.
 
 The tasks and their levels come from `envs/mujoco/call_mujoco_env.py` of
 github.com/OffDynamicsRL/off-dynamics-rl, commit d1a69cd. Where only six digits are known, such as a
-half-length of 0.0777817, the round ends that give it, (0, 0, 0) and (0.11, 0, -0.11), are meant.
-That every half cheetah weighs 14 kg is the setting `settotalmass` of Gym's file, which a file that
-MuJoCo has written lacks; `envs/mujoco/assets/halfcheetah_morph_easy.xml` of
+half-length of 0.0777817, they are replaced by the round end points that give it, (0, 0, 0) and
+(0.11, 0, -0.11). Every half cheetah weighs 14 kg because of `settotalmass` in Gym's file, which
+files written by MuJoCo lack; `envs/mujoco/assets/halfcheetah_morph_easy.xml` of
 github.com/shivambhagat79/off-dynamics-rl, commit 995bf26, a changed thigh of ODRL, has kept it.
 
-`odrl.json` keys them by their full names, such as `odrl-ant-friction-0.1`. Frictions apply to
-all geoms, except that the hopper's floor keeps its own; gravity is a factor of 9.81 m/s²; easy,
-medium and hard leave 0.8, 0.5 and 0.2 of the range of a joint. A walker has one foot of less
-friction than the other, as Gym's, which Gymnasium's v5 has made equal.
+`odrl.json` keys them by their full names, such as `odrl-ant-friction-0.1`. Frictions apply to all
+geoms, except the hopper's floor; gravity is a factor of 9.81 m/s²; easy, medium and hard leave 0.8,
+0.5 and 0.2 of the range of a joint. One foot of a walker has less friction than the other, as in
+Gym; Gymnasium's v5 has made them equal.
 """
 
 from __future__ import annotations

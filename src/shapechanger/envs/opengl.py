@@ -95,7 +95,7 @@ def open_context(width: int, height: int) -> Any:
     try:
         context: Any = import_module(f"mujoco.{library}").GLContext(width, height)
         context.make_current()
-    except Exception as error:  # Of PyOpenGL, ctypes or MuJoCo, depending on what is missing.
+    except Exception as error:  # Raised by PyOpenGL, ctypes or MuJoCo.
         raise RenderError(
             f"MUJOCO_GL={library} does not work here ({_first_line(error)}): set it to one of "
             f"{', '.join(_LIBRARIES)}, or unset it."
@@ -105,7 +105,7 @@ def open_context(width: int, height: int) -> Any:
 
 def _no_library(chosen: str) -> RenderError:
     return RenderError(
-        f"With MUJOCO_GL={chosen} nothing can be drawn: set it to one of {', '.join(_LIBRARIES)}, "
+        f"MuJoCo cannot render with MUJOCO_GL={chosen}: set it to one of {', '.join(_LIBRARIES)}, "
         "or unset it."
     )
 

@@ -1,4 +1,4 @@
-"""A robot and a task of the user's own, from an MJCF or URDF file."""
+"""Env of a user's robot, from an MJCF or URDF file, with an optional task of the user."""
 
 from __future__ import annotations
 
@@ -50,39 +50,39 @@ from shapechanger.morphology.pose import (
 
 _Floats = NDArray[np.float64]
 
-# By default as many physics steps as come nearest to this; Gymnasium's runners take 8 to
+# Target duration of an action, s, rounded to whole physics steps; Gymnasium's runners take 8 to
 # 50 ms.
 _CONTROL_STEP_S: Final = 0.02
-# The pose that collections of models call so is where a robot starts.
+# Name of the start pose in common collections of models.
 _HOME: Final = "home"
 _J: Final = mujoco.mjtJoint
 
 
 class OwnRobotEnv(Reshapable, EzPickle):
-    """A robot of an MJCF or URDF file, with a task of the user's own.
+    """A robot from an MJCF or URDF file, with a built-in or custom task.
 
-    - **Observation**: positions and velocities of all joints, without the place of the trunk on the
-      floor; or the numbers that the task names as `observe`. `observation_layout` names each.
+    - **Observation**: positions and velocities of all joints, without the position of the trunk on
+      the floor; or the numbers in the task's `observe`. `observation_layout` names each number.
     - **Action**: one number per actuator, over its `ctrlrange`; `action_layout` has names, units
       and gains.
     - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
-    - **Robot**: all that the actuators move, see `shapechanger.morphology.pose.robot_bodies`.
-      Trunk, standing height, noise and lift are the robot's alone, and objects keep the file's own
-      start.
+    - **Robot**: all bodies that the actuators move, see
+      `shapechanger.morphology.pose.robot_bodies`. Trunk, standing height, noise and lift concern
+      the robot only, and objects keep their start pose in the file.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
       at least a tenth of its range inside its limits; the feet stand above the floor, and coupled
-      joints and closed loops are closed as well as in the file. The standing height is the one of
-      this pose.
-    - **End**: where the task ends it, and where the simulation diverges, with a reward of 0.
+      joints and closed loops are closed as well as in the file. The standing height is the height
+      in this pose.
+    - **End**: when the task ends it, or when the simulation diverges, with a reward of 0.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`.
         task: `walk`, or your own task: `module:Name`, a class, a function or an object; see
             `shapechanger.envs.own_tasks`.
         task_options: Arguments of the task's class.
-        body: Edits of `shapechanger.morphology`, or their JSON; the file's own robot by default.
-        rig: Edits that come before any body's, such as `AddMotor("*")` and `AddFloor()`, or
-            their JSON.
+        body: Edits of `shapechanger.morphology`, or their JSON; the unedited robot by default.
+        rig: Edits that are applied before those of any body, such as `AddMotor("*")` and
+            `AddFloor()`, or their JSON.
         frame_skip: Physics steps per action; None for a step of 20 ms.
         reset_noise_scale: Half-width of the uniform noise of the start pose, rad and m, and
             standard deviation of the noise of its velocities, rad/s and m/s.
@@ -91,11 +91,11 @@ class OwnRobotEnv(Reshapable, EzPickle):
     Attributes:
         task: The task.
         task_name: Its name.
-        measures: What a policy is measured by, the default first.
+        measures: Metrics of a policy, the default first.
         reset_noise_scale: As given.
     """
 
-    # `gym.make` reads it before there is an env; the rate of the frames follows from the model.
+    # `gym.make` reads the modes from the class; the rate of the frames depends on the model.
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
         "render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"]
     }
@@ -136,7 +136,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
             frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
         if frame_skip < 1:
             raise EnvArgumentError(f"frame_skip must be at least 1, got {frame_skip}.")
-        # `_finish` replaces the space by the layout's.
+        # `_finish` replaces the space by the space of the layout.
         space = gym.spaces.Box(-np.inf, np.inf, (0,), np.float64)
         cast("Any", MujocoEnv).__init__(self, str(self._file.path), frame_skip, space, **arguments)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.dt)}
@@ -169,12 +169,12 @@ class OwnRobotEnv(Reshapable, EzPickle):
             for j, at in enumerate(np.split(np.arange(model.nq), model.jnt_qposadr[1:])):
                 if model.joint(j).name in self._home or np.any(home[at] != model.qpos0[at]):
                     pose[at] = home[at]
-            # Lifted to the floor if the robot has grown since.
+            # Lift the robot to the floor, in case an edit has enlarged it.
             pose = StartRules(model).feasible(pose, mujoco.MjData(model), pose)
-        # In the middle of their ranges many legs are folded.
+        # Many legs are folded if joints are in the middle of their ranges.
         height, trunk = standing_height(model, pose), travelling_body(model)
         if height is None and trunk is not None and trunk_lift(model) is None:
-            # Such as a base on wheels that slides in a plane: it stays as high as it starts.
+            # For example a base on wheels that slides in a plane: it keeps its height.
             height = float(_posed(model, pose).xpos[trunk, 2])
         return pose, None if height is None else height - floor_height(model, pose)
 
@@ -216,7 +216,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         before = self.trunk_place()
         cast("Any", self).do_simulation(action, self.frame_skip)
         robot, diverged = self.seen(action, before), self.diverged
-        # A state that is huge or not finite is no fault of the task, and is not its business.
+        # A diverged state is not the task's fault, so the task is not called.
         terms = {} if diverged else reward_terms(self.task, self.task_name, robot)
         terminated = diverged or has_ended(self.task, self.task_name, robot)
         (x, y, _), (x_velocity, y_velocity, _) = robot.place.tolist(), robot.velocity.tolist()
@@ -232,7 +232,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
 
     def _draw_start(self) -> _Floats:
         scale, rules = self.reset_noise_scale, self.start_rules()
-        # Nothing is drawn for objects, so that a robot starts the same with and without them.
+        # No noise is drawn for objects, so that a robot starts the same with and without them.
         place, speed = self.init_qpos.copy(), self.init_qvel.copy()
         moved, pushed = int(rules.robot_places.sum()), int(rules.robot_dofs.sum())
         place[rules.robot_places] += self.np_random.uniform(-scale, scale, moved)
@@ -254,7 +254,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return np.concatenate(blocks)
 
     def _number(self, name: str) -> float:
-        """Return the number of a name."""
+        """Return the observable number with a name."""
         if name not in self._place_of:
             raise UnknownName(f"number of {self.family.name}", name, self._place_of)
         return float(self._all_numbers(contacts=True)[self._place_of[name]])
@@ -264,7 +264,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
         return self.data.xpos[self._trunk].copy()
 
     def seen(self, action: NDArray[Any], before: _Floats) -> RobotState:
-        """Return a task's view of the robot after an action, with the trunk's place before, m."""
+        """Return the state for a task after an action, with the trunk's place before it, m."""
         place = self.trunk_place()
         return RobotState(
             *(self.model, self.data, self.dt, place, (place - before) / self.dt),
@@ -280,7 +280,7 @@ class OwnRobotEnv(Reshapable, EzPickle):
 
     @property
     def family_name(self) -> str:
-        """The file and the rig, which two robots with bodies between them share."""
+        """The file and the rig, which must be the same to interpolate between two bodies."""
         return self._file.key
 
 
@@ -314,7 +314,7 @@ def from_mjcf(
     max_episode_steps: int = 1000,
     **arguments: Any,
 ) -> gym.Env[Any, Any]:
-    """Make an env of your own robot and task, as `gymnasium.make` does.
+    """Make an env of your robot and task; `gymnasium.make` makes the same.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
@@ -322,7 +322,7 @@ def from_mjcf(
         task: `walk`, or your own task: `module:Name`, a class, a function or an object; see
             `shapechanger.envs.own_tasks`. Worker processes need one that they can import.
         body: Edits of `shapechanger.morphology`, or their JSON.
-        rig: Edits that come before any body's, such as `AddMotor("*")` and `AddFloor()`.
+        rig: Edits that are applied before those of any body, such as `AddMotor("*")`.
         task_options: Arguments of the task's class.
         max_episode_steps: Steps after which an episode is truncated.
         **arguments: More arguments of `OwnRobotEnv`, such as `frame_skip` or `render_mode`.
@@ -330,11 +330,11 @@ def from_mjcf(
     Raises:
         UnknownName: If there is no such file, task, edit or argument.
         BrokenModel: If MuJoCo cannot read or compile the file.
-        MorphologyError: If it is no robot that can be controlled.
+        MorphologyError: If the model is not a robot that can be controlled.
         TaskError: If the task cannot be made or does not fit the robot.
     """
     file = Path(path).expanduser()
-    # A spec then makes the same env wherever the program has gone.
+    # With an absolute path, a spec makes the same env from any folder.
     where = str(file.resolve()) if file.is_file() else fspath(path)
     given = {"body": body and to_json(as_body(body)), "rig": rig and to_json(as_body(rig))}
     given |= {"path": where, "task": reference(task), "task_options": task_options}

@@ -1,4 +1,4 @@
-"""Robots of the user's own: MJCF and URDF files, and robots of `robot_descriptions`."""
+"""Load users' robots: MJCF and URDF files, and robots of `robot_descriptions`."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError,
 from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_json
 from shapechanger.morphology.families import Family
 
-# Names of the package are its modules' names.
+# Names of robots in the package are names of its modules.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
-# Paths of ROS and Gazebo.
+# Path schemes of ROS and Gazebo.
 _IN_PACKAGE: Final = re.compile(r"(package|model)://+(?P<name>[^/]+)/(?P<rest>.+)")
 
 
@@ -39,7 +39,7 @@ def compiling(path: Path) -> Generator[None]:
 
 @dataclass(frozen=True)
 class OwnFamily(Family):
-    """The bodies that edits make from a robot of the user's own.
+    """The bodies that edits make from a user's robot.
 
     Attributes:
         path: The file; the family is the same only for the same file and rig.
@@ -49,14 +49,14 @@ class OwnFamily(Family):
 
     @property
     def key(self) -> str:
-        """The file and the rig: two robots with the same key have bodies between them."""
+        """The file and the rig: only bodies with the same key can be interpolated."""
         return f"{self.path}{to_json(self.rig) if self.rig else ''}"
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
         """Load a model with the rig, and name all its elements.
 
-        A file that a URDF names as `package://NAME/REST` is looked for in the folder NAME, which is
-        one of the folders that the URDF is in, or in one of these.
+        A file that a URDF names as `package://NAME/REST` is searched in each folder NAME that
+        contains the URDF, or lies next to such a folder.
 
         Args:
             path: The file.
@@ -70,7 +70,7 @@ class OwnFamily(Family):
         except (ValueError, mujoco.FatalError) as error:
             raise BrokenModel(f"MuJoCo cannot read {path}: {reason_of(error)}.") from error
         _find_packages(spec, Path(path))
-        # The base of a URDF would vanish in the world, and its names with it.
+        # By default, MuJoCo would merge the base of a URDF into the world, and lose its names.
         spec.compiler.fusestatic = False
         name_elements(spec)
         with compiling(Path(path)):
@@ -101,12 +101,12 @@ def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
-    """Return the family of a robot of the user's own.
+    """Return the family of a user's robot.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
             `go2_mj_description`, which downloads it.
-        rig: Edits that come before any body's.
+        rig: Edits that are applied before those of any body.
 
     Raises:
         UnknownName: If there is no such file, or the package has no robot of this name.
@@ -146,13 +146,13 @@ def _described(name: str) -> Path:
 
 
 def require_robot(model: mujoco.MjModel, path: Path) -> None:
-    """Require a compiled model of a file that a policy can act on.
+    """Require a compiled model with joints and actuators.
 
     Raises:
-        MorphologyError: If it has no joints, no actuators, or one whose range is unknown.
+        MorphologyError: If it has no joints, no actuators, or an actuator without a range.
     """
     if not model.njnt:
-        raise MorphologyError(f"{path.name} has no joints, so nothing of it can move.")
+        raise MorphologyError(f"{path.name} has no joints, so it cannot move.")
     if not model.nu:
         motors = "rig=AddMotor('*')" if path.suffix == ".urdf" else "rig=AddMotor('*', GEAR)"
         raise MorphologyError(

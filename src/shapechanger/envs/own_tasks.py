@@ -1,4 +1,4 @@
-"""Tasks for the user's own robots: their observations, their rewards, and how they are found.
+"""Tasks for users' robots: built-in ones, and the interface of custom ones.
 
 A task is any object with a method `reward`, or a function:
 
@@ -31,23 +31,23 @@ _Floats = NDArray[np.float64]
 
 @dataclass(slots=True)
 class RobotState:
-    """What a task sees of a robot after a step.
+    """State of a robot after a step, for a task.
 
     Attributes:
         model: MuJoCo's model.
         data: MuJoCo's data.
         dt: Duration of a step, s.
-        place: Origin of the trunk in the world, shape (3,), m. The robot is all that the actuators
-            move. Its trunk is the body that can travel or, of a robot fixed to the world, its first
-            body.
+        place: Origin of the trunk in the world, shape (3,), m. The robot consists of all bodies
+            that the actuators move. Its trunk is the body that can travel, or the first body of a
+            robot that is fixed to the world.
         velocity: Mean velocity of that point over the step, shape (3,), m/s.
         up: Vertical part of the axis of the trunk that points up at the start: 1 upright, 0 on its
             side, -1 upside down.
         action: The action, shape (nu,).
         scaled_action: The action from -1 to 1 over the range of each actuator, shape (nu,).
         standing_height: Height of the trunk above the floor when it stands, m; None for a robot
-            that does not.
-        can_travel: Whether the trunk can go anywhere.
+            that does not stand.
+        can_travel: Whether the trunk can travel in all directions.
         numbers: All numbers that can be observed, keyed by name.
         floor: Height in the world of the floor below the start, m; 0 without a floor.
     """
@@ -71,7 +71,7 @@ class RobotState:
         return float(self.place[2]) - self.floor
 
     def __getitem__(self, name: str) -> float:
-        """Return the number of a name in the layout, such as `knee/angle`, observed or not.
+        """Return a number by its name in the layout, such as `knee/angle`, even if unobserved.
 
         Raises:
             UnknownName: If the robot has no such number.
@@ -83,9 +83,9 @@ class OwnTask(Protocol):
     """A task; it may also have the attributes below.
 
     - `observe`: names or globs of the numbers to observe, such as `("*/angle", "*/contact/*")`; by
-      default all positions and velocities but the place on the floor.
+      default all positions and velocities, except the position on the floor.
     - `terminated(robot)`: whether the episode ends; by default never.
-    - `measures`: what a policy is measured by (`shapechanger.contract.measure`), the default first.
+    - `measures`: metrics of a policy (`shapechanger.contract.measure`), the default first.
     - `check(robot)`: called once with the robot at its start; raises `TaskError` if the robot does
       not fit.
     """
@@ -97,15 +97,15 @@ class OwnTask(Protocol):
 
 @dataclass
 class Walk:
-    """Walk or run forwards along x, as Gymnasium's runners.
+    """Walk or run forwards along x, like Gymnasium's runners.
 
     Attributes:
         forward: Reward per m/s.
         alive: Reward of each step in which the robot is healthy.
         control: Cost of the sum of squares of the actions, each scaled to -1 to 1.
-        least_height: Share of its standing height below which the robot has fallen.
-        least_up: Vertical part of its up axis below which it has fallen: 0 lets it tilt by 90
-            degrees.
+        least_height: Share of its standing height below which the robot counts as fallen.
+        least_up: Vertical part of its up axis below which it counts as fallen: 0 permits a tilt of
+            90 degrees.
         terminate: Whether an episode ends when the robot has fallen.
     """
 
@@ -170,7 +170,7 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
     name = task if isinstance(task, str) else getattr(task, "__qualname__", type(task).__qualname__)
     rewards = callable(getattr(found, "reward", None))
     is_function = callable(found) and not rewards and not isinstance(found, type)
-    # Checked first: a name from a file must not make just any object, such as a process.
+    # Checked first, because a name from a file must not create arbitrary objects.
     if not is_function and not rewards:
         raise TaskError(
             f"The task {name!r} has no method `reward(robot)` that returns a dict of reward terms."
@@ -181,12 +181,12 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
         except TypeError as error:
             raise TaskError(f"The task {name!r} cannot be made: {error}.") from error
     elif options:
-        raise TaskError(f"The task {name!r} is no class, so it takes no options.")
+        raise TaskError(f"The task {name!r} is not a class, so it takes no options.")
     return cast("OwnTask", SimpleNamespace(reward=found) if is_function else found), name
 
 
 def reference(task: Any) -> Any:
-    """Return `module:Name` of a class or function, which JSON can hold; else the task itself."""
+    """Return `module:Name` of a class or function, for JSON, or else the task itself."""
     module, name = getattr(task, "__module__", ""), getattr(task, "__qualname__", "")
     importable = module != "__main__" and name.isidentifier() and not isinstance(task, str)
     return f"{module}:{name}" if importable else task
@@ -252,7 +252,7 @@ def observed(task: OwnTask) -> Sequence[str] | None:
     """Return the names and globs that a task observes; None for the default.
 
     Raises:
-        TaskError: If they are no sequence of names.
+        TaskError: If they are not a sequence of names.
     """
     given: Any = getattr(task, "observe", None)
     if given is None:

@@ -30,7 +30,7 @@ from shapechanger.morphology import Stretch, compile_body
 from shapechanger.morphology.families import BodyLike, Family
 
 # The poles of the original release (2017) end at (0.001, 0, h) m with h = 0.3 and 1.2: stretching
-# along z keeps the lean of 1 mm.
+# along z keeps the offset of 1 mm.
 PENDULUM: Final = Family(
     "InvertedPendulum",
     {
@@ -45,11 +45,11 @@ _CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.m
 _CART_AND_POLES: Final = (*_CART_AND_POLE, int(mujoco.mjtJoint.mjJNT_HINGE))
 
 FALLEN_RAD: Final = 0.2
-"""The lean at which Gymnasium ends an episode of the single pendulum."""
+"""Angle at which Gymnasium ends an episode of the single pendulum, rad."""
 FALLEN_M: Final = 1.0
 """The tip's height at which Gymnasium ends an episode of the unedited double pendulum, m."""
 CLIPPED_AT: Final = 10.0
-"""Where Gymnasium clips the double pendulum's velocities, m/s and rad/s, and its force, N."""
+"""Limit to which Gymnasium clips the double pendulum's velocities, m/s and rad/s, and force, N."""
 
 
 class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -225,7 +225,7 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         return [position_features(model)[0], *angles, *velocities, force]
 
     def step(self, action: Any) -> Any:
-        """Take one step, and end the episode at the height that fits the length of the poles."""
+        """Take one step, and end the episode at a height in proportion to the poles."""
         observation, reward, _, truncated, info = cast("Any", super()).step(action)
         return observation, reward, self._fallen, truncated, info
 

@@ -34,7 +34,7 @@ _SQUARE_M: Final = 0.5
 
 @functools.cache
 def _require_context() -> None:
-    """Require, once, that MuJoCo can draw; Gymnasium's renderer fails in many ways."""
+    """Require that MuJoCo can render, once; otherwise Gymnasium's renderer fails unclearly."""
     open_context(16, 16).free()
 
 
@@ -42,19 +42,19 @@ class Renderer(MujocoRenderer):
     """Renderer that is independent of other renderers in the process.
 
     OpenGL draws into and deletes from the current context. Gymnasium makes a context current only
-    when it is new, so of two envs one renders black frames, and closing one deletes the textures of
-    the other. It also terminates GLFW, and all windows with it. And its free camera does not follow
-    the robot.
+    when it is new, so one of two envs renders black frames, and closing one deletes the textures of
+    the other. It also terminates GLFW with all windows, and its free camera does not follow the
+    robot.
 
     Without a GPU, shadows, reflections and smoothed edges take nearly all of the time of a small
     frame; a window always has them.
 
     Args:
-        *arguments: As Gymnasium's renderer.
+        *arguments: Arguments of Gymnasium's renderer.
         shadows: Whether frames have shadows, reflections and smoothed edges; None draws them in
             frames of more than 256 x 256 pixels.
         follow: Number of the body that a free camera follows; None for a fixed camera.
-        **more: As Gymnasium's renderer.
+        **more: Further arguments of Gymnasium's renderer.
     """
 
     _viewers: dict[str, Any]
@@ -79,11 +79,11 @@ class Renderer(MujocoRenderer):
 
         Args:
             render_mode: The mode.
-            markers: Shapes to draw besides the model, as `add_marker` of Gymnasium's viewers takes
-                them.
+            markers: Shapes to draw in addition to the model, as arguments of `add_marker` of
+                Gymnasium's viewers.
 
         Raises:
-            RenderError: If nothing can be drawn here.
+            RenderError: If rendering does not work on this machine.
         """
         if render_mode != "human":
             _require_context()
@@ -97,8 +97,8 @@ class Renderer(MujocoRenderer):
         for marker in markers:
             viewer.add_marker(**marker)
         with _restored(self.data.geom_xpos):
-            # Contacts take floors as infinite, and images do not, so those below a body that the
-            # camera follows move along, by whole tiles so that they seem to stay.
+            # Floors are infinite for contacts but not in images, so floors below a body that the
+            # camera follows are moved along, by whole tiles so that they seem fixed.
             for floor, period in self._floors.items() if self._follow is not None else ():
                 place = self.data.geom_xpos[floor, :2]
                 place += np.round((self.data.xpos[self._follow, :2] - place) / period) * period
@@ -231,7 +231,7 @@ _BACKGROUND: Final = [235 / 255.0] * 3
 _HIDDEN_GROUP: Final = 3
 _DARK_TILE: Final = [0.42, 0.45, 0.48]
 _LIGHT_TILE: Final = [0.54, 0.57, 0.6]
-# Light from all sides, and from lamps, in models with lamps; in a shadow only the first is left.
+# Ambient light and light of lamps, in models with lamps; shadows have ambient light only.
 _AMBIENT: Final = [0.3] * 3
 _DIFFUSE: Final = [0.7] * 3
 # Higher than any body of the catalogue reaches, m.
@@ -241,15 +241,15 @@ _SHADOW_CLIP: Final = 0.3
 
 
 def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
-    """Make a model's floor, lights and sky fit to look at; nothing of this moves a body.
+    """Improve the appearance of a model's floor, lights and sky, without effect on the physics.
 
-    Sensors do not see it either: range finders detect a geom by its opacity, which stays.
+    Sensors are not affected either: range finders detect a geom by its opacity, which is unchanged.
 
-    Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
+    Gymnasium's floors are black and white and mirror half of the light: they distract from the
     body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
-    are black. Its lights hang lower than large bodies stand, and their shadow maps, which stay
-    behind a body that walks, leave dark stripes far from it. The pendulums' models have no sky,
-    and most have no light: their frames would be dark shapes on black.
+    are black. Its lights are lower than large bodies, and their shadow maps, which do not follow a
+    body that walks, leave dark stripes far from it. The pendulums' models have no sky, and most
+    have no light: their frames would be dark shapes on black.
 
     Args:
         spec: The model.
@@ -288,7 +288,8 @@ def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
 def halve_textures(spec: mujoco.MjSpec) -> None:
     """Halve the width and height of all procedural textures of bodies and skies.
 
-    They are most of a compiled model: 0.47 of the 0.53 MB of Gymnasium's ant, and 0.12 MB halved.
+    They take most of the memory of a compiled model: 0.47 of 0.53 MB of Gymnasium's ant, and 0.12
+    MB if halved.
     Floors are not changed, because the edges of their tiles would blur.
     """
     for texture in spec.textures:

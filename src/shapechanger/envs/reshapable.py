@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
 
 # Distance of a camera that follows a body, in multiples of its reach: 3.5 m for the ant; and of a
-# fixed one: 2.04 m for the inverted pendulum, as Gymnasium's.
+# fixed camera: 2.04 m for the inverted pendulum, as in Gymnasium.
 _FOLLOWING_PER_REACH: Final = 3.0
 _FIXED_PER_REACH: Final = 4.1
 BAD_STATE: Final = slice(
@@ -70,11 +70,10 @@ class Reshapable(MujocoEnv):
     - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
       more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
       without them, do not.
-    - `fast_model`: whether a cheaper model that moves equally to the last bit may step the physics.
-      Ants and pendulums have such a model; other envs accept the argument and always step their
-      own.
+    - `fast_model`: whether a cheaper model with bit-equal motion may step the physics. Ants and
+      pendulums have such a model; other envs accept the argument and ignore it.
     - `towards`: another body of the family with the same spaces. Each reset then draws the body
-      uniformly on the way from `body` to it, unless the reset names one.
+      uniformly between `body` and it, unless the reset gives a body.
 
     Attributes:
         family: The bodies that the env can have.
@@ -115,7 +114,7 @@ class Reshapable(MujocoEnv):
         self._own_arguments: dict[str, Any] = own
         self.fast_model = own["fast_model"]
         self.body = self.family.body(body)
-        # Both ends of the way on which each reset draws a body.
+        # The bodies between which each reset draws a body.
         self._ends: tuple[Body, Body] | None = None
         if own["towards"] is not None:
             self._ends = self.body, self.family.body(own["towards"])
@@ -136,10 +135,10 @@ class Reshapable(MujocoEnv):
         }
 
     def _finish(self, arguments: dict[str, Any]) -> None:
-        """Derive what follows from the compiled model, and record what a pickle needs."""
+        """Set attributes that depend on the compiled model, and record the state for pickling."""
         self._follow_body()
         shape = (self.observation_layout.size,)
-        if self.observation_space.shape != shape:  # Gymnasium's constructor has its own body's.
+        if self.observation_space.shape != shape:  # The constructor set it for Gymnasium's body.
             self.observation_space = gym.spaces.Box(-np.inf, np.inf, shape, np.float64)
         self._renew_renderer()
         # Gymnasium's constructor has recorded its own arguments only.
@@ -170,7 +169,7 @@ class Reshapable(MujocoEnv):
     def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Compile the present body instead of the plain file."""
         model = compile_body(self._load_family(), self.body)
-        # As in Gymnasium's own method: the frame buffer must be as large as the frame.
+        # As in Gymnasium's method: the frame buffer must be as large as the frame.
         buffer = model.vis.global_
         buffer.offwidth = max(buffer.offwidth, self.width)
         buffer.offheight = max(buffer.offheight, self.height)
@@ -189,7 +188,7 @@ class Reshapable(MujocoEnv):
         return spec
 
     def _follow_body(self) -> None:
-        """Derive from the model what the env needs to know about it."""
+        """Set attributes of the env that depend on the model."""
         self.init_qpos, self.standing_height = self._start_and_height(self.model)
         self.init_qvel = np.zeros(self.model.nv)
         self.observation_layout = Layout(tuple(self._observation_features(self.model)))
@@ -240,7 +239,7 @@ class Reshapable(MujocoEnv):
             action: Shape (nu,), finite.
 
         Raises:
-            BadAction: If the action has another shape or is not finite; nothing has moved then.
+            BadAction: If the action has another shape or is not finite; the state is unchanged.
         """
         check_action(self, action)
         self._require_reset("step")
@@ -284,7 +283,7 @@ class Reshapable(MujocoEnv):
         self._started = True
 
     def _require_reset(self, method: str) -> None:
-        """Refuse a call before the first reset, also of a copy that was made in mid-episode."""
+        """Refuse a call before the first reset, also for a copy that was made during an episode."""
         if not self._started:
             raise gym.error.ResetNeeded(
                 f"Cannot call env.{method}() before calling env.reset(): "
@@ -292,7 +291,7 @@ class Reshapable(MujocoEnv):
             )
 
     def start_rules(self) -> StartRules:
-        """Return the rules that make a start pose feasible, for the model as it is now."""
+        """Return the rules that make a start pose feasible, for the present model."""
         return StartRules(self.model)
 
     def _change_body(self, body: Body) -> None:
@@ -314,13 +313,13 @@ class Reshapable(MujocoEnv):
         self._renew_renderer()
 
     def _renew_renderer(self) -> None:
-        """Render the present body from here on."""
+        """Render the present body from now on."""
         self.mujoco_renderer.close()
         trunk, camera = travelling_body(self.model), self._given_camera
         if not camera and trunk is not None:
             camera = {"distance": _FOLLOWING_PER_REACH * self.reach, "elevation": -20.0}
         elif not camera:
-            # Gymnasium's distance fits its own pole: a longer one would be cut.
+            # Gymnasium's distance fits its pole: a longer one would be cut off.
             default = cast("dict[str, Any]", self.mujoco_renderer.default_cam_config or {})
             distance = max(default.get("distance", 0.0), _FIXED_PER_REACH * self.reach)
             camera = {"distance": distance, "lookat": self.model.body(1).pos.tolist()}
@@ -372,13 +371,13 @@ class Reshapable(MujocoEnv):
         return self.family.name
 
     def arguments_towards(self, target: Reshapable, alpha: float) -> dict[str, Any]:
-        """Return arguments that make a body at `alpha`, 0 to 1, of the way to another env's."""
+        """Return arguments for the body at `alpha`, 0 to 1, between this one and another env's."""
         return {"body": to_json(interpolate(self.body, target.body, alpha))}
 
     def arguments_between(self, target: Reshapable) -> dict[str, Any]:
         """Return arguments that draw a body between this one and another env's at each reset."""
         ends = {"body": to_json(self.body), "towards": to_json(target.body)}
-        # A fast model that serves one episode takes longer to find than it saves.
+        # For a single episode, finding a fast model takes longer than it saves.
         return {**ends, "fast_model": False}
 
     def drawn_bodies(self, count: int, seed: int, split: Split) -> list[str]:
@@ -404,10 +403,10 @@ class Reshapable(MujocoEnv):
         Args:
             width: Width in pixels.
             height: Height in pixels.
-            reach: Radius in view around the middle of the body, m; None for its own reach.
+            reach: Radius in view around the middle of the body, m; None for the body's reach.
 
         Raises:
-            RenderError: If nothing can be drawn here.
+            RenderError: If rendering does not work on this machine.
         """
         pose = standing_pose(self.model, self.init_qpos)
         return draw(self.model, pose, width, height, reach or self.reach)

@@ -36,7 +36,7 @@ from shapechanger.morphology.pose import standing_height, start_pose, trunk_lift
 
 
 def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
-    """Family of runners in a plane with thigh, shank and foot of each leg; its parts are stumps."""
+    """Family of runners in a plane: legs of thigh, shank and foot, which edits can shorten."""
     limbs = [limb for leg in legs.values() for limb in leg]
     return Family(
         name,
@@ -56,17 +56,17 @@ _LEFT: Final = ("thigh_left", "leg_left", "foot_left")
 WALKER2D: Final = _runner("Walker2d", {"right leg": ("thigh", "leg", "foot"), "left leg": _LEFT})
 SWIMMER: Final = Family("Swimmer", {"Swimmer": ()})
 
-# Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
+# Limit to which Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
 _CLIPPED_AT: Final = 10.0
 
 
 class Runner(Reshapable):
     """Mixin for Gymnasium's runners, which start upright with straight legs.
 
-    The start pose is Gymnasium's, with each joint moved to its nearest limit where the model puts
-    it beyond, and the trunk high enough for the feet. Noise is drawn as in Gymnasium; joints stay
-    inside their limits and feet above the floor. The standing height is the start pose's,
-    because in the middle of their ranges these legs are folded.
+    The start pose is Gymnasium's, with joints beyond a limit moved to the limit, and the trunk high
+    enough for the feet. Noise is drawn as in Gymnasium; joints stay inside their limits and feet
+    above the floor. The standing height is the height in the start pose, because these legs are
+    folded if joints are in the middle of their ranges.
 
     Args:
         body: Name of a body of the family, edits of `shapechanger.morphology`, or their JSON; None
@@ -74,10 +74,10 @@ class Runner(Reshapable):
         **arguments: All arguments of Gymnasium's env and of `Reshapable`.
 
     Attributes:
-        measures: What a policy is measured by.
-        root: Types of the joints that the task reads the trunk's place from.
-        place_size: How many numbers of the trunk's place the observation omits by default.
-        velocity_limit: Where the observation clips velocities, m/s and rad/s.
+        measures: Metrics of a policy.
+        root: Types of the joints that determine the trunk's position.
+        place_size: How many numbers of the trunk's position the observation omits by default.
+        velocity_limit: Limit to which observed velocities are clipped, m/s and rad/s.
     """
 
     measures: ClassVar[tuple[Measure, ...]] = (FORWARD_SPEED, RETURN)
@@ -170,7 +170,7 @@ class HalfCheetahEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Run forwards in a plane on two legs: Gymnasium's `HalfCheetah-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `HalfCheetah-v5`'s.
+    Actions, observations, rewards and infos are equal to `HalfCheetah-v5`.
 
     ## Action space
     `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gears of 120, 90, 60, 120,
@@ -241,7 +241,7 @@ class HopperEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Hop forwards on one leg: Gymnasium's `Hopper-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Hopper-v5`'s.
+    Actions, observations, rewards and infos are equal to `Hopper-v5`.
 
     ## Action space
     `Box(-1, 1, (3,), float32)`: torques of the motors divided by their gear of 200 N·m. An action
@@ -304,7 +304,7 @@ class Walker2dEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Walk forwards in a plane: Gymnasium's `Walker2d-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Walker2d-v5`'s.
+    Actions, observations, rewards and infos are equal to `Walker2d-v5`.
 
     ## Action space
     `Box(-1, 1, (6,), float32)`: torques of the motors divided by their gear of 100 N·m. An action
@@ -372,7 +372,7 @@ class SwimmerEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 ):
     """Swim forwards in a plane: Gymnasium's `Swimmer-v5` with an editable body.
 
-    Actions, observations, rewards and infos equal `Swimmer-v5`'s.
+    Actions, observations, rewards and infos are equal to `Swimmer-v5`.
 
     ## Action space
     `Box(-1, 1, (2,), float32)`: torques of the motors divided by their gear of 150 N·m. An action

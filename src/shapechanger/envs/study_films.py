@@ -1,4 +1,4 @@
-"""Film what the policies of a study do: source, zero-shot and every arm that was trained."""
+"""Film the policies of a study: source, zero-shot and every trained arm."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _FINER: Final = 2
 _FILM_S: Final = 10.0
 _PICTURES: Final = 6
 _GAP: Final = 4
-# View of a vehicle: radius around it, m, and directions from its heading, rad: from behind, and
-# from ahead where a wall hides it.
+# View of a vehicle: radius around it, m, and directions from its heading, rad: from behind, or
+# from the front if a wall hides the vehicle.
 _REACH_M: Final = 0.45
 _FOLLOWING_RAD: Final = (0.4, -0.4, 0.0, 2.7, -2.7)
 
@@ -43,7 +43,7 @@ class _Scene(NamedTuple):
     env: EnvRef
     act: Act
     body_map: BodyMap | None
-    drives: bool = False  # Its env renders what it sees, so it is filmed from outside.
+    drives: bool = False  # A vehicle's env renders its camera, so it is filmed from outside.
 
 
 def film_study(
@@ -60,14 +60,14 @@ def film_study(
         study: The study.
         folder: Its folder.
         film: File of a film of all scenes side by side; None for no film.
-        source_policy: File of the source policy; None for the study's own.
+        source_policy: File of the source policy; None for the policy of the study.
         shadows: Whether frames have shadows.
     """
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0
     scenes = _scenes(study, folder, source_policy)
-    # Bodies of one family have one scale.
+    # Bodies of one family are drawn at the same scale.
     distances: dict[str, float] = {}
     for env in (scene.env for scene in scenes if scene.env.id in CATALOGUE):
         family = CATALOGUE[env.id].family
@@ -87,7 +87,7 @@ def film_study(
         rows.append(np.stack(frames))
     if film is not None and rows:
         longest = max(len(row) for row in rows)
-        # An episode that ended stays at its last frame.
+        # The last frame of an episode that ended is repeated.
         padded = [np.concatenate([row, row[-1:].repeat(longest - len(row), 0)]) for row in rows]
         side_by_side: NDArray[np.uint8] = np.concatenate(padded, axis=2)
         write_film([*side_by_side], film, fps)

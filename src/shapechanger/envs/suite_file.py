@@ -1,4 +1,4 @@
-"""Suites in TOML files: which envs are studied, with which learner and budget."""
+"""Suites in TOML files: envs, learner, budget and arms of several studies."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class SuiteFile(msgspec.Struct, forbid_unknown_fields=True):
     Attributes:
         learner: Name of the learner; empty for the one tuned on the target.
         arms: Arms of each study; empty for scratch, zero-shot and fine-tune.
-        steps: Target steps of a run; None for the learner's own number.
-        source_steps: Source steps of a source policy; None for the learner's own number.
+        steps: Target steps of a run; None for the learner's number.
+        source_steps: Source steps of a source policy; None for the learner's number.
     """
 
     envs: tuple[_Env, ...] = ()

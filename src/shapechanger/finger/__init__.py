@@ -1,8 +1,8 @@
 """A human index finger of four joints, pulled by seven tendons: simulated, on a rig, or its twin.
 
-Begin with `anatomy` (joints, tendons, sources of all numbers), `parameters` (what differs between
-fingers) and `reach` (the env `Finger-v1`; `track` follows `paths`). `controller` moves one, `gap`
-draws fingers like a rig's, `identify` finds a finger's parameters from a log, `remote` runs
+Begin with `anatomy` (joints, tendons, sources of all numbers), `parameters` (the differences
+between fingers) and `reach` (the env `Finger-v1`; `track` follows `paths`). `controller` moves one,
+`gap` draws fingers like a rig's, `identify` finds a finger's parameters from a log, `remote` runs
 the same tasks on a rig, `twin` simulates one, and `gpu` steps many fingers at once.
 """
 

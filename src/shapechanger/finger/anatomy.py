@@ -46,7 +46,7 @@ DIP_BAND: Final = math.radians(8.0)
 """Distance from that angle within which the end joint moves freely, rad. Chosen."""
 DIP_COUPLING: Final = 0.15
 """Stiffness of the coupling beyond the band, N·m/rad. Chosen so that random commands leave the end
-joint within 16 degrees of that angle, and identification can still tell the two joints apart."""
+joint within 16 degrees of that angle, and identification can still distinguish the two joints."""
 
 JOINT_REST: Final[NDArray[np.float64]] = np.radians([25.0, 0.0, 35.0, 21.0])
 """Equilibrium angles of the passive tissue, rad: the slightly curled finger of a resting hand.

@@ -45,7 +45,7 @@ class FingerController:
 
     Args:
         layout: Layout of the observations.
-        actions: What an action commands.
+        actions: Meaning of an action.
         parameters: Assumed parameters of the finger.
         gain: Gain on joint errors, 1/s; lower for a finger with delayed commands.
     """
@@ -129,7 +129,7 @@ class FingerBabble:
 
     Args:
         layout: Layout of the observations, with a feature `JOINT/angle` for each joint.
-        actions: What an action commands.
+        actions: Meaning of an action.
         seed: Seed of the motions.
         control_dt: Duration of an action, s.
 

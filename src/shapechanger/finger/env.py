@@ -37,7 +37,7 @@ from shapechanger.finger.visuals import tendon_legend
 from shapechanger.layout import Element, Feature, Layout
 
 _MODES: Final = ("human", "rgb_array", "depth_array")
-# From the thumb's side, with the workspace and the end of the hand in view.
+# View from the thumb's side, with the workspace and the end of the hand.
 _CAMERA: Final[Mapping[str, Any]] = {
     "lookat": np.array([0.017, 0.0, -0.024]),
     "distance": 0.18,
@@ -48,7 +48,8 @@ _PICTURE: Final = 480
 # Duration of the motions that a finger is identified from, s.
 _BABBLE_S: Final = 10.0
 
-# Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
+# Weight of the reward in a source for a rig: fast changes are penalised, because a rig cannot
+# follow.
 _CALM: Final = {"change": 5.0}
 
 SMOOTHNESS: Final = Measure("smoothness", "1", "smoothness", "episode")
@@ -59,7 +60,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     """An index finger moved by seven tendons; derived classes define the task.
 
     Args:
-        actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
+        actions: Meaning of an action; see `shapechanger.finger.tensions.DRIVES`.
         parameters: Parameters of the finger, as `FingerParameters`, their JSON, some keyed by name,
             or the name of a set, "an-1983"; by default the nominal finger.
         gap: Distribution, or its name, that the finger is drawn from instead of `parameters`; see
@@ -174,7 +175,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Take one step.
 
         Raises:
-            BadAction: If the action has another shape or is not finite; nothing has moved then.
+            BadAction: If the action has another shape or is not finite; the state is unchanged.
             ResetNeeded: If `reset` was never called.
         """
         if self._senses is None:
@@ -232,7 +233,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return frame if frame is None else tendon_legend(frame, self._pulled)
 
     def _markers(self) -> list[dict[str, Any]]:
-        """Return the marks that frames show besides the finger."""
+        """Return the marks that frames show in addition to the finger."""
         return []
 
     @property
@@ -305,7 +306,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def individual(self) -> str:
-        """The argument that says which finger this is, where the gap has many; else empty."""
+        """The argument that selects a finger of the gap, if it has several; else empty."""
         return "finger_seed" if self._is_drawn_anew else ""
 
     def randomised_source(self) -> dict[str, Any]:
@@ -335,7 +336,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
 
 FingerLike = FingerParameters | Mapping[str, Any] | str
-"""A finger as users give it: parameters, their JSON, some keyed by name, or the name of a set."""
+"""A finger as an argument: parameters, their JSON, some keyed by name, or the name of a set."""
 
 
 def as_finger(value: FingerLike | None) -> FingerParameters:

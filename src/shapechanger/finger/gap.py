@@ -20,7 +20,7 @@ from shapechanger.finger.tensions import spans_all_torques, tensions_for_torque
 # two hundred with arm errors of 25 %.
 _TRIES: Final = 1000
 
-# Parameters whose logarithm is drawn.
+# Parameters that are drawn by their logarithm.
 _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
 
 # Torque that the tendons must give each joint alone, N·m.
@@ -52,7 +52,7 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         tension_noise: Standard deviation of measured tensions, N.
         tendon_damping: N·s/m.
         least_tension: N.
-        around: The finger that errors and factors refer to, whose path of commands all have.
+        around: The finger that errors and factors refer to; all fingers have its path of commands.
 
     Raises:
         FingerError: If a range is empty, not finite or negative, begins at 0 where logarithms are
@@ -125,7 +125,7 @@ _DEGREE: Final = math.radians(1.0)
 _RIG: Final = NOMINAL.replace(
     path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
 )
-_RIG_MOST_N: Final = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)  # As `TENDONS`.
+_RIG_MOST_N: Final = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)  # In the order of `TENDONS`.
 _RIG_LEAST_N: Final = 1.0
 
 # A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.

@@ -253,8 +253,8 @@ class DeviceTrack(DeviceFinger):
     """Fingers that follow a path.
 
     Paths are functions of NumPy: their points, and the first angles at them, are computed on the
-    CPU from times that are known there. So a step asks the device which worlds have started, and
-    copies points to it.
+    CPU from times that are known there. So a step reads from the device which worlds have started,
+    and copies points to it.
     """
 
     @override

@@ -61,7 +61,7 @@ TARGET: Final = "target"
 _CABLE_DAMPING_RATIO: Final = 0.3
 _SKIN: Final = (0.87, 0.68, 0.58, 1.0)
 _HAND: Final = (0.75, 0.57, 0.48, 1.0)
-# As large as the tolerance of a reached target.
+# Radius equal to the tolerance of a reached target.
 _MARK: Final = (0.10, 0.55, 0.25, 0.45)
 _MARK_RADIUS_M: Final = 0.005
 # Length of the metacarpal, two thirds of a palm, for images only.
@@ -135,7 +135,7 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
     for k, name in enumerate(PHALANGES):
         length, radius = PHALANX_LENGTH_M[k], PHALANX_RADIUS_M[k]
         body = parent.add_body(name=name, pos=[at, 0, 0])
-        # As long as the bone with its caps, which overlap at the joints.
+        # Length of the bone with its caps, which overlap at the joints.
         body.add_geom(
             name=name,
             type=capsule,

@@ -123,9 +123,9 @@ def angles_for(
 ) -> tuple[NDArray[np.float64], float]:
     """Return joint angles whose fingertip is closest to a point: inverse kinematics.
 
-    Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, m, (3,),
-    those near the start are preferred whose end joint is within the band of the hood. `near` are
-    angles to start from, rad, (4,); by default a finger's at rest. The distance of the
+    Damped Gauss-Newton steps, kept within the joints' ranges. Among the angles for a point, m,
+    (3,), angles near the start with the end joint within the band of the hood are preferred. `near`
+    are angles to start from, rad, (4,); by default those of a finger at rest. The distance of the
     fingertip from the point, m, is returned too.
     """
     best = _search(place, JOINT_REST if near is None else near)

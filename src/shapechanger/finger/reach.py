@@ -129,7 +129,7 @@ class FingerReachEnv(FingerEnv):
         target = place_features("target", _TARGET)
         if goal:
             achieved = [Feature(f"achieved/{axis}", "m", element=_TARGET) for axis in "xyz"]
-            # In the order in which Gymnasium flattens a Dict.
+            # The order in which Gymnasium flattens a Dict.
             features = [*achieved, *target, *senses]
             self.observation_space = gym.spaces.Dict(
                 {

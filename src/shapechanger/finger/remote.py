@@ -158,7 +158,7 @@ class RigMixin(FingerEnv):
         """
         self._seed = seed
         if self._own is not None and self._operator is not None:
-            for name in TENDONS:  # Cool the servos of its own twin; a rig's cool in pauses.
+            for name in TENDONS:  # Cool the servos of its twin; servos of a rig cool in pauses.
                 self._operator.break_servo(name, "")
         observation, info = super().reset(seed=seed, options=options)
         return observation, self._with_rig(info)
@@ -167,7 +167,7 @@ class RigMixin(FingerEnv):
         """Take one step.
 
         Raises:
-            BadAction: If the action has another shape or is not finite; nothing was sent then.
+            BadAction: If the action has another shape or is not finite; no command was sent then.
             ResetNeeded: If `reset` was never called, or the link was lost.
         """
         observation, reward, terminated, _, info = super().step(action)
@@ -256,7 +256,7 @@ class RigMixin(FingerEnv):
         return senses
 
     def _sense(self, state: NDArray[Any]) -> FingerSenses:
-        """Read a state of the rig, and show it, or the true one of its own twin, in the plant."""
+        """Read a state of the rig, and show it, or the true state of its twin, in the plant."""
         senses = self._rig_senses.read(state, self._rig_info["absent"], self._command)
         if self._operator is not None:
             truth = self._operator.where().truth
@@ -308,7 +308,7 @@ class RemoteFingerEnv(RigMixin, FingerReachEnv):
 
     ## End
     Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
-    link. `info["truncated_because"]` says why.
+    link. `info["truncated_because"]` is the reason.
 
     ## Info
     As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
@@ -350,7 +350,8 @@ class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     as in `RemoteFinger-v1`; then the point moves.
 
     ## End
-    Truncated after 250 steps, 5 s, and when the rig stops; `info["truncated_because"]` says why.
+    Truncated after 250 steps, 5 s, and when the rig stops; `info["truncated_because"]` is the
+    reason.
 
     ## Info
     As `FingerTrack-v1`, and the entries of a rig as in `RemoteFinger-v1`.

@@ -119,7 +119,7 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
 
 
 PREVIEW_S: Final = (0.06, 0.12, 0.20)
-"""Lookahead of the observation besides the end of the next step, s."""
+"""Lookahead of the observation in addition to the end of the next step, s."""
 RANDOM: Final = "random"
 """Value of `path` for another path at each reset."""
 

@@ -131,7 +131,7 @@ class FingerWorld(World):
         return angle + self._joint_noise * float(self._noise.standard_normal())
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Do nothing: the servo bus moves the finger, by `pull`."""
+        """Do nothing, because the servo bus moves the finger by `pull`."""
 
     def truth(self) -> dict[str, float]:
         """Return the position of the fingertip, m, and the angles of the joints, rad."""

@@ -63,14 +63,14 @@ class Family:
     """One model, its named bodies, and how its other bodies differ.
 
     Attributes:
-        name: Name of the family, which is also that of its unedited body.
+        name: Name of the family and of its unedited body.
         bodies: Edits of each named body.
         bodies_by_joint: Names for bodies that the model leaves unnamed, by the name of their joint.
         axes: The numbers by which its bodies differ; none for a family that cannot be sampled.
         parts: Parts that a place, such as a leg, can have instead of the model's own, by the name
             of the place and of the part.
-        published: Edits of bodies that others have published, or their JSON, by name.
-        rig: Edits that come before those of any body, such as two more legs.
+        published: Edits of published bodies, or their JSON, keyed by name.
+        rig: Edits that are applied before those of any body, such as two more legs.
     """
 
     name: str
@@ -140,7 +140,7 @@ class Family:
         return tuple(edits)
 
     def sample(self, n: int, seed: int = 0, split: Split = "train") -> list[Body]:
-        """Draw bodies; the first ones are the same whatever the number is.
+        """Draw bodies; the first ones do not depend on the number.
 
         - "train": each axis within its training range, drawn uniformly in its logarithm, and in
           half of the bodies one part.
@@ -153,7 +153,7 @@ class Family:
 
         Args:
             n: How many.
-            seed: Seed of the draws; each split has draws of its own.
+            seed: Seed of the draws; the draws of splits are independent.
             split: Which part of the family.
 
         Raises:

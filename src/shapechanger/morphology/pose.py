@@ -23,7 +23,7 @@ GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFI
 # A joint starts at least this share of its range inside its limits, because the spring of a limit
 # pushes at the limit itself.
 _INSIDE: Final = 0.1
-# Distance at which a floor is looked for; a body that is higher stands on nothing.
+# Distance within which a floor is searched; a higher body has no floor.
 _FAR_M: Final = 1000.0
 # A damping that slows a joint down by more than this factor in one step locks it.
 _LOCKED: Final = 1e5
@@ -84,7 +84,7 @@ def moved_trees(model: mujoco.MjModel) -> list[int]:
         for i in np.flatnonzero(model.eq_active0).tolist()
     ]
     size = -1
-    while size < len(moved):  # No actuator counts for what an equality couples.
+    while size < len(moved):  # Joints that an equality couples count without an actuator.
         size = len(moved)
         for tied in coupled:
             if not tied.isdisjoint(moved):
@@ -110,7 +110,7 @@ class Lift(NamedTuple):
 
     Attributes:
         place: Its index in qpos.
-        up: 1 if a larger value is higher; -1 if it is lower, as of a slide that points down.
+        up: 1 if a larger value is higher; -1 if it is lower, such as for a slide that points down.
         at_zero_m: Height of the trunk's origin in the world at the value 0, m.
     """
 
@@ -176,7 +176,7 @@ def _unlimited_slides(model: mujoco.MjModel) -> list[int]:
 
 
 def _in_robot(model: mujoco.MjModel, joints: NDArray[np.bool_]) -> list[int]:
-    """Return the joints of the robot among some, those of the tree with most actuators first."""
+    """Return the joints of the robot among some; the tree with most actuators comes first."""
     found = np.flatnonzero(joints).tolist()
     if model.ntree < 2 or not found:
         return found
@@ -198,7 +198,7 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
 def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
     """Return a pose (nq,) with the trunk moved up or down until the lowest point is on the floor.
 
-    The pose is returned as it is if nothing raises the trunk or no floor is below it.
+    The pose is returned unchanged if no joint raises the trunk or no floor is below it.
     """
     rules, pose = StartRules(model), pose.copy()
     if rules.lift is not None and (gap := rules.floor_gap(_posed(model, pose))) < _FAR_M:
@@ -215,7 +215,7 @@ def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float 
             and the trunk upright.
 
     Returns:
-        None for a body that nothing raises or that has no floor to stand on.
+        None for a body that no joint raises or that has no floor to stand on.
     """
     rules = StartRules(model)
     if rules.lift is None:

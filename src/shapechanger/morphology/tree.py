@@ -1,6 +1,6 @@
 """The kinematic tree of a body: its trunk, its limbs, and numbers that describe each.
 
-A policy for many bodies reads them in addition to what it senses: N. Bohlinger and others, One
+A policy for many bodies observes them in addition to the state: N. Bohlinger and others, One
 Policy to Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
 """
 
@@ -30,14 +30,14 @@ LIMB_NUMBERS: Final = (
     *("axis x", "axis y", "axis z"),
     *("end x", "end y", "end z", "length"),  # From the joint to the limb's farthest end: the same.
     *("mass", "mass with limbs"),  # Decades above 1 kg.
-    *("start", "lower", "upper"),  # Of the joint, rad or m; 0 for limits that it has not.
+    *("start", "lower", "upper"),  # Start and limits of the joint, rad or m; 0 without limits.
     *("strength", "damping", "armature"),  # Decades, so that each is about 1.
     *("limited", "slides", "depth"),
 )
 """Meaning of the numbers of a limb; vectors are in the trunk's frame, in the start pose.
 
-Directions are apart from lengths, so that a leg in front on the left is the same for a policy
-whatever its size.
+Directions are separate from lengths, so that a leg in front on the left has the same direction for
+any size.
 """
 
 TRUNK_NUMBERS: Final = ("mass", "mass with limbs", "start height", "radius", "friction", "gravity")
@@ -45,7 +45,7 @@ TRUNK_NUMBERS: Final = ("mass", "mass with limbs", "start height", "radius", "fr
 
 
 class Limb(msgspec.Struct, frozen=True):
-    """One joint, and what it moves up to the next.
+    """One joint, and the segment that it moves up to the next joint.
 
     Attributes:
         joint: Name of its hinge or slide.
@@ -54,7 +54,7 @@ class Limb(msgspec.Struct, frozen=True):
         actuator: Name of the actuator that moves the joint; empty without one. One of a
             tendon, site or body counts for the joint that it turns most in the start pose, of those
             without an actuator yet; of equal ones, for the nearest to the trunk.
-        numbers: What describes it, see `LIMB_NUMBERS`.
+        numbers: Its description, see `LIMB_NUMBERS`.
     """
 
     joint: str
@@ -67,10 +67,10 @@ class Tree(msgspec.Struct, frozen=True):
     """A trunk and its limbs.
 
     Attributes:
-        trunk: Names of the trunk's body and of those fixed to it; of a body that cannot travel, of
-            the world.
-        numbers: What describes the trunk, see `TRUNK_NUMBERS`.
-        limbs: Its limbs, each after the one that carries it.
+        trunk: Names of the trunk's body and of bodies fixed to it; of the world if the body cannot
+            travel.
+        numbers: Description of the trunk, see `TRUNK_NUMBERS`.
+        limbs: Its limbs, each after the limb that carries it.
         trunk_numbers: Names of the numbers of the trunk.
         limb_numbers: Names of the numbers of each limb.
     """

@@ -19,7 +19,7 @@ except ImportError as error:
     raise MissingExtra("matplotlib", "report") from error
 
 # Okabe & Ito (2008), distinguishable with any colour vision; the green is darker than theirs, so
-# that a thin line of it is visible on white. Purple, the dark yellow and grey are not theirs.
+# that a thin line of it is visible on white. Purple, the dark yellow and grey are additions.
 BLUE: Final = "#0072B2"
 ORANGE: Final = "#D55E00"
 GREEN: Final = "#007A5A"

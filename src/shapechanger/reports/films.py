@@ -25,7 +25,7 @@ _VP9: Final = {
 
 
 def require_film(path: Path) -> None:
-    """Raise OutputError unless a video can be written to a path, whose suffix is a video's."""
+    """Raise OutputError unless a path is writable and has the suffix of a video."""
     if path.suffix.lower() not in _FILMS and not path.is_dir():
         raise OutputError(f"Cannot write {path}: a film ends with one of {', '.join(_FILMS)}.")
     require_file(path)

@@ -54,7 +54,7 @@ def interval_text(
     if low is None or high is None:
         return f"{number(value, signed=signed)} (no interval)"
     decimals = _decimals(high - low, 2)
-    # An end other than zero must not be rounded to zero: it decides whether the interval has 0.
+    # An end other than zero must not be rounded to zero, or the interval would seem to contain 0.
     while decimals < _MAX_DECIMALS and any(
         end != 0.0 and round(end, decimals) == 0.0 for end in (low, high)
     ):

@@ -31,7 +31,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class FoundRobot:
-    """Announcement of a robot, which proves nothing.
+    """Announcement of a robot; it is not authenticated.
 
     Attributes:
         name: Name of the robot.
@@ -51,7 +51,7 @@ class FoundRobot:
 def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
     """Find the robots on the local network, sorted by name.
 
-    A network may block multicast DNS; an address works all the same.
+    A network may block multicast DNS; connecting by address works nevertheless.
 
     Args:
         timeout_s: Time to listen, s.

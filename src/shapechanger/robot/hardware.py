@@ -22,7 +22,7 @@ class Clock:
     """The machine's monotonic clock; a twin overrides all of it.
 
     Attributes:
-        is_real: Whether the hardware takes its time; a twin's chips respond at once.
+        is_real: Whether the hardware needs time to respond; a twin's chips respond at once.
     """
 
     is_real: ClassVar = True
@@ -41,8 +41,8 @@ class Clock:
                 time stands still.
 
         Returns:
-            False if only the limit was reached. A twin's time moves in grants: the result is True
-            at each grant, and only then.
+            False if only the limit was reached. A twin's time advances in steps that are granted;
+            the result is True exactly at each of them.
         """
         left_s = min((until_ns - time.monotonic_ns()) / 1e9, at_most_s)
         poll = select.poll()
@@ -52,16 +52,16 @@ class Clock:
         return bool(ready) or time.monotonic_ns() >= until_ns
 
     def keep_alive(self, beat: Callable[[], object]) -> None:
-        """Let a call to the hardware send heartbeats while a twin's board is held up.
+        """Let a call to the hardware send heartbeats while a twin's board is delayed.
 
-        `beat` sends one if it is due. On a robot this does nothing: a guard that hangs in a bus is
-        silent, and must be replaced.
+        `beat` sends a heartbeat if it is due. On a robot this has no effect: a guard that hangs in
+        a bus is silent, and must be replaced.
         """
 
     async def sleep(self, seconds: float) -> int | None:
         """Let `seconds` pass in the daemon, and return when the newest frame was captured, ns.
 
-        The daemon can wait for that frame. None where frames arrive in their own time.
+        The daemon can wait for that frame. None if frames are not tied to steps.
         """
         import asyncio  # Imported here, because the guard does not need it.
 
@@ -127,7 +127,7 @@ class Hardware:
         """
         if self._pin_factory is None:
             with translate_errors(
-                Exception,  # Of gpiozero or lgpio, or one of them is missing.
+                Exception,  # Raised by gpiozero or lgpio, or one of them is missing.
                 to=lambda error: RobotError(
                     f"Cannot open this machine's pins ({str(error) or type(error).__name__}); "
                     "`shapechanger robot serve --twin` needs none."
@@ -152,14 +152,14 @@ class Hardware:
         return open_port(settings)
 
     def close(self) -> None:
-        """Close all of it."""
+        """Close all devices."""
         if self._pin_factory is not None:
             self._pin_factory.close()
             self._pin_factory = None
 
 
 def load(place: str) -> Any:
-    """Import what is at MODULE:NAME."""
+    """Import the object MODULE:NAME."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
 

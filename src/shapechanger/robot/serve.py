@@ -1,4 +1,4 @@
-"""Service of a robot: the plan of its processes, its twin's board, and its name on this machine."""
+"""Serve a robot: plan its processes, start its twin, and store it as a known robot."""
 
 from __future__ import annotations
 
@@ -49,33 +49,33 @@ _TWIN_PATIENCE_MS: Final = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class Service:
-    """How a robot is served, on its hardware or on a twin."""
+    """Options of serving a robot, on its hardware or on a twin."""
 
     twin: bool = False
-    """Run on simulated pins and in a simulated world instead of this machine's pins. It is then
-    known here by its name, unless another robot is."""
+    """Run on simulated pins and in a simulated world instead of this machine's pins. The robot is
+    then stored as a known robot, unless another one has its name."""
     host: str = ""
     """Address to listen at; all of this machine's if not given, only 127.0.0.1 with --twin or
     --insecure."""
     port: int = 5000
-    """Port to listen at; 0 for any that is free."""
+    """Port to listen at; 0 for any free port."""
     clock: Literal["real", "twin"] = "real"
     """With --twin: whether time passes by itself, or only when a program takes a step."""
     wired_as: str = ""
-    """With --twin: the profile of the parts that are really attached, if not the one served."""
+    """With --twin: the profile of the simulated wiring, if it differs from the served profile."""
     seed: int = 0
     """With --twin: seed of the world."""
     twin_folder: Path | None = None
     """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
-    given. A twin that runs there already is used as it is."""
+    given. If a twin already runs there, it is used."""
     insecure: bool = False
     """Serve without TLS. The key is still needed."""
     credentials: Path | None = None
-    """Folder of the robot's key and certificate, if not the one that `init` made."""
+    """Folder of the robot's key and certificate; the folder that `init` made if not given."""
     arm_by_program: bool = False
-    """Let programs arm the robot. By default a person has to; on a twin anyone may."""
+    """Let programs arm the robot. By default only persons may; on a twin anyone may."""
     announce: bool = True
-    """Let `shapechanger robot find` find it."""
+    """Announce the robot, so that `shapechanger robot find` lists it."""
     ready_file: Path | None = None
     """File to write the port and the fingerprint into, as JSON, once the robot can be reached."""
 
@@ -83,8 +83,8 @@ class Service:
     """Folder for the robot's recordings; ~/.local/share/shapechanger/recordings/NAME if not
     given."""
     policy: Path | None = None
-    """A policy on board, as `shapechanger policies export` writes it, which drives once a person
-    arms the robot for it; or a folder of them, among which the console chooses."""
+    """A policy on board, written by `shapechanger policies export`, which drives once a person arms
+    the robot for it; or a folder of policies, one of which is chosen in the console."""
 
     def board(
         self, profile: Profile, place: Callable[[], Place], undo: contextlib.ExitStack
@@ -169,7 +169,7 @@ class Service:
         credentials = load_credentials(self.credentials or credentials_folder(name))
         try:
             robot = robot_at(str(address_here(self.host, port)), name, credentials)
-        except LinkError:  # Not every name of a robot is a file's.
+        except LinkError:  # Not every name of a robot is a valid name of a file.
             return
         plan.daemon["port"] = port  # A daemon that is started again keeps it.
         sys.stdout.flush()
@@ -178,7 +178,7 @@ class Service:
             os.waitpid(child, 0)
             return
         try:
-            # A child of init: the supervisor has no child that it does not know.
+            # A child of init, because the supervisor may only have the children that it started.
             if not os.fork() and _is_reached(Path(plan.daemon["ready_file"]), port, served_by):
                 say(store(robot))
         finally:
@@ -248,6 +248,6 @@ def store(robot: KnownRobot) -> str:
 
 
 def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:
-    """Return a robot as its clients know it."""
+    """Return the address and credentials that clients use for a robot."""
     key = credentials.key_file.read_text().strip()
     return KnownRobot(name, address, key, credentials.fingerprint.hex())

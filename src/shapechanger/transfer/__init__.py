@@ -1,6 +1,6 @@
 """Transfer of policies between bodies: maps, transplants, studies and measures.
 
-This package exports what needs no learner. `shapechanger.transfer.study` runs studies and
+This package exports learner-independent names only. `shapechanger.transfer.study` runs studies and
 `shapechanger.transfer.transplant` moves the weights of a policy; both need the extra `learn`.
 """
 

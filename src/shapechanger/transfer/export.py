@@ -1,7 +1,7 @@
 """Export trained policies as ONNX, from their env's own observations to its own actions.
 
-The metadata has the names of the layouts and the card, so that a program that knows nothing of
-Shapechanger can see what each number is.
+The metadata has the names of the layouts and the card, so that a program without Shapechanger can
+read the meaning of each number.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def steady(ref: EnvRef, found: IdentifiedEnv) -> IdentifiedEnv:
 
 
 def single_body(ref: EnvRef) -> EnvRef:
-    """Return the env of one body, where a reference stands for many."""
+    """Return the env of one body, if a reference has many bodies."""
     return EnvRef(ref.id, {name: v for name, v in ref.kwargs.items() if name != "bodies"})
 
 

@@ -29,7 +29,7 @@ NO_SKILL: Final = ("random", "zero-action")
 # The index in this tuple determines the seeds of a kind; seeds of other methods follow from their
 # names.
 _KINDS: Final = (SOURCE, "random", *ARMS, "randomised", "identified", "zero-action")
-# Welch's interval needs two of each.
+# Welch's interval needs two seeds of each arm.
 _MIN_SEEDS: Final = 2
 
 
@@ -51,8 +51,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         task: Source and target.
         body_map: Map between their layouts.
-        measure: What runs are compared by: the name of a measure of the target, of one of its
-            reward terms, or "return".
+        measure: Quantity by which runs are compared: the name of a measure of the target, of one of
+            its reward terms, or "return".
         unit: Unit of the measure.
         learner: Name of the learner.
         settings: Its settings, the same in every arm.
@@ -135,7 +135,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         return int(entropy.generate_state(1)[0] >> 1)
 
     def target_of(self, run: Run) -> EnvRef:
-        """The target of a run: the individual of its index, if there are individuals."""
+        """The target of a run, with the individual that its index selects, if there are several."""
         if not self.individual:
             return self.task.target
         return self.task.target.having({self.individual: run.index})

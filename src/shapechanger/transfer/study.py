@@ -129,7 +129,7 @@ class TaskTraits(NamedTuple):
 
 
 def inspect_task(task: TransferTask) -> TaskTraits:
-    """Make both envs of a task once, and read what a study needs to know."""
+    """Make both envs of a task once, and read their traits for a study."""
     with closing(task.source.make()) as source, closing(task.target.make()) as target:
         traits: list[EnvTraits] = []
         for ref, made in ((task.source, source), (task.target, target)):
@@ -312,14 +312,14 @@ def run_study(
         plan: The plan.
         out: Folder of the study; made if missing.
         source_policy: The file that `plan.source_policy` is the digest of.
-        executor: What runs the runs; None for processes on this machine.
+        executor: Executor of the runs; None for processes on this machine.
         on_progress: Called with the name of a run, its steps so far and whether it has ended.
         command: The command that repeats the study.
         traits: What `inspect_task` returned for the task; None to inspect it now.
         looked: Numbers of seeds at which parts of this study were evaluated elsewhere.
 
     Raises:
-        EmptyShift: If nothing changes between source and target.
+        EmptyShift: If source and target do not differ.
         OutputError: If `out` cannot be written; finished runs are kept.
         ForeignStudy: If `out` holds another study, or something else.
         CorruptStudy: If a file in `out` cannot be read.

@@ -1,8 +1,8 @@
 """Suites: several studies that share the runs of their targets and sources.
 
-Scratch on a target is the same training whatever the source is, and a source policy is the same
-whatever its target is; seeds follow from the kind and index of a run alone. So a study copies such
-runs from the finished studies of its suite.
+Training from scratch on a target does not depend on the source, and a source policy does not depend
+on the target; the seed of a run depends on its kind and index only. So a study copies such runs
+from the finished studies of its suite.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
 
 def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
-    """Make a study's folder below `out`, with the runs that other studies there share with it."""
+    """Make a study's folder in `out`, and copy the runs that it shares with other studies there."""
     make_folder(out)
     folder = out / name
     claim_folder(plan, folder)
@@ -75,8 +75,8 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
     for plan, folder in zip(plans, folders, strict=True):
         if text := changes_between(whole, plan, folders[0], folder):
             raise ForeignStudy(
-                f"{folders[0]} and {folder} hold runs with other versions of what they name. "
-                f"{text}. Merge only folders of one version; nothing was changed."
+                f"{folders[0]} and {folder} hold runs with different versions of an env, a learner "
+                f"or a method. {text}. Merge only folders of one version; nothing was changed."
             )
         if whole != plan and not whole.extends(plan):
             raise ForeignStudy(
@@ -107,8 +107,8 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     other = read_plan(sibling, remedy)
     if text := changes_between(other, plan, sibling, folder):
         raise ForeignStudy(
-            f"{sibling} was run with another version of what this study names. {text}. A suite "
-            f"has one version of each: give another --out, or delete {sibling} to repeat it."
+            f"{sibling} was run with another version of an env, a learner or a method. {text}. A "
+            f"suite has one version of each: give another --out, or delete {sibling} to repeat it."
         )
     same = msgspec.structs.replace(
         other,

@@ -108,7 +108,7 @@ def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
 
 
 def differences(plan: Plan, old: Identities, new: Identities) -> str:
-    """Return how parts of a plan differ, in words; empty if they do not."""
+    """Describe how parts of a plan differ; empty if they do not."""
     titles = {"source": f"{plan.task.source}", "target": f"{plan.task.target}"}
     changed = {
         titles.get(part, f"the {part}"): old.get(part, NOTHING).changes_to(new.get(part, NOTHING))
@@ -118,7 +118,7 @@ def differences(plan: Plan, old: Identities, new: Identities) -> str:
 
 
 def require_planned(plan: Plan, run: Run) -> None:
-    """Refuse a run whose robot, task, method or learner is not the planned one in this process.
+    """Refuse a run if its robot, task, method or learner differs from the plan in this process.
 
     A file may be edited while a study runs, and another node of a cluster may have another version.
     """

@@ -298,8 +298,8 @@ class CloneLearner(Learner[CloningSettings]):
             )
         if policy.card.env is None:
             raise PolicyError(
-                f"{path} learned from recordings of no env: give a clone that `shapechanger train` "
-                "or a study has written."
+                f"{path} learned from recordings without an env: give a clone that "
+                "`shapechanger train` or a study has written."
             )
         return policy.card
 

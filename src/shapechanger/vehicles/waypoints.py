@@ -1,6 +1,6 @@
-"""Waypoints, the action that all vehicles share: to steering, from steering, and from recordings.
+"""Waypoints, the action that all vehicles share, and their conversion to and from steering.
 
-The frames of all vehicles are warped to one virtual camera, in which waypoints are seen.
+Waypoint policies see the frames of all vehicles warped to one virtual camera.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
 AHEAD_M: Final = 0.8
-"""Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
+"""Distance of the waypoint, m: the look-ahead distance of a car at 1.8 m/s."""
 
 WIDEST_RAD: Final = 1.0
 """Bearing of the waypoint at an action of -1 or 1, rad."""
@@ -37,7 +37,7 @@ WIDEST_RAD: Final = 1.0
 LEAST_THROTTLE: Final = 0.25
 """Least throttle, in size, that overcomes the friction at rest of all vehicles."""
 
-_SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
+_SLOWEST_MPS: Final = 0.3  # Below this, a measured speed hardly predicts the next turn.
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
 # Of a fit to a drive: largest change of the steering within the lag of the turn, s, the jitter of
 # the steps' times, s, and the least share of the turning that the steering must explain.
@@ -53,8 +53,8 @@ _MOTION: Final = ("steering/applied", "speed", "yaw_rate")
 class SteeringResponse:
     """How fast a vehicle turns when it steers.
 
-    rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn the vehicle
-    the more, the faster it rolls; tracks turn it where it stands.
+    rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn a vehicle
+    faster when it rolls faster; tracks turn it even at rest.
 
     Attributes:
         per_metre: Turn for each metre at full steering, rad/m.
@@ -83,7 +83,7 @@ def measure_response(env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int) ->
         speed_at: Place of the speed, m/s, in the numbers that it observes.
         yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
     """
-    from scipy.optimize import nnls  # Not there on a robot, which does not measure itself.
+    from scipy.optimize import nnls  # Not installed on robots, which do not measure themselves.
 
     rng = np.random.default_rng(0)
     env.reset(seed=0)
@@ -115,19 +115,19 @@ def fit_response(
 ) -> SteeringResponse:
     """Fit how a vehicle turns to one or more drives.
 
-    Only steps count in which the steering is known not to have changed for 0.1 s, because the turn
-    lags behind it: neither the first of an episode, nor the first after a gap. Those in which
-    something was not measured are left out, too.
+    The turn lags behind the steering, so steps count only if the steering has not changed for
+    0.1 s. The first steps of an episode, the first after a gap, and steps with an unmeasured value
+    are left out.
 
     Args:
         steering: Steering that the outputs had, -1 to 1, positive to the right, shape (n,).
         speed: Speed along the heading, m/s, shape (n,).
         yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
         times_s: Time of each step since the start of its episode, s, shape (n,); an episode begins
-            where time does not go on.
+            where the time does not increase.
 
     Raises:
-        StudyError: If the drive does not tell it.
+        StudyError: If steering does not explain enough of the turning.
     """
     from scipy.optimize import nnls
 
@@ -191,7 +191,7 @@ def command(
         action: Bearing and speed, each from -1 to 1; values beyond are clipped.
         response: How the vehicle turns.
         speed: Its speed along the heading, m/s.
-        on_the_spot: Whether it turns by its tracks, of which full throttle would saturate one.
+        on_the_spot: Whether it turns by its tracks; full throttle would saturate one of them.
 
     Raises:
         SpaceMismatch: If the action is not two finite numbers.
@@ -236,7 +236,7 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
         *,
         turns_on_the_spot: bool,
     ) -> None:
-        """See another env, with steering and throttle, through waypoints.
+        """Wrap another env, whose actions are steering and throttle.
 
         Args:
             env: The env.
@@ -277,7 +277,7 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-        """Start an episode of the vehicle's own env."""
+        """Start an episode of the wrapped env."""
         gym.Env.reset(self, seed=seed)  # Sets `np_random`.
         seen, info = self._env.reset(seed=seed, options=options)
         return self._rectified(seen), info
@@ -298,7 +298,7 @@ class WaypointView(gym.Env[Any, NDArray[np.float32]]):
         return self._rectified(seen), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the newest frame as the camera took it; see the vehicle's own env."""
+        """Return the newest frame as the camera took it; see the wrapped env."""
         return self._env.render()
 
     def close(self) -> None:
@@ -316,10 +316,10 @@ class WaypointLabels(NamedTuple):
 
     Attributes:
         actions: Bearing and speed, each from -1 to 1, shape (n, 2).
-        usable: Whether a command says where the way is, shape (n,). Those of a vehicle that stands
-            still, drives backward, or did not measure its speed do not.
-        at_limit: Whether it only says that the way is at least as far aside, shape (n,): at full
-            steering, or beyond the widest bearing.
+        usable: Whether a command determines a waypoint, shape (n,). It does not if the vehicle
+            stands still, drives backward, or did not measure its speed.
+        at_limit: Whether the bearing is only a lower bound, shape (n,): at full steering, or
+            beyond the widest bearing.
     """
 
     actions: NDArray[np.float32]
@@ -332,10 +332,11 @@ def waypoints_of(
 ) -> WaypointLabels:
     """Return the waypoints that a driver's commands lead to, the inverse of `command`.
 
-    The steering gives the circle that the vehicle drives, and the waypoint is where it is `AHEAD_M`
-    away. At full steering, and where tracks turn on the spot, the way may be farther aside than the
-    waypoint, which is then the nearest one with the same command. The throttle gives the speed;
-    throttles below a quarter, of brakes too, become speeds that `command` turns into a quarter.
+    The steering gives the circle that the vehicle drives, and the waypoint is the point of the
+    circle at the distance `AHEAD_M`. At full steering, and if tracks turn on the spot, the intended
+    bearing may be wider than the waypoint, which is then the narrowest one with the same command.
+    The throttle gives the speed; throttles below a quarter, including brakes, become speeds that
+    `command` turns into a quarter.
 
     Args:
         commands: Steering and throttle, shape (n, 2); values beyond [-1, 1] are clipped.
@@ -351,7 +352,7 @@ def waypoints_of(
     bearing = np.arcsin(np.clip(sine, -widest, widest)) / WIDEST_RAD
     moves = np.abs(speed) >= STANDING_MPS
     turns = np.abs(steering) * response.per_second >= STANDING_RADPS
-    # Backwards it cannot point ahead; at rest only a throttle, or tracks that turn, say something.
+    # Driving backward, no waypoint is ahead; at rest, one needs throttle, or tracks that turn.
     usable = np.where(
         moves, speed > 0.0, (throttle >= LEAST_THROTTLE) | ((throttle >= 0.0) & turns)
     )
@@ -367,9 +368,9 @@ class WaypointDemonstrations(NamedTuple):
 
     Attributes:
         data: The demonstrations.
-        kept: Which of the given steps they are, shape (n,).
+        kept: Mask of the given steps that were converted, shape (n,).
         response: How the vehicle that was driven turns.
-        notes: Sentences on what was done.
+        notes: Sentences for people to read.
     """
 
     data: Dataset
@@ -381,7 +382,7 @@ class WaypointDemonstrations(NamedTuple):
 def as_waypoints(data: Dataset, response: SteeringResponse | None = None) -> WaypointDemonstrations:
     """Return demonstrations of steering and throttle as demonstrations of waypoints.
 
-    Steps that do not say where the way is are left out; see `waypoints_of`.
+    Steps that do not determine a waypoint are left out; see `waypoints_of`.
 
     Args:
         data: The demonstrations, with rectified images.

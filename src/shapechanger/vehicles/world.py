@@ -33,7 +33,7 @@ PORTRAITS_RAD: Final = tuple(
 
 _CAMERA: Final = "vehicle/camera"
 _CHASSIS: Final = "vehicle/chassis"
-_INNER_OHM: Final = 0.12  # Of the battery and its leads.
+_INNER_OHM: Final = 0.12  # Resistance of the battery and its leads.
 _IDLE_A: Final = 0.6  # Current of the computer.
 _CONE: Final = np.radians((-7.0, 0.0, 7.0))  # An HC-SR04 hears 15 degrees.
 _HEARD_M: Final = 10.0  # More than twice as far as it hears; rays to walls beyond would cost time.
@@ -157,7 +157,7 @@ class MujocoWorld:
         Args:
             seed: Seed of the course and the start.
             look: New light and colours; None to keep them.
-            camera: Error of the camera's pose; None for none.
+            camera: Error of the camera's pose; None for no error.
 
         Raises:
             WorldError: If the seed has no course, or the camera would be off its vehicle. The world
@@ -276,7 +276,7 @@ class MujocoWorld:
     def _rays(
         self, ahead_m: float, bearings: NDArray[np.float64], nothing_m: float, farthest_m: float
     ) -> NDArray[np.float64]:
-        """Distances from a point ahead of the middle, m, (n,); `nothing_m` if nothing is hit."""
+        """Distances from a point ahead of the middle, m, (n,); `nothing_m` without an obstacle."""
         pose, count = self._motion, len(bearings)
         x = pose.x + ahead_m * math.cos(pose.heading)
         y = pose.y + ahead_m * math.sin(pose.heading)
@@ -390,7 +390,7 @@ def _compiled(
         # Pair wheels with the ground: searching for all that they meet takes a third of a step.
         if geom.contype & ground.conaffinity and geom.name.startswith("vehicle/"):
             geom.contype = geom.conaffinity = 0
-            # As MuJoCo combines the frictions of two geoms.
+            # MuJoCo's rule for combining the frictions of two geoms.
             wins = geom.priority > ground.priority
             slide, spin, roll = (
                 geom.friction if wins else np.maximum(geom.friction, ground.friction)

@@ -64,7 +64,7 @@ def test_a_mark_at_the_height_of_the_lens_is_enough(profile: Path, tmp_path: Pat
         (["--fovy", "0"], "10 to 170, got 0"),
         (["--fovy", "48.8"], "give --board or --horizon"),
         (["--horizon", "121", "--fovy", "48.8"], "from 0 to 120"),
-        ([], "does not say pitch_deg and fovy_deg"),
+        ([], "does not state pitch_deg and fovy_deg"),
     ],
 )
 def test_unsuitable_options_are_refused(

@@ -101,7 +101,7 @@ def write_ready_profile(home: Path, text: str = CAR) -> str:
         ("check test-car.toml --twin --leds --probe 20", "A twin needs no --probe"),
         ("check test-car.toml --leds --probe 22", "Pin 22 is used by drive forward"),
         ("check test-car.toml --leds --probe 40", "GPIO0 to GPIO27, got 40"),
-        ("check finger --twin --leds", "an LED cannot stand for it"),
+        ("check finger --twin --leds", "which LEDs cannot replace"),
         ("check finger --faults", "there is nothing to stop"),
         ("check test-car.toml --leds --twin --trials 3", "--trials needs --faults"),
         ("check test-car.toml --no-one-shot", "--no-one-shot needs --faults"),

@@ -90,7 +90,7 @@ def test_images_without_a_step_are_all_kept(tmp_path: Path) -> None:
     path = recorded(tmp_path, close=False)
     for size in (20, 30):
         (path / "frames" / "000005.jpg").write_bytes(picture(5)[:size])
-        assert "images of no step: 1" in repair(path)
+        assert "unused images: 1" in repair(path)
     lost = path / "lost"
     assert (lost / "000005.jpg").read_bytes() == picture(5)[:20]
     assert (lost / "000005-0001.jpg").read_bytes() == picture(5)[:30]

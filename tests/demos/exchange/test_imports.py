@@ -241,7 +241,7 @@ def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> N
     records = [r | {"_timestamp_ms": 1000 + 50 * n} for n, r in enumerate(_RECORDS[:3] * 4)]
     folder = tub_folder(tmp_path / "tub", records)
     (folder / "images/4_cam_image_array_.jpg").write_bytes(b"")
-    with pytest.raises(DemosError, match=r"is not whole .*1 record with an empty image: 4"):
+    with pytest.raises(DemosError, match=r"is incomplete .*1 record with an empty image: 4"):
         list(chain.from_iterable(episode.rows for episode in import_episodes(folder)))
     with pytest.raises(DemosError, match="import it with `shapechanger demos import`"):
         load_dataset(folder)

@@ -105,7 +105,7 @@ def endless(file: h5py.File) -> None:
         (
             lambda file: file["episode_1"].attrs.__setitem__("total_steps", 9),
             BOTH[:1],
-            "episode_1 has 4 steps, and its total_steps says 9",
+            "episode_1 has 4 steps, but its total_steps is 9",
         ),
         (lambda file: file.__delitem__("episode_1"), BOTH[:1], "episode that cannot be read"),
         (

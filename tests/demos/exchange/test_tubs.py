@@ -1,4 +1,4 @@
-"""Donkeycar tubs: numbers and times are read, and what is not whole is named."""
+"""Donkeycar tubs: numbers and times are read, and incomplete parts are reported."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def test_the_rest_of_a_damaged_tub_is_imported(
 ) -> None:
     folder = tub_folder(tmp_path / "tub", records(10), per_catalog=6)
     spoil(folder)
-    with pytest.raises(DemosError, match="is not whole") as caught:
+    with pytest.raises(DemosError, match="is incomplete") as caught:
         imported(folder, strict=True)
     assert expected in str(caught.value)
     episodes, done = imported(folder)

@@ -83,7 +83,11 @@ def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str) -> Non
         ("Ant", {"backend": "warp", "copy": False}, "always copies observations"),
         ("Ant", {"backend": "warp", "njmax": 0}, "needs at least one njmax, got 0"),
         ("Ant", {"backend": "warp", "render_mode": "rgb_array"}, "no render_mode: nothing is"),
-        ("Ant", {"backend": "warp", "towards": "BigAnt"}, "takes no towards: a reset draws no"),
+        (
+            "Ant",
+            {"backend": "warp", "towards": "BigAnt"},
+            "takes no towards: a reset does not draw",
+        ),
         ("Ant", {"backend": "warp", "autoreset_mode": "Disabled"}, "no autoreset mode Disabled"),
         ("Ant", {"pool": ["Ant"]}, "backend='threads' takes no pool: use backend='warp'"),
         ("Ant", {"device": "cpu"}, "takes no device: use backend='warp'"),

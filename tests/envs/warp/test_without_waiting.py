@@ -1,4 +1,4 @@
-"""A step asks the device one question and copies nothing to it, as a pretended device counts."""
+"""A step reads one result from the device and copies no data to it."""
 
 from __future__ import annotations
 

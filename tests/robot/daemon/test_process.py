@@ -127,21 +127,21 @@ def test_no_client_connects_before_the_first_state(begun: Started) -> None:
     status, log = begun.ended()
     assert (status, begun.ready.exists()) == (1, False)
     assert "listens" not in log
-    assert "The guard is gone." in log
+    assert "The guard has ended." in log
 
 
 def test_the_daemon_exits_when_the_guard_is_lost(started: Started) -> None:
     started.guard.close()
     status, log = started.ended()
     assert status == 1
-    assert "The guard is gone." in log
+    assert "The guard has ended." in log
 
 
 def test_the_daemon_exits_when_the_supervisor_is_lost(started: Started) -> None:
     started.heart.close()
     status, log = started.ended()
     assert status == 1
-    assert "The supervisor is gone." in log
+    assert "The supervisor has ended." in log
 
 
 def test_a_closed_log_does_not_end_the_daemon(started: Started) -> None:

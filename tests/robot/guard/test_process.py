@@ -193,7 +193,7 @@ def test_the_guard_waits_for_the_supervisor_and_a_living_daemon(make: _Make) -> 
     assert bench.clock.waits[0] == ([heart, *daemon], 0.01)
     assert bench.clock.waits[-1] == ([heart], 0.01)
     assert bench.clock.beat == bench.heartbeat.beat
-    assert bench.guard._rules.disarmed == "Disarmed: the daemon is gone."
+    assert bench.guard._rules.disarmed == "Disarmed: the daemon has ended."
 
 
 def test_a_refusal_is_sent_once(make: _Make) -> None:
@@ -269,7 +269,7 @@ def test_a_lost_supervisor_ends_the_guard(make: _Make) -> None:
     bench = make(_plan())
     bench.clock.at(15, bench.supervisor.close)
     bench.guard.run(bench.heartbeat)
-    assert bench.guard.ended == "the supervisor is gone"
+    assert bench.guard.ended == "the supervisor has ended"
 
 
 def test_an_order_or_a_signal_ends_the_guard(make: _Make) -> None:

@@ -133,7 +133,7 @@ def test_the_supervisor_gives_up_after_too_many_failures(tmp_path: Path) -> None
     with running(tmp_path, record="/nowhere/record") as robot:
         assert robot.process.wait(60) == 1
         assert robot.record.is_at_rest()
-    assert "gives up: the daemon is gone, once too often." in _log(tmp_path)
+    assert "gives up after too many failures: the daemon has ended." in _log(tmp_path)
 
 
 def test_a_stuck_output_is_reported_as_unsafe(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_stuck_output_at_the_start_ends_the_supervisor(tmp_path: Path) -> None
     (tmp_path / "stuck-GPIO22").touch()
     with running(tmp_path) as robot:
         assert robot.process.wait(30) == 3
-    assert re.search("gives up: .* is gone, and not all outputs are at rest.", _log(tmp_path))
+    assert re.search("gives up: .* has ended, and not all outputs are at rest.", _log(tmp_path))
 
 
 class _Stuck:

@@ -88,7 +88,7 @@ def test_a_board_that_never_replies_ends_the_heartbeats(
     client.while_held_up = lambda: pytest.fail("a beat for a broken board")
     ending = threading.Timer(0.05, board.close)
     ending.start()
-    with pytest.raises(RobotError, match="board is gone"):
+    with pytest.raises(RobotError, match="board has ended"):
         client.ask(int, "levels")
     ending.join()
     client.close()

@@ -96,8 +96,8 @@ def test_using_a_closed_board_raises(tmp_path: Path) -> None:
     clock = granted(hardware)
     board.close()
     assert board.process.returncode == 0
-    with pytest.raises(RobotError, match="board is gone"):
+    with pytest.raises(RobotError, match="board has ended"):
         clock.wait([], 2**62, 1.0)
-    with pytest.raises(RobotError, match="board is gone"):
+    with pytest.raises(RobotError, match="board has ended"):
         asyncio.run(clock.sleep(1.0))
     hardware.close()

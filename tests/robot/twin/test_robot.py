@@ -18,7 +18,7 @@ def test_a_lost_link_keeps_the_end_of_the_log(tmp_path: Path, error: Exception) 
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "ready.json").write_text('{"port": 1, "fingerprint": ""}')
-    (folder / "log.txt").write_text("x" * 5000 + "guard: the daemon is gone")
+    (folder / "log.txt").write_text("x" * 5000 + "guard: the daemon has ended")
     supervisor = subprocess.Popen([sys.executable, "-c", _WAIT])
     with (
         pytest.raises(type(error)) as raised,
@@ -31,4 +31,4 @@ def test_a_lost_link_keeps_the_end_of_the_log(tmp_path: Path, error: Exception) 
     assert bool(notes) == isinstance(error, LinkError)
     for note in notes:
         assert note.startswith("The log of the robot ends:\nx")
-        assert note.endswith("guard: the daemon is gone")
+        assert note.endswith("guard: the daemon has ended")

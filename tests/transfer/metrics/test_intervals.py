@@ -116,11 +116,11 @@ def test_many_seeds_make_the_ratio_normal() -> None:
     [
         (ARM[:1], SCRATCH, "at least two seeds"),
         (ARM, SCRATCH[:1], "at least two seeds"),
-        (np.full(3, 0.2), np.full(4, 0.1), "all seeds equal"),
+        (np.full(3, 0.2), np.full(4, 0.1), "all seeds of each arm are equal"),
         # Equal up to rounding, which counts as no spread.
-        (np.array([0.3, 0.1 + 0.2]), np.full(4, 0.1), "all seeds equal"),
+        (np.array([0.3, 0.1 + 0.2]), np.full(4, 0.1), "all seeds of each arm are equal"),
         # Differences too small for a variance.
-        (np.array([0.0, 1e-280]), np.full(4, 0.1), "all seeds equal"),
+        (np.array([0.0, 1e-280]), np.full(4, 0.1), "all seeds of each arm are equal"),
     ],
 )
 def test_unreliable_intervals_are_omitted(

@@ -204,6 +204,6 @@ def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
     with _served(file, "twin") as (_, person):
         until(lambda: person.policies is not None and person.policies.running == "")
         assert person.policies is not None
-        assert "The policy gave [nan, nan], which is no command." in person.policies.text
+        assert "The policy gave [nan, nan], which is not finite." in person.policies.text
         until(lambda: person.ask().message.holder == "")
         assert not _moves(person)

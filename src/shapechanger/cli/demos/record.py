@@ -30,14 +30,14 @@ class DemosRecord(OneEnv):
     """Record an expert or a policy in an env."""
 
     out: Path
-    """Folder of the recording; new episodes are added to those there."""
+    """Folder of the recording; new episodes are added to existing ones."""
     minutes: float = 10.0
     """Duration, minutes of the env's time."""
     driver: str = EXPERT
     """"expert", or the file of a policy."""
     corrected_by: str = ""
-    """"expert" to let it take over where the policy would fail. Only the expert's steps are then
-    learned from."""
+    """"expert" to let it take over where the policy would fail. Training then uses the expert's
+    steps only."""
     episode_s: float = 50.0
     """Longest episode, s; a collision ends it earlier."""
     lenses: tuple[str, ...] = ()

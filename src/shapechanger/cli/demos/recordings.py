@@ -279,8 +279,8 @@ PARTLY_IMPORTED: Final = 3
 class DemosImport:
     """Import a recording from another format, leaving the source unchanged.
 
-    What is whole is imported, and the rest is listed. The exit code is 0 if all was imported, 3 if
-    something was left out, and 2 if nothing could be imported.
+    Complete parts are imported, and the rest is listed. The exit code is 0 if all was imported, 3
+    if parts were left out, and 2 if nothing could be imported.
     """
 
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FROM")]
@@ -333,7 +333,7 @@ class DemosExport:
     dropped: bool = False
     """Write dropped steps too, marked as such; only minari, csv and mcap can."""
     task: str = ""
-    """What the robot does, in words, for policies that follow language; lerobot only."""
+    """Description of the task, for policies that follow language; lerobot only."""
     images: bool = False
     """Store images as they were recorded, instead of video; lerobot only."""
 

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class _Waypoints:
-    """Options of how a recording on steering becomes one on waypoints."""
+    """Options for converting a recording of steering to waypoints."""
 
     camera: tuple[float, float] | None = None
-    """Pitch and vertical field of view of the camera, degrees, for waypoints; those that the
-    recording states if not given."""
+    """Pitch and vertical field of view of the camera, degrees, for waypoints; from the
+    recording if not given."""
     response: tuple[float, float] | None = None
     """How far the vehicle turns at full steering, rad for each metre and for each second, for
     waypoints; fitted to its recorded motion if not given."""
@@ -70,12 +70,13 @@ class DemosTrain(_Waypoints):
     held_out: float = 0.2
     """Share of the steps to evaluate the policy on, not learned from; 0 to learn from all."""
     waypoints: bool = False
-    """Learn where the free way is instead of steering and throttle, for any vehicle to follow:
+    """Learn waypoints instead of steering and throttle, which any vehicle can follow:
     shapechanger play TankWaypoint --policy ..."""
     seed: int = 0
-    """Seed of everything random."""
+    """Seed of all randomness."""
     sac: Path | None = None
-    """Also write it as a file that `stable_baselines3.SAC.load` reads, to go on from by reward."""
+    """Also write it as a file that `stable_baselines3.SAC.load` reads, to continue with
+    reinforcement learning."""
     ppo: Path | None = None
     """Also write it as a file that `stable_baselines3.PPO.load` reads."""
 
@@ -88,7 +89,7 @@ class DemosTrain(_Waypoints):
         if self.waypoints:
             if self.head == "class" or self.inputs in {"state", "both"}:
                 raise DemosError(
-                    "Waypoints are numbers, seen in images: leave out --head, --inputs."
+                    "Waypoint policies map images to numbers: leave out --head, --inputs."
                 )
             view = self.view()
         elif self.camera is not None or self.response is not None:

@@ -48,8 +48,8 @@ class RobotCalibrate:
     twin: bool = False
     """Practise on the twin: no hardware moves, but the results are written all the same."""
     cap: float = 0.4
-    """Largest value that a motor or an ESC is jogged with, 0 to 1; of an ESC you are asked whether
-    to go beyond."""
+    """Largest value that a motor or an ESC is jogged with, 0 to 1; for an ESC, a prompt offers to
+    exceed it."""
     wheels_up: bool = False
     """Without --twin: the wheels are off the ground, so do not ask."""
 
@@ -78,7 +78,7 @@ class RobotCalibrate:
         change_profile(path, calibration.found)
 
 
-# Change of a value at each key press; of a motor, whose start is searched for.
+# Change of a value at each key press; the second is for finding the duty at which a motor starts.
 _STEP: Final = 0.02
 _START_STEP: Final = 0.05
 # Tolerance of the requested value, and time to wait for an output that is held back.
@@ -92,9 +92,9 @@ class _Ended(Exception):
 
 
 class Calibration:
-    """Calibration of all outputs and encoders of a robot, whose results are `found`.
+    """Calibration of all outputs and encoders of a robot, with the results in `found`.
 
-    `cap` bounds motors, and ESCs unless the person goes beyond.
+    `cap` limits motors, and ESCs unless the person chooses to exceed it.
     """
 
     def __init__(self, profile: Profile, keys: Terminal, cap: float, *, twin: bool) -> None:
@@ -105,7 +105,7 @@ class Calibration:
         self.found: dict[str, Any] = {}
 
     def run(self) -> None:
-        """Calibrate everything; nothing is found if the person quits."""
+        """Calibrate everything; `found` is empty if the person quits."""
         say(
             "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
             "Q ends without writing, Space and Escape stop everything and end."
@@ -151,7 +151,7 @@ class Calibration:
             return {}
         say("  … did it go forward, or right? Y or N")
         while True:
-            for key in self._pressed(1.0):  # Nothing is served here, so everything is at rest.
+            for key in self._pressed(1.0):  # The robot is not served here, so it is at rest.
                 if key in {"y", "n"}:
                     starts_at = abs(value) * output.settings["full"]
                     return motor_changes(output, "forward" if key == "y" else "backward", starts_at)
@@ -184,8 +184,8 @@ class Calibration:
     ) -> float | None:
         """Jog an output with keys until Enter; return its applied value, or None if skipped.
 
-        A key press changes the command by `step`, to at most `cap`; with `goes_beyond`, Y goes on
-        from there.
+        A key press changes the command by `step`, to at most `cap`; with `goes_beyond`, Y lifts the
+        cap.
         """
         actions, outputs = self._profile.actions, self._profile.outputs
         index = [one.name for one in outputs].index(output.name)
@@ -232,7 +232,7 @@ class Calibration:
                 seen = robot.observation(seen.seq).message
 
     def _pressed(self, wait_s: float = 0.0, robot: RobotClient | None = None) -> Iterator[str]:
-        """Yield the pressed keys; Q quits, and Space and Escape stop the robot before."""
+        """Yield the pressed keys; Q quits, and Space and Escape stop the robot and quit."""
         for key in self._keys.keys(wait_s):
             if key in STOPS and robot is not None:
                 robot.emergency_stop("calibrate")
@@ -268,7 +268,7 @@ def _live_line() -> Live:
 def ask_for_wheels_up() -> None:
     """Ask at the terminal to confirm that the wheels are off the ground."""
     if not sys.stdin.isatty():
-        raise RobotError("The robot will drive: lift its wheels, and say so with --wheels-up.")
+        raise RobotError("The robot will drive: lift its wheels, and confirm with --wheels-up.")
     answer = input("The robot will drive. Are its wheels off the ground? [yes/no] ")
     if answer.strip().lower() != "yes":
         raise RobotError("Nothing was moved.")

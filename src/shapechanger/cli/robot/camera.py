@@ -1,4 +1,4 @@
-"""`shapechanger robot camera`: measure how a robot's camera looks at the world, and draw it."""
+"""`shapechanger robot camera`: measure pitch and field of view of a robot's camera, and draw it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from shapechanger.vehicles.cameras.rectify import (
     pitch_of_horizon,
 )
 
-# As in a profile.
+# Range that a profile accepts.
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0
 _MOST_BYTES: Final = 2**25
@@ -38,7 +38,7 @@ _MOST_BYTES: Final = 2**25
 class RobotCamera:
     """Measure pitch and field of view of the camera, write them into the profile, and draw them.
 
-    With neither --board nor --horizon it draws what the profile says.
+    With neither --board nor --horizon, the values of the profile are drawn.
     """
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
@@ -48,11 +48,12 @@ class RobotCamera:
     board: str = ""
     """Inner corners of a checkerboard that stands upright before the robot, such as 9x6."""
     horizon: float | None = None
-    """Row of the horizon in the image, pixels from the top: of a mark at the lens's height."""
+    """Row of the horizon in the image, pixels from the top, for example of a distant mark at the
+    height of the lens."""
     fovy: float | None = None
-    """Vertical field of view, degrees, where the data sheet says it."""
+    """Vertical field of view, degrees, from the data sheet."""
     out: Path = Path("camera.jpg")
-    """The drawing: the horizon and what policies with waypoints look at, and what they see."""
+    """The drawing: the image with the horizon and the view of waypoint policies, and that view."""
 
     def run(self) -> None:
         import simplejpeg
@@ -90,7 +91,7 @@ class RobotCamera:
         camera = profile.camera
         if camera is None or camera.pitch_deg is None or camera.fovy_deg is None:
             raise RobotError(
-                f"{profile.path} does not say pitch_deg and fovy_deg of its camera: measure them "
+                f"{profile.path} does not state pitch_deg and fovy_deg of its camera: measure them "
                 "with --board or --horizon."
             )
         drawing = _drawing(picture, CameraGeometry(camera.pitch_deg, camera.fovy_deg))
@@ -112,7 +113,7 @@ class RobotCamera:
             return found.geometry
         fovy = stated.fovy_deg if self.fovy is None else self.fovy
         if fovy is None:
-            raise RobotError("A horizon tells the pitch where the field of view is known: --fovy.")
+            raise RobotError("Measuring the pitch from a horizon requires --fovy.")
         if self.horizon is not None:
             return CameraGeometry(pitch_of_horizon(self.horizon, picture.shape[0], fovy), fovy)
         if stated.pitch_deg is None:

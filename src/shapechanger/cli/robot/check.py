@@ -59,7 +59,7 @@ class RobotCheck:
     cap: float = _CAP
     """Largest throttle of the checks that drive, 0 to 1; faults are tried at full throttle."""
     yes: bool = False
-    """With --leds: no motor is connected, and nobody is there to answer, so ask nothing."""
+    """With --leds: no motor is connected, and no questions are to be asked."""
     probe: int | None = None
     """With --leds: a free BCM pin, joined by a wire to the pin of the motor that drives forward,
     which measures when it stops."""
@@ -118,7 +118,7 @@ class RobotCheck:
             sys.exit(1)
 
     def _level(self) -> CheckLevel:
-        """Return the level; refuse options without an effect, and numbers that mean nothing."""
+        """Return the level; refuse options without an effect, and invalid numbers."""
         options = {"wiring": self.wiring, "leds": self.leds, "faults": self.faults}
         asked = [level for level, chosen in options.items() if chosen]
         if len(asked) > 1:
@@ -147,7 +147,7 @@ class RobotCheck:
         return level
 
     def _require_consent(self, profile: Profile, *, asks: bool) -> None:
-        """Refuse to drive pins before a person has said that nothing can run away."""
+        """Refuse to drive pins until a person has confirmed that the robot cannot run away."""
         if not self.leds and not self.wheels_up:
             ask_for_wheels_up()
         if self.jumper is not None:
@@ -155,7 +155,7 @@ class RobotCheck:
         require_pins(profile)
         if self.leds and not (asks or self.yes):
             raise RobotError(
-                "All outputs will be driven: put LEDs where the motors were, and say so with --yes."
+                "All outputs will be driven: replace the motors by LEDs, and confirm with --yes."
             )
         question = "All outputs will be driven. Is every motor taken off?"
         if self.leds and asks and not ask_person(question):
@@ -163,7 +163,7 @@ class RobotCheck:
 
 
 def ask_nobody(_: str) -> None:
-    """Ask nothing; see `Ask`."""
+    """Return no answer; see `Ask`."""
 
 
 def ask_person(question: str) -> bool | None:

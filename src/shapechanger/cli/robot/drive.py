@@ -86,7 +86,7 @@ class RobotDrive:
 
 @contextlib.contextmanager
 def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
-    """Record on the robot for the duration of a block; if it fails, tell where the recording is."""
+    """Record on the robot for the duration of a block; after an error, print how to fetch it."""
     before = begin_recording(robot)
     try:
         yield
@@ -156,7 +156,7 @@ class Driving:
 
     def run(self) -> None:
         console = plain_console()
-        self._terminal.keys(0.0)  # Keys pressed before this line was shown are no orders.
+        self._terminal.keys(0.0)  # Discard keys that were pressed before the help was shown.
         console.print(_HELP)
         seq = 0
         with Live(console=console, refresh_per_second=10, transient=True) as live:

@@ -124,7 +124,7 @@ class RobotStop:
                 until_s = time.monotonic() + _CONFIRMED_WITHIN_S
                 while not (seen := robot.ask().message).emergency:
                     if time.monotonic() > until_s:
-                        raise LinkError("The robot answers, and does not say that it stopped.")
+                        raise LinkError("The robot answers, but does not report that it stopped.")
         except LinkError as error:
             say(
                 f"error: {error}\nThe stop was not confirmed: go there, and cut its power.",
@@ -139,7 +139,7 @@ class RobotStop:
 
 @dataclass(frozen=True)
 class RobotFetch:
-    """Download a robot's recordings to this machine, or only what is new."""
+    """Download a robot's recordings to this machine; only new data are transferred."""
 
     robot: RobotName
     out: Annotated[Path, tyro.conf.arg(metavar="DATA")]

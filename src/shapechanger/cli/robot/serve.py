@@ -40,8 +40,8 @@ class RobotServe(Service):
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """A profile, such as car.toml, or the name of one that comes with Shapechanger."""
     world: str = ""
-    """With --twin: corridor, yard, harbour or flooded-corridor, or room for a plain room that needs
-    no MuJoCo; the vehicle's default if not given."""
+    """With --twin: corridor, yard, harbour or flooded-corridor; or room, which works without
+    MuJoCo. The vehicle's default if not given."""
     lens: tuple[str, ...] = ()
     """With --twin: disturbances of the camera, such as night or dirt."""
     gap: str = ""
@@ -54,7 +54,7 @@ class RobotServe(Service):
         """Become the robot's supervisor; return only on an error."""
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
-        # Undone only after an error: exec keeps everything.
+        # Undone only after an error: after exec, the supervisor keeps all resources.
         with contextlib.ExitStack() as undo:
             board = None
             if self.twin:
@@ -102,10 +102,10 @@ class RobotServe(Service):
 def place_of(
     profile: Profile, world: str, lenses: Sequence[str], gap: str = "", seed: int | None = None
 ) -> Place:
-    """Return the world of a twin, of a kind of course or with the finger of a reality gap.
+    """Return the world of a twin: a plain room, a kind of course, or a finger drawn from a gap.
 
-    "room" is the plain room, "" the robot's default, or the room without such a default or without
-    MuJoCo.
+    `world` is "room" for the plain room, or "" for the robot's default. The room also replaces a
+    default that is missing or needs MuJoCo where that is not installed.
     """
     if world == _ROOM or not (world or gap or find_spec("mujoco")):
         if lenses:
@@ -114,7 +114,6 @@ def place_of(
     if gap and not find_spec("mujoco"):
         raise MissingExtra("mujoco", "sim")
     if gap or not (world or lenses):
-        # Without MuJoCo, products cannot be imported.
         from shapechanger.finger.twin import rig_place  # MuJoCo, an extra.
 
         if (rig := rig_place(profile, gap, seed)) is not None:

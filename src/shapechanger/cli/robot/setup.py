@@ -54,22 +54,21 @@ from shapechanger.robot.setup.install import (
 
 @dataclass(frozen=True)
 class RobotInit:
-    """Create the profile, key and certificate of a new robot; at a terminal, by questions."""
+    """Create the profile, key and certificate of a new robot, interactively if at a terminal."""
 
     kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[KIND]")] = ""
-    """Name of a shipped profile, such as car. Without any argument, up to five questions are
-    asked."""
+    """Name of a shipped profile, such as car. Without any argument, the command asks up to five
+    questions."""
     name: str = ""
-    """Name of the robot; the name of its kind if not given."""
+    """Name of the robot; the kind if not given."""
     out: Path | None = None
     """The profile to write; NAME.toml if not given."""
     credentials: Path | None = None
-    """Folder for the key and the certificate, if not the robot's own in the user's
-    configuration."""
+    """Folder for the key and the certificate; a folder in the user's configuration if not given."""
     camera: Literal["", "ribbon", "usb", "none"] = ""
-    """The camera: on the Pi's ribbon cable, a webcam, or none; its kind's if not given."""
+    """The camera: on the Pi's ribbon cable, a webcam, or none; the kind's default if not given."""
     arming: Literal["", "person", "anyone"] = ""
-    """Who may arm it: only a person, or programs, too; as its kind has it if not given."""
+    """Who may arm it: only a person, or programs, too; the kind's default if not given."""
 
     def run(self) -> None:
         if self == RobotInit() and sys.stdin.isatty():
@@ -83,7 +82,7 @@ class RobotInit:
         self._write()
 
     def _ask(self) -> None:
-        """Ask what is needed, each with a default, write the files, and install them on a Pi."""
+        """Ask for all settings, each with a default, write the files, and install them on a Pi."""
         kinds = shipped_profiles()
         say("Kinds of robot:")
         for kind, path in kinds.items():
@@ -129,7 +128,7 @@ class RobotInit:
     def _write(self, *, installs: bool = False) -> Path:
         name, out = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
-        # Lets this machine drive it, especially on a twin.
+        # Lets clients on this machine drive the robot, especially a twin.
         remember(robot_at("127.0.0.1", name, credentials))
         unit, is_new = write_unit(name, out, self.credentials)
         # Last, because an existing profile is refused: after a failure, such as a full disk, the
@@ -201,7 +200,7 @@ def shown_credentials(credentials: Credentials) -> str:
 
 
 def how_to_remember(name: str, credentials: Credentials) -> str:
-    """Return the command for the computer that is to drive the robot."""
+    """Return the command to run on the computer that will drive the robot."""
     return (
         "On the workstation, with the key from above:\n"
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "
@@ -216,7 +215,7 @@ def _first_sentence(profile: Path) -> str:
 
 
 def _one_of(options: Iterable[str], kind: str) -> Callable[[str], str]:
-    """Return a check that takes one of some words, in any case, or the start of one."""
+    """Return a check that accepts an option in any case, or an unambiguous prefix of one."""
 
     def check(answer: str) -> str:
         word = answer.lower()
@@ -242,7 +241,7 @@ def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
 
 
 def own_profile(name: str) -> Path:
-    """Return the file of a profile that may be written, from a file or the name of a profile."""
+    """Return the file of a profile that may be changed, from its path or name."""
     path = find_profile(name)
     if path in shipped_profiles().values():
         own = Path(path.name)
@@ -269,11 +268,11 @@ class RobotHome:
     """Find the zeros of a rig's tendons and joints while a person holds the finger straight."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The rig's profile; the zeros are written into it, and its comments stay. The rig must not be
-    served meanwhile. Do it again whenever the servos were without power; encoders at the joints
-    keep their zeros."""
+    """The rig's profile; the zeros are written into it, and its comments are kept. The rig must not
+    be served meanwhile. Repeat the command whenever the servos were without power; encoders at the
+    joints keep their zeros."""
     straight: bool = False
-    """Somebody holds the finger straight already, so do not ask."""
+    """Do not ask, because a person already holds the finger straight."""
 
     def run(self) -> None:
         path = own_profile(self.profile)
@@ -320,7 +319,7 @@ class RobotInstall:
             machine.require_pi()
             if machine.user == "root":
                 raise RobotError(
-                    "Install it as the user that is to run the robot, without sudo, which is "
+                    "Install it as the user that will run the robot, without sudo, which is "
                     "called when it is needed."
                 )
             folder = self.credentials or credentials_folder(profile.name)
@@ -368,9 +367,9 @@ _LAST_PORT: Final = 65535
 
 
 def require_port(port: int) -> None:
-    """Refuse a number that is no TCP port, or 0 for any that is free."""
+    """Refuse a number that is not a TCP port; 0 selects any free port."""
     if not 0 <= port <= _LAST_PORT:
-        raise RobotError(f"A port is 0, for any that is free, to {_LAST_PORT}: got {port}.")
+        raise RobotError(f"A port is 0 (any free port) to {_LAST_PORT}, got {port}.")
 
 
 @dataclass(frozen=True)

@@ -8,5 +8,5 @@ evaluation.evaluate   compare a policy with a driver on held-out steps
 sb3                   continue with reinforcement learning in Stable-Baselines3
 ```
 
-Nothing is imported here, so that settings can be read without PyTorch.
+This package imports no modules, so that settings can be read without PyTorch.
 """

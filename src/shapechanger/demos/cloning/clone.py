@@ -1,4 +1,4 @@
-"""Cloned policies without PyTorch: their settings, what they see, and how they act."""
+"""Cloned policies without PyTorch: settings, preparation of inputs, and actions."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 _CHUNK: Final = 256  # Images at a time, to bound the memory of the sums.
 # A mean in single precision may miss a half by a rounding error, and is still rounded up.
 HALF: Final = 0.5 + 1e-4
-_ROUNDING: Final = 1e-4  # Of actions in single precision.
+_ROUNDING: Final = 1e-4  # Tolerance of actions in single precision.
 
 
 def _require(
     settings: msgspec.Struct, names: str, limits: str, fits: Callable[[float], bool]
 ) -> None:
-    """Refuse settings, whose names a text lists, with a value or an empty tuple out of limits."""
+    """Refuse the settings in `names` that have a value out of limits, or an empty tuple."""
     for name in names.split():
         value: Any = getattr(settings, name)
         values: Any = value if hasattr(value, "__len__") else (value,)
@@ -37,7 +37,7 @@ def _require(
 
 
 class Augmentation(msgspec.Struct, frozen=True, kw_only=True):
-    """Random changes of each image each time it is learned from.
+    """Random changes of each image, drawn again each time that it is used for training.
 
     Attributes:
         mirror: Share of images that are mirrored, with their actions.
@@ -69,7 +69,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Hyperparameters of behaviour cloning.
 
     Attributes:
-        framing: Crop and resolution; those of `start` where training starts from another policy.
+        framing: Crop and resolution; training that starts from a policy uses that policy's framing.
         channels: Filters of each convolution; each one halves rows and columns.
         features: Number of features between image and actions.
         batch: Examples per step.
@@ -80,14 +80,14 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
         further_rate: Initial learning rate when another policy is trained further.
         warm_up: Steps in which the rate rises from 0.
         weight_decay: Of AdamW.
-        held_out: Share of the steps, in [0, 1), in one stretch, that is not learned from but used
-            for early stopping.
+        held_out: Share of the steps, in [0, 1), in one stretch, that is used for early stopping
+            instead of training.
         checks: Number of validations during training.
         patience: Number of validations without improvement after which training stops.
         rehearsal: Share of each batch that comes from the rehearsal data, if there are any.
         augmentation: Random changes of the images.
         eyes: Input of the first layer: "colours", or "edges": strength of the edges of each
-            direction in each cell, independent of light and colour.
+            direction in each cell, which does not depend on light and colour.
         nerves: Widths of the layers for the state.
         members: Number of averaged networks; each uses another stretch of time for early stopping,
             so that together they learn from all data.
@@ -162,15 +162,15 @@ DEMOS: Final = CloneSettings(
 )
 """Settings for few demonstrations."""
 
-# Steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network on colours
-# and finer images learns from them; with fewer it would learn irrelevant details.
+# Number of steps from which one network on colours and finer images is used: two and a half minutes
+# at 20 Hz. With fewer steps, it would learn irrelevant details.
 _MANY: Final = 3000
 
 
 def settings_for(steps: int) -> CloneSettings:
     """Return the settings for this many steps.
 
-    With many steps nothing is held out, and the last network is kept. When a tenth of twenty
+    With many steps, no steps are held out, and the last network is kept. When a tenth of twenty
     minutes was held out, the network after 140 of 1,400 steps was best by 0.3 %, and drove badly;
     see docs/cloning.md.
     """
@@ -251,7 +251,7 @@ class ShrunkFrames:
         framing: Crop and resolution.
         view: Returns the frame of another camera for a frame and the header of its episode; None
             for the same camera.
-        size: Rows and columns of the last frame before; None before the first.
+        size: Rows and columns of the last frame before it was reduced; None before the first frame.
         seen: Digests of the frames.
     """
 
@@ -277,7 +277,7 @@ def clone_of(card: PolicyCard) -> CloneNetwork:
     """Return the architecture of a clone.
 
     Raises:
-        PolicyError: If the policy is no clone.
+        PolicyError: If the policy is not a clone.
     """
     if card.clone is None:
         raise PolicyError(
@@ -301,7 +301,7 @@ class Clone(Policy):
     ) -> NDArray[np.float32]:
         """Return class probabilities, shape (n, classes); or actions in [-1, 1], shape (n, m).
 
-        It takes the arguments of `predict_many`.
+        The arguments are the same as for `predict_many`.
         """
 
     def predict(
@@ -347,7 +347,7 @@ class Clone(Policy):
 
 
 class OnnxClone(Clone):
-    """A cloned policy from an ONNX file, which runs without PyTorch: its card and its network."""
+    """A cloned policy from an ONNX file, which runs without PyTorch."""
 
     def __init__(self, card: PolicyCard, run: Network) -> None:
         self.card, self._run = card, run
@@ -361,11 +361,11 @@ class OnnxClone(Clone):
 
 
 def load_clone(path: Path) -> Clone:
-    """Load a clone, of PyTorch or ONNX.
+    """Load a clone from a PyTorch or ONNX file.
 
     Raises:
-        PolicyError: If the file is missing, damaged, or no clone.
-        MissingExtra: If what the file needs is not installed.
+        PolicyError: If the file is missing or damaged, or not a clone.
+        MissingExtra: If a package that the file needs is not installed.
     """
     policy = load_policy(path)
     if not isinstance(policy, Clone):
@@ -381,7 +381,7 @@ def prepared(
     pictures: NDArray[np.uint8] | None,
     states: NDArray[np.floating] | None,
 ) -> tuple[NDArray[np.uint8] | None, NDArray[np.float32] | None]:
-    """Return images and states as the network of a clone takes them; None for an input it lacks.
+    """Return the inputs for the network of a clone; None for an input that it does not have.
 
     Args:
         card: Its card.
@@ -418,7 +418,7 @@ def targets(net: CloneNetwork, actions: NDArray[np.float32]) -> NDArray[Any]:
         (n, m).
 
     Raises:
-        DemosError: If an action is out of range, where the network states no other than [-1, 1].
+        DemosError: If an action is outside [-1, 1], and the network states no other range.
     """
     if net.classes:
         return class_numbers(actions, net.classes)

@@ -1,4 +1,4 @@
-"""Outputs of a clone, chosen from the demonstrated actions, and its evaluation on others."""
+"""Choose the outputs of a clone from the demonstrated actions, and evaluate a clone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 AskedHead = Literal["auto", "class", "regression"]
 """Requested kind of output; "auto" uses classes if few different actions were demonstrated."""
 
-_MOST_CLASSES: Final = 16  # More different actions are continuous.
+_MOST_CLASSES: Final = 16  # More different actions are treated as continuous.
 _MIN_REPEATS: Final = 4  # Average number of occurrences of each action for classes.
 # Maximum error of a value within the tolerance, as a share of half its range.
 _TOLERANCE: Final = 0.1
@@ -31,16 +31,17 @@ _WORDS: Final = {
 }
 _PLACES: Final = ("low", "middle", "high")
 OUT_OF_RANGE: Final = "out of range"
-"""Class of an action that is in no third."""
+"""Class of an action outside its range."""
 
 
 def tercile_classes(
     actions: NDArray[np.float64], layout: Layout, driver: NDArray[np.float64] | None = None
 ) -> tuple[list[str], NDArray[np.int64]]:
-    """Return the third of its range that each value is in, one class per combination that occurs.
+    """Classify actions by the third of its range that each value is in.
 
-    The extremes of the driver's actions, or of `actions`, replace missing bounds. An action with a
-    value outside its range, by more than the tolerance, is in the class `OUT_OF_RANGE`.
+    Each combination of thirds that occurs is a class. The extremes of the driver's actions, or of
+    `actions`, replace missing bounds. An action with a value outside its range, by more than the
+    tolerance, is in the class `OUT_OF_RANGE`.
 
     Returns:
         The names of the classes, and the class index of each action, shape (n,).
@@ -144,12 +145,12 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
         steps: Number of steps.
         accuracy: Share of steps with the driver's class. For continuous actions, the share in which
             all values are in the same third of their range as the driver's, such as left, straight
-            and right. The range is the layout's, or where that has no bound the driver's.
+            and right. The range is the layout's; the driver's extremes replace missing bounds.
         macro_f1: Mean F1 score over all classes that the driver or the policy chose; for continuous
-            actions over the driver's.
+            actions over the driver's classes only.
         majority_baseline: Accuracy of always choosing the driver's most frequent class here.
         classes: Names of the classes, or of the thirds that occur.
-        confusion: Number of steps by the driver's class (rows) and the policy's (columns).
+        confusion: Number of steps for each class of the driver (rows) and the policy (columns).
         calibration: Steps grouped by confidence; () for continuous actions.
         ece: Expected calibration error: mean difference of confidence and accuracy, weighted by
             steps; None for continuous actions.
@@ -158,7 +159,7 @@ class EvaluationResult(msgspec.Struct, frozen=True, kw_only=True):
         within: Share of steps with every value within the tolerance.
         tolerance: Maximum error of such a value, as a share of half its range.
         worst: Indices of the steps with the largest errors, worst first.
-        predicted: Actions of the policy at some steps, in time; () for classes.
+        predicted: Actions of the policy at some steps, in order of time; () for classes.
         target: Actions of the driver at the same steps.
     """
 
@@ -205,7 +206,7 @@ def evaluate(
     predicted = policy.predict_many(pictures, states).astype(np.float64)
     layout = data.action_layout
     apart = np.abs(predicted - target)
-    # From the driver alone: an absurd output would widen the range, and make all others seem right.
+    # Ranges of the driver alone: an absurd output would widen them, so that all others seem right.
     low, high = _ranges(target, layout)
     half = 0.5 * (high - low)
     relative = apart / np.where(half > 0.0, half, 1.0)
@@ -264,9 +265,9 @@ def macro_f1(
     Args:
         predicted: Chosen classes, shape (n,).
         truth: Correct classes, shape (n,).
-        absurd: Mask of outputs that belong to no class, shape (n,). Each counts as a wrong choice
-            of every class, and only classes of `truth` count: the score would otherwise improve
-            when a wrong choice becomes an absurd one. None if each output is a class.
+        absurd: Mask of outputs outside all classes, shape (n,); None if each output is a class.
+            Each counts as a wrong choice of every class, and only classes of `truth` count:
+            otherwise the score would improve when a wrong choice becomes an absurd one.
     """
     scores: list[float] = []
     for one in np.union1d(predicted, truth) if absurd is None else np.unique(truth):

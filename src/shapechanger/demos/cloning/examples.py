@@ -29,8 +29,8 @@ from shapechanger.policy import PolicyCard
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset
 
-# Parts of names, between slashes. In the mirror image, the first change their sign and the second
-# do not. Positive yaw is to the left, and y points to the left.
+# Parts of names, between slashes. In the mirror image, the values of the first set change their
+# sign, and those of the second set do not. Positive yaw is to the left, and y points to the left.
 _NEGATED: Final = frozenset({"steering", "bearing", "yaw_rate", "acceleration_y"})
 _KEPT: Final = frozenset(
     {"throttle", "forward", "backward", "speed", "distance", "acceleration_x"}
@@ -124,7 +124,7 @@ def evaluated_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArr
 
 
 def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_]:
-    """Return a mask of those of n steps with which a member decides when to stop.
+    """Return a mask of the steps, out of n, that a member uses for early stopping.
 
     The stretch is a share of n, in [0, 1), but at most n / (members + 1) steps; the last member
     takes the end.
@@ -170,7 +170,8 @@ def augmented(
     seen.mul_(gain * colour).add_(offset)
     if few := count(augmentation.blurred):
         seen[:few] = functional.avg_pool2d(seen[:few], 3, 1, 1, count_include_pad=False)
-    # As of a camera in the dark, and at the end of the batch: some images are blurred and noisy.
+    # Noise of a camera in the dark. It is added at the end of the batch, and blur at the beginning,
+    # so that some images may have both.
     if few := count(augmentation.noisy):
         strength = augmentation.noise * uniform(few, 1, 1, 1)
         last = seen[-few:]
@@ -197,8 +198,8 @@ class Batch(NamedTuple):
     """Examples of one training step.
 
     Attributes:
-        pictures: In [0, 1], shape (batch, 3, height, width); None for none.
-        states: Shape (batch, k); None for none.
+        pictures: In [0, 1], shape (batch, 3, height, width); None without images.
+        states: Shape (batch, k); None without states.
         targets: Shape (batch, m), or (batch,) for classes.
     """
 
@@ -211,10 +212,10 @@ class Examples(NamedTuple):
     """Training examples, with their mirror images.
 
     Attributes:
-        pictures: Prepared images, shape (n, height, width, 3); None for none.
-        states: Shape (n, k); None for none.
+        pictures: Prepared images, shape (n, height, width, 3); None without images.
+        states: Shape (n, k); None without states.
         targets: Target outputs: actions, shape (n, m), or class indices, shape (n,).
-        mirrored_states: The mirrored states; None for none.
+        mirrored_states: The mirrored states; None without states.
         mirrored_targets: The mirrored targets.
     """
 
@@ -275,9 +276,9 @@ def batches(
     settings: CloneSettings,
     seed: int,
 ) -> Iterator[Batch]:
-    """Yield batches without end of the examples in a mask, shape (n,), and of a rehearsal.
+    """Yield batches indefinitely, from the examples in a mask, shape (n,), and from a rehearsal.
 
-    They are augmented, and each example is drawn once before any repeats.
+    Images are augmented, and each example is drawn once before any repeats.
     """
     generator = torch.Generator().manual_seed(seed)
     again = 0 if rehearsal is None else round(settings.rehearsal * settings.batch)

@@ -51,7 +51,7 @@ Inputs = Literal["auto", "picture", "state", "both"]
 _HUBER_BETA: Final = 0.1
 _MAX_INITIAL: Final = 0.95  # Keeps the initial output in the range where tanh can still learn.
 _MAX_GRADIENT: Final = 1.0
-# The average of early steps forgets faster: step / (step + 10).
+# The decay of the average is lower in early steps: step / (step + 10).
 _AVERAGE_FROM: Final = 10.0
 # The previous action nearly always predicts the next one: a clone that sees it learns to repeat
 # itself instead of looking.
@@ -87,7 +87,7 @@ class Training:
         best_steps: Step of each member at which it was best, which was kept.
         learned: Number of demonstrated steps learned from.
         mirrored: Share of examples that were mirrored.
-        mirror_note: Reason for that share, in a sentence; "" for a share that the settings state.
+        mirror_note: Reason for that share, in a sentence; "" if the settings state the share.
         seconds: Duration, s.
     """
 
@@ -121,14 +121,14 @@ def learn(
     Args:
         data: The demonstrations.
         learned: Mask of the steps to learn from, shape (n,); None for all.
-        settings: Hyperparameters; None for those of `settings_for`.
+        settings: Hyperparameters; None for `settings_for` the number of steps.
         head: Kind of output.
         inputs: Inputs of the policy.
         seed: Seed of all randomness.
         start: Policy to train further, which is not changed; one network then keeps its inputs and
             outputs. None for a new one.
         rehearsal: Demonstrations that `start` was trained on, mixed in so that they are not
-            forgotten; None for none.
+            forgotten; None without rehearsal.
         symmetric: Whether the driver steers to both sides equally in the long run, as an expert in
             random worlds does. The settings then state the share of mirrored images; otherwise it
             depends on how evenly the driver steered.
@@ -140,7 +140,7 @@ def learn(
     Raises:
         DemosError: If the data are unsuitable, or the seed is not a whole number from 0 to
             2^32 - 1.
-        PolicyError: If the layouts of the data are other ones than those of `start`.
+        PolicyError: If the layouts of the data differ from the layouts of `start`.
     """
     seed = check_seed(seed, DemosError)
     began = time.monotonic()
@@ -268,7 +268,7 @@ def _validation(policy: CameraPolicy, shown: Examples) -> tuple[Tensor, Tensor]:
 
 
 def _loss(out: Tensor, target: Tensor, smoothing: float = 0.0) -> Tensor:
-    """Return the mean loss of outputs of the last layer, of classes where targets are numbers."""
+    """Return the mean loss of outputs of the last layer; 1-D targets are class indices."""
     if target.ndim == 1:
         return functional.cross_entropy(out, target, label_smoothing=smoothing)
     return functional.smooth_l1_loss(torch.tanh(out), target, beta=_HUBER_BETA)
@@ -287,7 +287,7 @@ def _begin(policy: CameraPolicy, shown: Examples) -> None:
             network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
         if shown.states is None:
             return
-        # Of the finite values only.
+        # Statistics of the finite values only.
         known = np.where(np.isfinite(shown.states), shown.states, np.nan)
         there: NDArray[np.bool_] = np.isfinite(known).sum(axis=0) > 0
         middle, spread = np.zeros(known.shape[1]), np.ones(known.shape[1])
@@ -318,7 +318,7 @@ def _fit(
     n = len(validation.targets)
     total = settings.steps(len(kept_back) - n)
     every = max(total // settings.checks, 1)
-    # Validated and kept: the network itself, or the average of its weights.
+    # The network to validate and keep: the trained one, or a copy with averaged weights.
     kept = CameraPolicy(copy.deepcopy(network) if settings.averaging else network, policy.card)
     losses: list[float] = []
     best_step, least, worse = -1, math.nan, 0
@@ -362,7 +362,7 @@ def _fit(
 
 
 def _share_of_rate(step: int, total: int, warm_up: int) -> float:
-    """Return the learning rate schedule: a linear warm-up, and half a cosine down to 0."""
+    """Return the factor of the learning rate: a linear warm-up, and half a cosine down to 0."""
     rising = min((step + 1) / warm_up, 1.0) if warm_up else 1.0
     return rising * 0.5 * (1.0 + math.cos(math.pi * step / total))
 

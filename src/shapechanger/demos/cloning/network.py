@@ -157,7 +157,7 @@ class CameraNetwork(nn.Module):
         self.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def perceive(self, pictures: Tensor | None, states: Tensor | None = None) -> Tensor:
-        """Return the features, shape (n, features), of images and states as the encoders take."""
+        """Return the features, shape (n, features), of inputs of the encoders."""
         given = ((self.eyes, pictures), (self.nerves, states))
         found = [encoder(part) for encoder, part in given if encoder is not None]
         return found[0] if len(found) == 1 else torch.cat(found, dim=1)
@@ -216,7 +216,7 @@ class CameraPolicy(Clone):
             network = CameraNetwork(card)
         state = {name: torch.from_numpy(value.copy()) for name, value in weights.items()}  # pyright: ignore[reportUnknownMemberType]
         network.load_state_dict(state, assign=True)
-        # Assigned weights lie in memory as in the file; sums in another order are other sums.
+        # Assigned weights keep the memory layout of the file, so that sums have the same order.
         network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
         for name, value in weights.items():
             if value.dtype != np.float32 or not np.isfinite(value).all():
@@ -319,7 +319,7 @@ def seeded(seed: int) -> Generator[None]:
 
 
 def joined(card: PolicyCard, members: list[CameraNetwork]) -> CameraNetwork:
-    """Return one network, as a card describes it, whose output is the mean of its members'."""
+    """Return one network, as a card describes it, whose output is the mean of its members."""
     network = CameraNetwork(card)
     for name in ("eyes", "nerves"):
         several = getattr(network, name)

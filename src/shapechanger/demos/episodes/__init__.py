@@ -6,13 +6,13 @@ A recording is a folder of episodes; the folder of a single episode is a recordi
 DATA/20261121T103005Z-0001/
   episode.json    header; written atomically when the episode begins and again when it is closed
   steps.jsonl     append-only; each line is a JSON object whose last key is its own CRC-32
-  frames/         pictures, as JPEG, byte for byte as received
-  lost/           what `repair` moved aside, if anything
+  frames/         images, as JPEG, byte for byte as received
+  lost/           invalid lines and unused images that `repair` moved aside
 ```
 
 The lines of `steps.jsonl` are steps (`"kind": "step"`), marks (`"mark"`), and ranges of steps that
 are excluded or included again (`"drop"`, `"keep"`); recorded lines are never rewritten. Robots
-write episodes, too, so this package needs few others.
+write episodes, too, so this package has few dependencies.
 """
 
 from __future__ import annotations

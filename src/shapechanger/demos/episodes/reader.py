@@ -47,7 +47,7 @@ from shapechanger.errors import BrokenEpisode, DemosError, UnknownName
 from shapechanger.files import read_file, write_atomic, writing
 
 _LOST: Final = "lost"
-"""Folder of an episode for what `repair` moves aside."""
+"""Folder of an episode for lines and images that `repair` moves aside."""
 
 _CUT_OFF: Final = "cut off"
 """Outcome of an episode that was not closed before `repair`."""
@@ -129,12 +129,12 @@ class Episode:
 
     @property
     def reward(self) -> float | None:
-        """Sum of the rewards of the kept steps; None if none has a reward."""
+        """Sum of the rewards of the kept steps; None if no kept step has a reward."""
         rewards = [step.reward for step in self.kept if step.reward is not None]
         return sum(rewards) if rewards else None
 
     def jpeg(self, step: Step) -> bytes | None:
-        """Return the image of a step as it was received; None for none.
+        """Return the image of a step as it was received; None without an image.
 
         Raises:
             BrokenEpisode: If the file is missing or was modified.
@@ -173,7 +173,7 @@ def read_episode(path: Path) -> Episode:
 
 
 class _StepTimes(msgspec.Struct, tag_field="kind", tag="step"):
-    """The part of a step that a list of episodes needs; an hour has 72 000 steps."""
+    """Index and times of a step, enough for a list of episodes; an hour has 72 000 steps."""
 
     index: int = msgspec.field(name="step")
     captured_ns: int | None = None
@@ -186,7 +186,7 @@ _OUTLINES: Final = msgspec.json.Decoder(_StepTimes | Edit)
 def read_outline(path: Path) -> Episode:
     """Read the times and edits of an episode quickly, without checks of lines and images.
 
-    Its steps lack all else, and lines that are incomplete or no valid JSON are left out.
+    Its steps have no other fields; lines that are incomplete or not valid JSON are left out.
 
     Raises:
         DemosError: If the header is missing or cannot be read.
@@ -264,7 +264,7 @@ def _checked_lines(
 
 
 def _image_fault(frames: Path, picture: StepPicture | None, *, thorough: bool) -> str:
-    """Return what is wrong with the image of a step, as part of a sentence; "" for nothing."""
+    """Return the fault of a step's image, as part of a sentence; "" if the image is valid."""
     if picture is None:
         return ""
     path = frames / picture.name
@@ -300,7 +300,7 @@ def episodes_of(data: Path) -> tuple[Path, ...]:
 
 
 def episode_at(path: Path) -> Episode:
-    """Load the episode of a folder, which may be a recording with a single one."""
+    """Load an episode from its folder, or from a recording with a single episode."""
     if not path.exists() and path.parent.is_dir():
         known = [episode.name for episode in episodes_of(path.parent)]
         raise UnknownName("episode", path.name, known)
@@ -324,7 +324,7 @@ def repair(path: Path) -> str:
         path: Folder of the episode.
 
     Returns:
-        The number of steps, and what was done, as the end of a sentence.
+        The number of steps, and the repairs, as the end of a sentence.
 
     Raises:
         DemosError: If the folder is not an episode, or is being recorded now.
@@ -349,7 +349,7 @@ def repair(path: Path) -> str:
         for stray in strays:
             stray.rename(free_path(path / _LOST, stray.stem, stray.suffix))
         if strays:
-            done.append(f"moved aside the images of no step: {len(strays)}")
+            done.append(f"moved aside unused images: {len(strays)}")
         if outcome is None:
             write_header(path, header, {"steps": len(kept), "outcome": _CUT_OFF})
             done.append("closed it")

@@ -188,7 +188,7 @@ class EpisodeHeader:
             )
         known = dict(plain)
         for name in {"action_layout", "state_layout"} & known.keys():
-            layout = known[name] or ""  # As `Layout.to_json` writes it; null is "".
+            layout = known[name] or ""  # Same form as from `Layout.to_json`; null is "".
             known[name] = layout and json.dumps(layout, separators=(",", ":"), ensure_ascii=False)
         with translate_errors(
             msgspec.ValidationError,
@@ -202,14 +202,14 @@ Driver = Literal["person", "policy", "expert", "program"]
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 
-# Sums of two fit into the 64 bits of NumPy and of other formats.
+# The sum of two such numbers fits into 64 bits, as in NumPy and other formats.
 _Integer = Annotated[int, Meta(ge=-(1 << 62), le=1 << 62)]
 
 
 class StepPicture(msgspec.Struct, frozen=True, array_like=True):
     """The image of a step: file name, size in bytes, and CRC-32 as eight hexadecimal digits."""
 
-    name: Annotated[str, Meta(pattern=r"^[0-9]{6,}\.jpg\Z")]  # It never leads to another folder.
+    name: Annotated[str, Meta(pattern=r"^[0-9]{6,}\.jpg\Z")]  # Excludes paths to other folders.
     size: Annotated[int, Meta(le=MAX_PICTURE_BYTES)]
     crc: str
 
@@ -233,18 +233,18 @@ class Step(
         driver: Who decided the action.
         action: The action decided for this step's observation, in the order and units of the action
             layout.
-        applied: What the outputs did, after caps, slew limits and reflexes; None if unknown.
-        wanted: What a policy would have done while somebody else drove; None without a policy.
-        state: Values of the state layout; NaN where nothing measured one.
+        applied: The action after caps, slew limits and reflexes; None if unknown.
+        wanted: The action of a policy while another driver drove; None without a policy.
+        state: Values of the state layout; NaN for unmeasured values.
         captured_ns: When the image was taken or the state was read; monotonic clock of the robot.
         decided_ns: When the action reached the robot; same clock.
         wall_ns: When the step was recorded; Unix time of the recorder.
         reward: Reward of the step; None without a reward.
-        terms: Terms of the reward, by name.
+        terms: Terms of the reward, keyed by name.
         terminated: Whether the task ended with this step.
         truncated: Whether the episode was cut short at this step.
         stop_reason: Why the robot overrode the action; "" if it did not.
-        picture: Its image on disk; None for none.
+        picture: Its image on disk; None without an image.
     """
 
     index: _Integer = msgspec.field(default=-1, name="step")
@@ -265,12 +265,12 @@ class Step(
 
     @property
     def frame(self) -> str:
-        """File name of the image; "" for none."""
+        """File name of the image; "" without an image."""
         return "" if self.picture is None else self.picture.name
 
     @property
     def clock_ns(self) -> int | None:
-        """Time on the robot's clock: of the capture, or else of the decision; None if unknown."""
+        """Time of the capture, or else of the decision, on the robot's clock; None if unknown."""
         return self.decided_ns if self.captured_ns is None else self.captured_ns
 
     def refusal(self, action_size: int, state_size: int) -> str:
@@ -285,7 +285,7 @@ class Step(
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON can hold it; empty fields are left out."""
-        plain = msgspec.to_builtins(self, enc_hook=float).items()  # Of NumPy, too.
+        plain = msgspec.to_builtins(self, enc_hook=float).items()  # Converts NumPy numbers, too.
         return {name: _mapped(_as_json, value) for name, value in plain}
 
     @classmethod
@@ -325,7 +325,7 @@ def _from_json(value: Any) -> Any:
 
 
 class EpisodeMark(msgspec.Struct, frozen=True, tag_field="kind", tag="mark"):
-    """A bookmark set by the operator, at the step with an index."""
+    """A bookmark set by the operator; `step` is the index of the marked step."""
 
     step: int
     text: str = ""
@@ -337,7 +337,7 @@ class Drop(msgspec.Struct, frozen=True, tag_field="kind", tag="drop"):
     Attributes:
         first: Index of the first step.
         last: Index of the last step, inclusive.
-        why: Such as "undo", "cut" or "bad".
+        why: Reason, such as "undo", "cut" or "bad".
     """
 
     first: int
@@ -353,7 +353,7 @@ Edit = EpisodeMark | Drop | Keep
 """Lines of `steps.jsonl` other than steps."""
 
 _PAUSE_PERIODS: Final = 30.0
-_SHORTEST_PAUSE_S: Final = 1.0  # A disk, or a rate that is not known well, takes this long.
+_SHORTEST_PAUSE_S: Final = 1.0  # A slow disk or an imprecise rate causes shorter gaps.
 
 
 def longest_period_s(control_hz: float) -> float:
@@ -369,7 +369,7 @@ _CHECK_SIZE: Final = len(_CHECK % 0)
 
 
 def encode_line(line: Step | Edit | dict[str, Any]) -> bytes:
-    """Encode one line of `steps.jsonl`, with the CRC-32 of what precedes it as its last key."""
+    """Encode one line of `steps.jsonl`; its last key is the CRC-32 of the preceding bytes."""
     fields = line.to_json() if isinstance(line, Step) else msgspec.to_builtins(line)
     text = json.dumps(fields, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     # A lone surrogate has no UTF-8 encoding.
@@ -378,7 +378,7 @@ def encode_line(line: Step | Edit | dict[str, Any]) -> bytes:
 
 
 def parse_line(line: bytes) -> Step | Edit | None:
-    r"""Parse one line of `steps.jsonl`, with its `\n`; None for a kind of a later version.
+    r"""Parse one line of `steps.jsonl`, with its `\n`; return None for an unknown kind of line.
 
     Raises:
         ValueError: If the line is damaged or invalid; the message is part of a sentence.

@@ -42,8 +42,8 @@ SPARE_BYTES: Final = 64 << 20
 """Disk space to leave free by default."""
 
 FULL_BYTES: Final = MAX_TEXT_BYTES * 3 // 4
-"""Size of `steps.jsonl` from which recorders begin the next episode, bytes; marks and edits, which
-come later, have the rest."""
+"""Size of `steps.jsonl` from which recorders begin the next episode, bytes; the rest of the limit
+is for marks and edits that are added later."""
 
 _CONTINUED: Final = "continued"
 """Outcome of an episode that was full, and goes on in the next one."""
@@ -58,15 +58,15 @@ _NS_PER_S: Final = 1e9
 class EpisodeWriter:
     """Writer of one episode; use `create` to construct one.
 
-    Readers refuse files above a limit. A recorder therefore goes on with `continued`, once the
-    episode `is_full`. A thread flushes files to disk once a second, because a memory card may take
-    longer than a control period: a power cut costs at most a second, and a crash of the program
-    alone nothing, because the kernel has the bytes by then.
+    Readers refuse files above a limit, so a recorder calls `continued` once the episode `is_full`.
+    A thread flushes files to disk once a second, because a memory card may take longer than a
+    control period: a power cut costs at most a second. A crash of the program alone costs nothing,
+    because the kernel already has the bytes.
 
     Attributes:
         path: Folder of the episode.
         steps: Number of steps written.
-        dropped: Number of those that were undone.
+        dropped: Number of written steps that were undone.
         marks: Number of marks set.
     """
 
@@ -149,7 +149,7 @@ class EpisodeWriter:
 
     @property
     def is_full(self) -> bool:
-        """Whether the next step should be that of another episode, so that readers accept both."""
+        """Whether the next step should begin another episode, so that readers accept both."""
         return self._bytes >= FULL_BYTES
 
     def continued(self) -> EpisodeWriter:
@@ -264,7 +264,7 @@ class EpisodeWriter:
             outcome: How it ended, such as "collision" or "time"; "" if unspecified.
 
         Raises:
-            OutputError: If the header cannot be written; all steps are on disk all the same.
+            OutputError: If the header cannot be written; all steps are on disk nevertheless.
         """
         if self._closed.is_set():
             return
@@ -300,7 +300,7 @@ class EpisodeWriter:
 
 
 def _disorder(before: Step | None, step: Step) -> str:
-    """Return which time runs backwards, as part of a sentence; "" for none."""
+    """Return the time that runs backwards, as part of a sentence; "" if the times ascend."""
     for name in ("captured_ns", "decided_ns"):
         earlier, later = getattr(before, name, None), getattr(step, name)
         if earlier is not None and later is not None and later < earlier:

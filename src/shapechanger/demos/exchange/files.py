@@ -1,8 +1,8 @@
-"""Files of datasets: sources stay unchanged, targets appear whole, and one budget limits all reads.
+"""Read and write files of datasets: sources stay unchanged, targets are complete or absent.
 
-The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of an image,
-`MAX_UNPACKED` of anything compressed, and regular files inside the folder only. All functions raise
-`DemosError` for what they refuse, and `MissingExtra` for a package that is not installed.
+Reads are limited to `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of an image,
+`MAX_UNPACKED` of compressed data, and regular files inside the folder. All functions raise
+`DemosError` for invalid input, and `MissingExtra` for a package that is not installed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ MAX_UNPACKED: Final = 64 << 20
 MAX_VALUES: Final = 1 << 17
 """Largest number of values of a feature."""
 
-_SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # As Excel writes it.
+_SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # First line that Excel may write.
 
 
 def library(name: str, extra: str = "data") -> Any:
@@ -86,20 +86,20 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
 
 
 def is_inside(folder: Path, name: str) -> bool:
-    """Return whether a name, with all links, leads to a place below a folder."""
+    """Return whether a name, after resolving links, is a path inside a folder."""
     try:
         return (folder / name).resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError):  # A NUL, or too long.
+    except (OSError, ValueError):  # The name has a NUL, or is too long.
         return False
 
 
 def inside(folder: Path, name: str, named_by: object) -> Path:
-    """Return the path of a regular file below a folder that a data set names.
+    """Return the path of a regular file inside a folder.
 
     Args:
         folder: The folder.
-        name: Its name according to the data set.
-        named_by: Where the name stands, such as "steps.csv, line 3".
+        name: Name of the file according to the dataset.
+        named_by: Where the dataset has the name, such as "steps.csv, line 3".
     """
     if not name or not is_inside(folder, name):
         raise DemosError(f"{named_by}: the name {name!r} leaves the folder.")
@@ -125,12 +125,12 @@ def read_text(path: Path) -> str:
 
 
 def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[str]]]]:
-    """Read a CSV file, also as spreadsheets write it: with semicolons or tabs, and blank lines."""
+    """Read a CSV file, also from spreadsheets with semicolons or tabs, and with blank lines."""
     text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip()), "")
     stated = _SEPARATOR_LINE.fullmatch(first.strip())
     found = [mark for mark in ",\t;" if first.count(mark) >= max(1, columns - 1)]
-    # Decimal commas stand between semicolons, so the last one that fits separates.
+    # A file with decimal commas is separated by semicolons, so the last mark that fits is used.
     separator = stated[1] if stated else found[-1] if found else ","
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
     try:
@@ -170,7 +170,7 @@ def read_json(path: Path, kind: Any = dict[str, Any]) -> Any:
 
 
 def own_fields(episode: ExchangeEpisode) -> dict[str, Any]:
-    """Return what `own_header` reads of an episode that is exported."""
+    """Return the fields of an exported episode that `own_header` reads."""
     return episode.header.to_json() | {"outcome": episode.outcome}
 
 

@@ -190,7 +190,7 @@ class ImportContext:
         findings += [warning.removesuffix(".") for warning in self.warnings]
         if findings:
             raise DemosError(
-                f"{source} is not whole ({'; '.join(findings)}): repair it, or import it with "
+                f"{source} is incomplete ({'; '.join(findings)}): repair it, or import it with "
                 "`shapechanger demos import` and without --strict."
             )
 

@@ -56,7 +56,7 @@ _CAMERAS: Final = "observation.images."
 _NUMBERS: Final = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)")
 _CHANNELS: Final = (1, 3, 4)
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
-_MAX_PACKED: Final = 64  # Largest share of unpacked bytes to those of a file.
+_MAX_PACKED: Final = 64  # Largest ratio of unpacked bytes to bytes of a file.
 _MOST: Final = 1 << 20  # Steps of an episode, and episodes.
 _ROWS: Final = 256  # In memory at once; fewer if the values of a column are large.
 

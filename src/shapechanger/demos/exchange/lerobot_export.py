@@ -58,7 +58,7 @@ _VIDEO_PATH: Final = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_inde
 _VIDEO_FILE_S: Final = 500.0
 _ROWS: Final = 256  # In memory at once, because they may hold images.
 _SMALLEST_FRACTION: Final = 10_000  # Denominator of a rate: 19.98 Hz is 999/50.
-_INDEX: Final = "__index_level_0__"  # Of pandas, with which LeRobot reads the tasks.
+_INDEX: Final = "__index_level_0__"  # Column of pandas, with which LeRobot reads the tasks.
 _QUANTILES: Final = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 _LEVELS: Final = 256
 

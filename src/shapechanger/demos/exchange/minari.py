@@ -1,11 +1,11 @@
-"""Minari datasets: ours without a loss, and those of others as far as possible.
+"""Minari datasets: lossless if exported by Shapechanger, and as far as possible from others.
 
 An observation is the image, the state, or a dictionary of both; the last one is repeated, because
-Minari needs one more than there are steps. An image is stored as the JPEG that was recorded, which
-Minari decodes on reading. Images below 32 pixels, which Minari does not store as JPEG, are stored
-as pixels, with the JPEG in `infos/jpeg`. Of the infos, `frame` is the index of the image in the
-episode, the same for steps that share one, and `step` is everything without a column of its own,
-as JSON. The reward is NaN where it is unknown. `metadata.json` has the headers of the episodes.
+Minari needs one more than there are steps. An image is stored as the recorded JPEG, which Minari
+decodes on reading. Images below 32 pixels, which Minari does not store as JPEG, are stored as
+pixels, with the JPEG in `infos/jpeg`. `infos/frame` is the index of the image in the episode, the
+same for steps that share an image, and `infos/step` contains all fields without a separate column,
+as JSON. An unknown reward is NaN. `metadata.json` has the headers of the episodes.
 
 Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
 encodes each image again at JPEG quality 75, and needs the whole episode in memory.
@@ -59,7 +59,7 @@ _OBSERVATIONS, _FRAME, _JPEG = "observations", "infos/frame", "infos/jpeg"
 _ACTION, _REWARD, _TERMINATED, _TRUNCATED, _STEP = (
     COLUMNS[field]["minari"] for field in ("action", "reward", "terminated", "truncated", "driver")
 )
-_IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys of a step that its JSON lacks.
+_IN_COLUMNS: Final = ("kind", "action", "state", "frame")  # Keys left out of `infos/step`.
 _STORAGE: Final = "minari.dataset.minari_storage"
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 64  # Steps in memory at once; images may be stored as pixels.
@@ -67,14 +67,14 @@ _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not an image.
 _CHANNELS: Final = (1, 3)
 _DEEP: Final = ("uint16", "int16", "uint32")
 _DESCRIPTION: Final = (
-    "Episodes recorded by Shapechanger, and exported without a change: images are JPEG as "
-    "recorded, numbers have 64 bits, the last observation of an episode is there twice."
+    "Episodes recorded by Shapechanger, and exported without changes: images are the recorded "
+    "JPEGs, numbers have 64 bits, and the last observation of an episode is repeated."
 )
 _BAD_JSON: Final = (ValueError, TypeError, RecursionError, msgspec.DecodeError)
 
 
 class _Rest(msgspec.Struct):
-    """What a step of an own dataset has without a column, in its `infos/step`."""
+    """Fields of a step without a column, in `infos/step` of datasets from Shapechanger."""
 
     step: dict[str, Any]
     marks: tuple[str, ...]
@@ -83,18 +83,18 @@ class _Rest(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """The columns of an episode; those of the action and the state with their number of values."""
+    """The columns of an episode; columns of action and state map to their number of values."""
 
     header: EpisodeHeader
     action: Mapping[str, int]
     state: Mapping[str, int]
     picture: str = ""
     pixels: tuple[int, ...] = ()  # The shape of an image; () for JPEG.
-    infos: Sequence[str] = ()  # Of an own dataset.
+    infos: Sequence[str] = ()  # Only in datasets from Shapechanger.
 
 
 def _data_folder(folder: Path) -> Path | None:
-    """Return the folder with the files of a dataset, `data` or `folder` itself; None for none."""
+    """Return the folder with the files of a dataset, `data` or `folder` itself; None if missing."""
     return next((p for p in (folder / _DATA, folder) if (p / _METADATA).is_file()), None)
 
 
@@ -110,7 +110,7 @@ def _opened(path: Path) -> Generator[Any]:
 
 
 def _arrays(file: Any, number: int) -> dict[str, Any]:
-    """Return the arrays of an episode by their paths; no link or other file is followed."""
+    """Return the arrays of an episode, keyed by path; links and external files are not followed."""
     h5py, name, found = library("h5py"), f"episode_{number}", dict[str, Any]()
     is_there = isinstance(file.get(name, getlink=True), h5py.HardLink)
     if not is_there or not isinstance(file[name], h5py.Group):
@@ -124,7 +124,7 @@ def _arrays(file: Any, number: int) -> dict[str, Any]:
 
 
 def _columns(file: Any, number: int, parts: _Parts) -> dict[str, Any]:
-    """Return the columns of an episode by name; refuse those that do not fit together."""
+    """Return the columns of an episode, keyed by name; refuse columns that do not fit together."""
     where, arrays = f"{file.filename}, episode_{number}", _arrays(file, number)
     sizes = {_TERMINATED: 1, _TRUNCATED: 1, **parts.action, **parts.state}
     sizes |= {_REWARD: 1} if parts.infos or _REWARD in arrays else {}
@@ -151,7 +151,7 @@ def _columns(file: Any, number: int, parts: _Parts) -> dict[str, Any]:
             raise DemosError(f"{where}: {name!r} has images that do not fit their space.")
     stated = file[f"episode_{number}"].attrs.get("total_steps", steps)
     if not np.array_equal(np.ravel(stated), [steps]):
-        raise DemosError(f"{where} has {steps} steps, and its total_steps says {stated}.")
+        raise DemosError(f"{where} has {steps} steps, but its total_steps is {stated}.")
     return columns
 
 
@@ -202,7 +202,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
 
 
 def _parts(metadata: Mapping[str, Any], path: Path, context: ImportContext) -> _Parts:
-    """Return the columns of all episodes, by the spaces in the metadata."""
+    """Return the columns of all episodes, according to the spaces in the metadata."""
     observed, acted = (_leaves(metadata, f"{of}_space", path) for of in ("observation", "action"))
     pictures = {at: size for at, space in observed.items() if (size := _picture_size(space))}
     if len(pictures) > 1:
@@ -239,7 +239,7 @@ def _parts(metadata: Mapping[str, Any], path: Path, context: ImportContext) -> _
 
 
 def _leaves(metadata: Mapping[str, Any], name: str, path: Path) -> dict[str, spaces.Space[Any]]:
-    """Return the spaces without subspaces in one of the metadata, by their paths, as "/image"."""
+    """Return the leaves of a space in the metadata, keyed by path, such as "/image"."""
     text, where = metadata.get(name), f"The {name} in {path}"
     if not isinstance(text, str):
         raise DemosError(f"{path} has no {name}: create the dataset again with this space.")
@@ -254,7 +254,7 @@ def _leaves(metadata: Mapping[str, Any], name: str, path: Path) -> dict[str, spa
 
 
 def _walked(space: Any, at: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the leaves of the JSON of a space, in the order and with the keys of the files."""
+    """Yield the leaves of the JSON of a space, in the order and with the keys of Minari's files."""
     match space["type"]:
         case "Dict":
             named = sorted(space["subspaces"].items())
@@ -270,7 +270,7 @@ def _walked(space: Any, at: str = "") -> Iterator[tuple[str, Any]]:
 def _features(
     leaves: Mapping[str, spaces.Space[Any]], part: str, context: ImportContext
 ) -> dict[str, list[Feature]]:
-    """Return the features of each leaf of numbers, by its column; the others are reported."""
+    """Return the features of each numeric leaf, keyed by column; other leaves are reported."""
     found: dict[str, list[Feature]] = {}
     for at, space in leaves.items():
         shape, what = space.shape or (), part.removesuffix("s")
@@ -409,7 +409,7 @@ def _write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCon
 
 
 def _space_of(episode: ExchangeEpisode, jpeg: bytes | None) -> tuple[Any, spaces.Box | None]:
-    """Return the space of all observations by the first image, and its part of the images."""
+    """Return the space of all observations, from the first image, and its subspace of images."""
     header, found, picture = episode.header, dict[str, spaces.Space[Any]](), None
     if jpeg is not None or header.image_size is not None:
         where = f"of the first step of {episode.name}"
@@ -427,8 +427,8 @@ def _space_of(episode: ExchangeEpisode, jpeg: bytes | None) -> tuple[Any, spaces
 def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | None) -> list[Step]:
     """Write the columns of an episode to its group, and return its steps.
 
-    The last observation is repeated. An episode without an end is truncated at its last step: a
-    learner must not take the next episode for its continuation.
+    The last observation is repeated. An episode without an end is truncated at its last step, so
+    that learners do not treat the next episode as its continuation.
     """
     h5py, header = library("h5py"), episode.header
     steps, rests, frames = list[Step](), list[str](), list[int]()
@@ -458,7 +458,9 @@ def _write_episode(group: Any, episode: ExchangeEpisode, picture: spaces.Box | N
             frame, shown = frame + 1, pixels[..., 0] if grey else pixels
             where = f"of step {len(steps)} of {episode.name}"
             if is_grey(jpeg, where) != grey:
-                kinds = "not grey as the first one" if grey else "grey, and the first one is not"
+                kinds = (
+                    "not grey, and the first one is" if grey else "grey, and the first one is not"
+                )
                 raise DemosError(f"The image {where} is {kinds}: Minari needs images of one kind.")
         for at, value in zip(observed, (np.frombuffer(jpeg, np.uint8), shown), strict=False):
             append(at, value)

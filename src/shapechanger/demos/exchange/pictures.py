@@ -1,8 +1,8 @@
-"""Images and videos of other projects: checked, and converted to JPEG if needed.
+"""Read images and videos of datasets, check them, and convert them to JPEG; write videos.
 
-Videos are written and read through PyAV. A stranger's video is opened as a file object and as MP4
-only, so that it can refer to no other file; its images are decoded below a limit of pixels, and
-damaged ones are refused, never filled up.
+Videos are written and read through PyAV. An untrusted video is opened as a file object and as MP4
+only, so that it cannot refer to other files. Its images are decoded up to a limit of pixels, and
+damaged images are refused instead of being concealed.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _MAX_SAMPLES: Final = 1 << 21  # Of a video: 10 hours at 60 Hz, and 50 MB of FFm
 
 
 class PictureError(DemosError):
-    """Why an image cannot be imported, after a noun, such as "with an empty image"."""
+    """An image cannot be imported; the message follows a noun, such as "with an empty image"."""
 
 
 def load_jpeg(
@@ -228,7 +228,7 @@ class VideoWriter:
         self.frames += 1
 
     def close(self) -> None:
-        """Finish the file, and check that it is whole."""
+        """Finish the file, and check that it is complete."""
         self._file.mux(self._images.encode(None))
         self._file.close()
         if (written := len(read_times(self._path).ticks)) != self.frames:
@@ -244,7 +244,7 @@ class VideoTimes:
     Attributes:
         ticks: Times, ascending, shape (n,).
         seconds: The same in seconds.
-        keys: Decoding time of the key frame with which decoding an image begins, shape (n,).
+        keys: Decoding time of the key frame from which to decode each image, shape (n,).
         tick_s: Length of a tick, s.
         size: Width and height of the images, pixels.
     """
@@ -296,7 +296,7 @@ def _require_whole(path: Path) -> None:
 
 @contextmanager
 def _opened(path: Path) -> Generator[tuple[Any, Any]]:
-    """Open an MP4 file of a stranger; yield the container and its first stream of images."""
+    """Open an untrusted MP4 file; yield the container and its first video stream."""
     av = library("av", "lerobot")
     _require_whole(path)
     strict = {"max_pixels": str(MAX_PIXELS), "err_detect": "explode"}
@@ -325,7 +325,8 @@ def read_times(path: Path) -> VideoTimes:
         read = 0
         for packet in container.demux(stream):
             if packet.pts is not None and packet.dts is not None:
-                shown = not packet.is_corrupt and not packet.is_discard  # By the list of edits.
+                # The edit list of the file may discard packets.
+                shown = not packet.is_corrupt and not packet.is_discard
                 found.append((packet.pts, packet.dts, packet.is_keyframe, shown))
                 read += max(1, packet.size)
             if read > most:

@@ -1,8 +1,8 @@
 """Donkeycar tubs: import of versions 1 and 2, export of version 2.
 
 `user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
-Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is what a policy wanted. In
-the other modes `pilot/...` drives, except that in "local_angle" the throttle is the person's.
+Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is the action of a policy.
+In the other modes `pilot/...` drives, except for the person's throttle in "local_angle".
 
 Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
 metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
@@ -75,7 +75,7 @@ Time = Annotated[int, _IN_TIME] | Annotated[float, _IN_TIME] | None
 
 
 class _Record(Struct):
-    """The columns that mean the same in all tubs."""
+    """The columns with the same meaning in all tubs."""
 
     time_ms: Time = field(default=None, name="_timestamp_ms")
     mode: str = field(default="user", name=_MODE)
@@ -100,7 +100,7 @@ class _Tub(Struct):
     types: list[str] = []
     start: float | None = None  # Unix time, s.
     rate: Any = field(default=None, name=_LOOP_HZ)
-    records: list[Fields] = []  # Each with a number as `_index`, which no other one has.
+    records: list[Fields] = []  # Each has a unique number as `_index`.
     deleted: list[int] = []
     is_unix: bool = True  # Otherwise times begin at 0 with each start of the car.
 
@@ -240,7 +240,7 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
 
 
 def _float(value: Any) -> float:
-    """Return a number; NaN for anything else, also for one that is too large."""
+    """Return a number; NaN for other values and for numbers that are too large."""
     with suppress(TypeError, ValueError, OverflowError):
         return float(value)
     return math.nan
@@ -301,7 +301,8 @@ def _find_pictures(records: Sequence[SourceRecord], images: Path, context: Impor
 def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
     """Write episodes as the sessions of one tub of version 2.
 
-    Actions of people, experts and programs become the user's, those of policies the pilot's.
+    Actions of people, experts and programs are written as `user/...`, those of policies as
+    `pilot/...`.
     """
     states = {_state_names(episode) for episode in episodes}
     if len(states) > 1:
@@ -366,10 +367,10 @@ def _fields(step: Step, state: Sequence[str], where: str) -> Fields:
 
 
 def _timed(episode: ExchangeEpisode, began_ns: int) -> Iterator[tuple[Step, bytes | None, int]]:
-    """Yield the steps with their images and Unix times, ns, each after the one before.
+    """Yield the steps with their images and ascending Unix times, ns.
 
-    Steps of a simulated drive get the times of its own clock, since the recorder's tells how fast
-    the simulation ran; steps without a time follow the one before at the rate of the episode.
+    Steps of a simulated drive get the times of its clock, because the recorder's times depend on
+    the speed of the simulation; steps without a time follow at the rate of the episode.
     """
     header = episode.header
     is_simulated = header.clock == "twin" or (header.clock == "none" and header.env)

@@ -1,13 +1,13 @@
-"""Models that move like another to the last bit and cost less.
+"""Find cheaper models whose motion is bit-equal to the original model.
 
 Four parts of MuJoCo's step take time without changing any number of an ant or a pendulum:
 
 - **Islands.** The solver splits the constraints into islands that do not touch. One tree of bodies
-  has at most one island, so not looking for it gives the same sums in the same order.
-- **Contact search.** The possible contacts of one floor and a few geoms are known beforehand. Given
-  as explicit pairs, in the order in which the search would find them and with the parameters that
-  it would mix, they make the same contacts. Margins are *summed*.
-- **Collisions** of models in which nothing can collide, such as a pendulum.
+  has at most one island, so skipping the search gives the same sums in the same order.
+- **Contact search.** The possible contacts of one floor and a few geoms are known beforehand.
+  Explicit pairs, in the order of the search and with the parameters that it would mix, give the
+  same contacts. Margins are *summed*.
+- **Collisions** of models without possible collisions, such as a pendulum.
 - **Springs, joint friction, sensors and equalities** of a model that has none.
 
 Two checks decide which of these may be left out: rules on the model, which keep every pair that the
@@ -69,7 +69,7 @@ def find_fast_model(
 
 
 def _disabled(model: mujoco.MjModel, flags: int) -> mujoco.MjModel:
-    """Add disable flags to a model, and those of everything that it lacks; return it."""
+    """Set disable flags of a model, including flags for the features that it lacks; return it."""
     # If both springs and dampers are disabled, MuJoCo skips all other passive forces too, such as
     # fluid forces.
     has_dampers = not model.opt.disableflags & int(_BIT.mjDSBL_DAMPER)
@@ -106,7 +106,7 @@ def _without_search(
     joined = geoms_of_pairs(result)
     for parameter, values in mixed_parameters(result, joined).items():
         getattr(result, f"pair_{parameter}")[:] = values
-    # Leave no geom to the search, neither by its own bits nor by its body's.
+    # Exclude all geoms from the search, by their bits and by the bits of their bodies.
     result.geom_contype[:] = result.geom_conaffinity[:] = 0
     result.body_contype[:] = result.body_conaffinity[:] = 0
     return _disabled(result, _NO_ISLANDS | _NO_SEARCH)
@@ -170,7 +170,7 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
 
     Args:
         model: The original model.
-        other: The model that shall replace it.
+        other: The model that is to replace it.
     """
     rng = np.random.default_rng(_SEED)
     one, two = mujoco.MjData(model), mujoco.MjData(model)

@@ -39,14 +39,14 @@ _APART: Final = 64
 
 @dataclass(eq=False)
 class Shared:
-    """What all watches of models that were compiled equal share.
+    """Data that all watches of models with equal digests share.
 
     Attributes:
-        parts: The bytes of each watched region of memory. Sharing keeps them in a core's caches
-            while many envs compare their models with them.
+        parts: The bytes of each watched region of memory. Because they are shared, they stay in
+            the caches of a core while many envs compare their models with them.
         steps: Steps that all envs with such a model have taken without a fast model.
-        searched: Whether a fast model has been looked for.
-        fast: The fast model; None if none is known to move equally.
+        searched: Whether a fast model has been searched.
+        fast: The fast model; None if no bit-equal model is known.
     """
 
     parts: list[bytearray] | None = None
@@ -57,7 +57,7 @@ class Shared:
 
 @lru_cache(maxsize=32)
 def shared_by(digest: bytes) -> Shared:
-    """Return what models of a digest share; that of the latest digests is kept."""
+    """Return the shared data of models with a digest; a few recent ones are kept."""
     return Shared()
 
 
@@ -73,9 +73,9 @@ class ModelWatch:
 
     Attributes:
         model: The watched model.
-        digest: Hash of the model as it was when the watch was created.
-        shared: What equal models share.
-        timestep: Its timestep then, s.
+        digest: Hash of the model when the watch was created.
+        shared: Data that equal models share.
+        timestep: Timestep of the model when the watch was created, s.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -97,7 +97,7 @@ class ModelWatch:
         self._parts = list(zip(parts, views, strict=True))
 
     def unedited(self) -> bool:
-        """Return whether every number of the model is as it was, to the last bit."""
+        """Return whether every number of the model is unchanged, to the last bit."""
         if self._read_numbers() != self._numbers:
             return False
         for before, now in self._parts:  # noqa: SIM110  # `all` takes twice as long.
@@ -119,7 +119,7 @@ class Binding:
     Attributes:
         model: The public model.
         stepping: The model that steps the data: the public model or its fast model.
-        has_fast_model: Whether `stepping` is a fast model; None until one has been looked for.
+        has_fast_model: Whether `stepping` is a fast model; None until the search for one.
         shape: Shape of an action.
         dt: Duration of a step while the model is unedited, s.
         warnings: View of MuJoCo's counts of bad positions, velocities and accelerations, (3,).
@@ -152,26 +152,26 @@ class Binding:
 
 
 class TunedStep(Reshapable):
-    """Mixin that speeds up the step of a Gymnasium MuJoCo env without changing a bit of it.
+    """Mixin that speeds up the step of a Gymnasium MuJoCo env, with bit-equal results.
 
     Each step compares the public `model` with the compiled one. While it is edited, Gymnasium's own
     methods step it. They also step if a subclass overrides one of the methods in `replaced`, or if
     `model` has been replaced.
 
-    Subclasses implement `_advance`, list in `replaced` what it stands for, and set `tuned` and
-    `binding`.
+    Subclasses implement `_advance`, list the methods that it replaces in `replaced`, and set
+    `tuned` and `binding`.
 
     To step many envs together, call `ready_together` of each, set their controls, call `move` of
     each binding, and then `conclude` once for all bindings of one `kind`. Whether a simulation has
     diverged is in the `warnings` of its binding.
 
     Attributes:
-        replaced: Methods and properties that `_advance` stands for.
+        replaced: Methods and properties that `_advance` replaces.
         tuned: The class that `_advance` was written for.
         binding: Class of its bindings.
         patience: Steps with a body, summed over all envs that have it, before a fast model is
-            looked for. Finding an ant's takes 20 ms and saves 0.05 ms a step, so it would not pay
-            for a body that soon changes. Results do not depend on when the fast model takes over.
+            searched. For an ant, the search takes 20 ms and saves 0.05 ms a step, so it would not
+            pay off for a body that soon changes. Results do not depend on the time of the search.
     """
 
     replaced: ClassVar[tuple[str, ...]] = ()
@@ -190,7 +190,7 @@ class TunedStep(Reshapable):
         self._rules = self._bound = None
 
     def start_rules(self) -> StartRules:
-        """Return the rules that make a start pose feasible, for the model as it is now."""
+        """Return the rules that make a start pose feasible, for the present model."""
         watch = self._watch
         if watch is None or watch.model is not self.model or not watch.unedited():
             return super().start_rules()
@@ -222,7 +222,7 @@ class TunedStep(Reshapable):
 
         Raises:
             ResetNeeded: If the env has not been reset.
-            BadAction: If the action has another shape or is not finite; nothing has moved then.
+            BadAction: If the action has another shape or is not finite; the state is unchanged.
         """
         bound = self._ready()
         return super().step(action) if bound is None else self._advance(bound, action)
@@ -256,11 +256,11 @@ class TunedStep(Reshapable):
         actions: NDArray[Any],
         out: NDArray[np.float64] | None,
     ) -> Outcomes:
-        """Compute the results of envs of this one's kind after their physics has stepped.
+        """Compute the results of envs of this kind after their physics has stepped.
 
         Args:
             bounds: The binding of each env.
-            before: What `remember` of each binding returned before the step.
+            before: Result of `remember` of each binding before the step.
             actions: The action of each env, a row each.
             out: Array to write the observations into; None for a new one.
         """
@@ -288,16 +288,16 @@ class TunedStep(Reshapable):
             shared = bound.watch.shared
             shared.steps += 1
             if shared.steps > self.patience and bound.unedited():
-                with _searching:  # Of several threads with the same body, one searches.
+                with _searching:  # If several threads have the same body, only one searches.
                     if not shared.searched:
                         shared.fast = find_fast_model(self.model, self.body_spec)
                         shared.searched = True
                 bound.step_with(shared.fast)
-        # Without a fast model the public one steps; only its timestep was copied.
+        # Without a fast model the public model steps; only its timestep was copied.
         return bound if bound.dt == self.dt else None
 
     def _new_binding(self) -> Any:
-        """Return a new binding; None where the model or a method that it replaces is another."""
+        """Return a new binding; None if the model or a method that it replaces was changed."""
         self._require_reset("step")
         self._bound = None
         watch, mine = self._watch, type(self)
@@ -315,7 +315,7 @@ class TunedStep(Reshapable):
 def _views(apart: int, *owners: Any) -> list[Any]:
     """Return views of the memory of all arrays; those closer than `apart` bytes share one."""
     arrays = [getattr(owner, name) for owner in owners for name in _array_names(owner.__class__)]
-    # An array that owns its memory is a copy, which is gone at once.
+    # An array that owns its memory is a temporary copy.
     spans = [
         (int(array.ctypes.data), int(array.nbytes))
         for array in arrays

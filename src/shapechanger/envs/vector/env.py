@@ -121,19 +121,19 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """Start an episode in each env.
 
         Args:
-            seed: A number, which is the seed of the first env, the next of the next; or one seed or
-                None per env; None goes on with the present generators.
-            options: Handed to each env. `reset_mask`, an array of one boolean per env, says which
-                envs start again; the others stay as they are.
+            seed: A number, which is the seed of the first env and counts up from there; or one seed
+                or None per env. None continues with the present generators.
+            options: Passed to each env. `reset_mask`, an array of one boolean per env, selects the
+                envs to reset; the others are unchanged.
 
         Returns:
-            The observations of all envs, and the infos of those that started again.
+            The observations of all envs, and the infos of the envs that were reset.
 
         Raises:
             VectorEnvError: If there are not as many seeds as envs.
             ResetNeeded: If the mask leaves out envs that have never been reset.
             TypeError: If the mask is not an array of booleans.
-            ValueError: If the mask has another shape, or is true nowhere.
+            ValueError: If the mask has another shape, or is all false.
         """
         self._require_open()
         seeds = one_seed_each(seed, self.num_envs)
@@ -164,7 +164,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         numbers = list(range(self.num_envs) if chosen is None else chosen)
         changes_bodies = any(given and "body" in given for given in options)
-        # One thread at a time compiles a body, and its renderer is replaced.
+        # Only one thread at a time may compile a body and replace its renderer.
         compiling = threading.Lock() if changes_bodies else nullcontext()
 
         def start(i: int) -> None:
@@ -209,7 +209,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         if self._mode is AutoresetMode.DISABLED and self._ended.any():
             numbers = ", ".join(str(i) for i in np.flatnonzero(self._ended))
             raise gym.error.ResetNeeded(
-                f"The episodes of envs {numbers} have ended, and nothing resets them in this mode: "
+                f"The episodes of envs {numbers} have ended, and this mode does not reset them: "
                 "call `reset` with options={'reset_mask': terminations | truncations}."
             )
         results = StepResults(self.num_envs)
@@ -254,7 +254,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             own = queues[thread]
             for queue in (own, *queues):
                 take = queue.popleft if queue is own else queue.pop
-                with suppress(IndexError):  # None is left.
+                with suppress(IndexError):  # All envs have been taken.
                     while True:
                         attempt(advance, take(), failures)
 
@@ -266,7 +266,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         diverged: set[int] = set()
         for numbers in kinds.values():
             diverged.update(self._conclude(numbers, moved, actions, results))
-        # Observations that are not finite end episodes, even if no simulation has noticed.
+        # Observations that are not finite end episodes, even without a warning of MuJoCo.
         finite = np.isfinite(self._observations)
         if not np.logical_and.reduce(finite, axis=None):
             rows = finite.reshape(self.num_envs, -1).all(axis=1)
@@ -324,7 +324,7 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return self._of_each(lambda i: cast("Any", self.envs[i]).render())
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of each env with the arguments given, or read an attribute."""
+        """Call a method of each env with the given arguments, or read an attribute."""
 
         def ask(i: int) -> Any:
             found = self.envs[i].get_wrapper_attr(name)

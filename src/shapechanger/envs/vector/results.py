@@ -34,7 +34,7 @@ class InfoColumns(NamedTuple):
 
 
 def in_columns(infos: Mapping[int, Mapping[str, Any]]) -> list[InfoColumns]:
-    """Group the infos of some envs, by number; an info with others within is a group by itself."""
+    """Group infos, keyed by the number of the env; a nested info forms a separate group."""
     groups: dict[Any, list[int]] = {}
     for number, info in infos.items():
         nested = any(isinstance(value, dict) for value in info.values())
@@ -48,9 +48,9 @@ def in_columns(infos: Mapping[int, Mapping[str, Any]]) -> list[InfoColumns]:
 def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dict[str, Any]:
     """Return the infos of all envs as Gymnasium's vector envs do.
 
-    For each key there is an array of one entry per env, and under `_key` a mask of the envs that
-    have one. Gymnasium adds one env after another, key by key; here it does so with the first env
-    of each part, which makes the arrays, and the others are added together, in a tenth of the time.
+    For each key there is an array of one entry per env, and under `_key` a mask of the envs with an
+    entry. Gymnasium adds one env after another; here it adds the first env of each part, which
+    makes the arrays, and the others are added together, in a tenth of the time.
     """
     batch: dict[str, Any] = {}
     add: Any = cast("Any", envs)._add_info
@@ -62,7 +62,7 @@ def batched(envs: VectorEnv[Any, Any, Any], parts: Iterable[InfoColumns]) -> dic
         others = slice(1, None) if len(numbers) == envs.num_envs else np.asarray(numbers[1:])
         for key, column in values.items():
             array = batch[key]
-            if array.dtype == np.object_:  # Numbers and arrays in it stay what they are.
+            if array.dtype == np.object_:  # Object arrays keep the types of their elements.
                 for number, value in zip(numbers, column, strict=True):
                     array[number] = value
             else:
@@ -83,8 +83,8 @@ class StepResults:
         rewards: Shape (n,).
         terminated: Whether the step ended each episode, shape (n,).
         truncated: Whether each episode was cut off, shape (n,).
-        restarts: Of the envs that were reset within the step, by number: the last observation of
-            the episode, and the info of the reset.
+        restarts: Last observation of the episode and info of the reset, for envs that were reset
+            within the step, keyed by number.
     """
 
     def __init__(self, num_envs: int) -> None:
@@ -137,8 +137,8 @@ class SubEnv:
     reward is 0, and the info has `diverged`. Observations that are not finite read 0.
 
     Args:
-        env: The env as `gym.make` makes it.
-        row: Where to write its observations.
+        env: The env, from `gym.make`.
+        row: Array to write its observations into.
 
     Attributes:
         tuned: The env without its time limit if its physics can be stepped separately, else None.
@@ -163,7 +163,7 @@ class SubEnv:
         """Start an episode, and return its info; see `gymnasium.Env.reset`."""
         self.row[...], info = self.env.reset(seed=seed, options=options)
         inner: Any = self.env.unwrapped
-        # Ours say themselves that they have diverged. A reset may have replaced the data.
+        # Shapechanger's envs report divergence. A reset may have replaced the data.
         if hasattr(inner, "data") and not hasattr(inner, "diverged"):
             self._warnings = inner.data.warning.number[_BAD_STATE]
         return info
@@ -183,6 +183,6 @@ class SubEnv:
         return self._clock._elapsed_steps >= self._clock._max_episode_steps
 
     def diverged(self, truncated: Any, info: dict[str, Any]) -> Step:
-        """Return the result of a step with this end and info whose simulation has diverged."""
+        """Return the result of a step whose simulation has diverged."""
         self.row[~np.isfinite(self.row)] = 0.0
         return 0.0, True, truncated, {**info, "diverged": True}

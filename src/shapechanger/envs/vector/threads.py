@@ -1,4 +1,4 @@
-"""Threads that step the envs of a vector env, each its own envs."""
+"""Threads that step the envs of a vector env; each has a fixed range of envs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Final
 Failures = list[tuple[int, Exception]]
 """Exceptions, each with the number of the env that raised it."""
 
-# A job of a worker, with the queue that receives what it raised, or None.
+# A job of a worker, with the queue that receives its exception, or None.
 _Answers = SimpleQueue[BaseException | None]
 _Task = tuple[Callable[[], None], _Answers]
 
@@ -94,7 +94,7 @@ class EnvThreads:
 
         Raises:
             Exception: As in `do`.
-            BaseException: What a job itself raised, such as KeyboardInterrupt.
+            BaseException: The exception of a job itself, such as KeyboardInterrupt.
         """
         failures: Failures = []
         first, *others = [partial(job, failures) for job in jobs]
@@ -106,8 +106,8 @@ class EnvThreads:
             first()
             errors = [answers.get() for _ in workers]
         except BaseException:
-            # It is unknown which jobs were handed over, so wait until each thread has done another
-            # one, which does nothing.
+            # It is unknown which jobs were handed over, so wait until each thread has done an empty
+            # job.
             settled = _Answers()
             try:
                 for worker in workers:
@@ -145,7 +145,7 @@ class EnvThreads:
 
 
 def attempt(work: Callable[[int], object], number: int, failures: Failures) -> None:
-    """Do `work` for one env, and record what it raises, which the caller's thread raises."""
+    """Do `work` for one env, and record its exception, which the caller's thread raises."""
     try:
         work(number)
     except Exception as error:

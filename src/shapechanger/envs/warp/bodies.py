@@ -1,4 +1,4 @@
-"""What a device needs to know about a body: rows of its model, and which arrays must be equal."""
+"""Read bodies for a device: arrays per world, and arrays that all worlds of a batch share."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from shapechanger.envs.warp.devices import mjw, wp
 Rows = Mapping[str, NDArray[Any]]
 """Arrays of one body, keyed by name."""
 
-# Nothing is drawn on the device.
+# Only used for rendering, which does not happen on the device.
 _DRAWN: Final = ("cam_", "light_", "mat_", "geom_rgba", "geom_matid", "geom_group", "site_type")
-# What each world has its own of, of the options.
+# Options that may differ between worlds.
 _OPTIONS: Final = ("timestep", "gravity", "wind", "magnetic", "density", "viscosity")
-# What is the same for all worlds, of the options.
+# Options that are the same for all worlds.
 _SHARED_OPTIONS: Final = (
     *("tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance", "impratio"),
     *("integrator", "cone", "jacobian", "solver", "iterations", "ls_iterations"),
     *("noslip_iterations", "ccd_iterations", "disableflags", "enableflags"),
 )
 ARMS: Final = "wrap_prm"
-"""Moment arms of tendons over joints, which worlds have their own of; see `kernels`."""
-# Arrays of which mujoco-warp asks whether all numbers are zero, or which.
+"""Moment arms of tendons over joints, which may differ between worlds; see `kernels`."""
+# Arrays of which mujoco-warp checks whether all numbers are zero, or which.
 _ANY_ZERO: Final = (
     *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
     *("actuator_damping", "actuator_dampingpoly", "dof_frictionloss"),
     *("tendon_frictionloss", "geom_adhesion", "geom_surfacevel"),
 )
 _EACH_ZERO: Final = ("actuator_gainprm", "actuator_biasprm", "actuator_gear", "body_mass")
-# Read by sleeping bodies and by sensors alone, which our tasks do not have.
+# Used only by sleeping bodies and sensors, which the tasks do not have.
 _UNREAD: Final = ("dof_length", "site_size")
 
 
 class DeviceBody(NamedTuple):
-    """A body as the device needs it.
+    """Arrays of a body for a device.
 
     Attributes:
         name: Its name or edits, for messages.
         shared: Arrays that all worlds of a batch have in common, as bytes.
-        rows: Arrays that each world has its own of.
+        rows: Arrays that may differ between worlds.
         static: Places and orientations of the geoms that never move, which the device's kinematics
             leaves as they are: `geom_xpos` (k, 3) and `geom_xmat` (k, 3, 3).
         constants: Numbers of the task that depend on the body.
@@ -90,24 +90,24 @@ def geom_type(model: mujoco.MjModel, geom: int) -> str:
 
 
 def differing_arrays(one: DeviceBody, other: DeviceBody) -> list[str]:
-    """Return the names of the arrays that keep two bodies from sharing a batch."""
+    """Return the names of the arrays because of which two bodies cannot share a batch."""
     names = {**one.shared, **other.shared}
     return [name for name in names if one.shared.get(name) != other.shared.get(name)]
 
 
 @cache
 def _fields() -> list[Any]:
-    """Return the fields of mujoco-warp's model that are not for drawing."""
+    """Return the fields of mujoco-warp's model that are not for rendering."""
     return [f for f in dataclasses.fields(mjw.Model) if not f.name.startswith(_DRAWN)]
 
 
 def _has_rows(field: Any) -> bool:
-    """Return whether a field is an array of which each world may have its own."""
+    """Return whether a field is an array that may differ between worlds."""
     return isinstance(field.type, wp.array) and field.type.shape[0] == "*"
 
 
 def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and the bytes of all that mujoco-warp keeps once for all worlds."""
+    """Yield name and bytes of all data that mujoco-warp keeps once for all worlds."""
     for field in _fields():
         name = field.name
         if name in _UNREAD or not hasattr(model, name):
@@ -117,14 +117,14 @@ def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
             yield name, str(int(value)).encode()
         elif isinstance(field.type, wp.array):
             array: NDArray[Any] = np.asarray(value)
-            # Of the rows, only the shape is shared. A pulley's divisor is in the place of the arms.
+            # Rows only share their shape. A pulley's divisor takes the place of the arms.
             only_joints = bool(np.all(model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT))
             own = _has_rows(field) or (name == ARMS and only_joints)
             yield name, str(array.shape).encode() + (b"" if own else array.tobytes())
     for name in _SHARED_OPTIONS:
         yield f"opt.{name}", str(getattr(model.opt, name)).encode()
-    # Where arrays are zero, mujoco-warp leaves out what a zero does not need. It decides this once
-    # for all worlds, from the model that a batch is made of (`put_model`).
+    # If arrays are zero, mujoco-warp skips the related computations. It decides this once for all
+    # worlds, from the model that a batch is created from (`put_model`).
     for name in _ANY_ZERO:
         yield f"zeros of {name}", str(np.any(getattr(model, name))).encode()
     for name in _EACH_ZERO:

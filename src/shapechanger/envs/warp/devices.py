@@ -78,7 +78,7 @@ def as_warp(tensor: Tensor, dtype: Any) -> Any:
 
 @contextmanager
 def on(device: str) -> Generator[None]:
-    """Let Warp allocate and launch on a device, on a GPU in the order of torch's own work.
+    """Let Warp allocate and launch on a device; on a GPU in torch's current stream.
 
     Args:
         device: Its name.
@@ -94,7 +94,7 @@ def on(device: str) -> Generator[None]:
 
 
 class Streams:
-    """Streams of a GPU, one for each of some independent calls, which alone would not fill it.
+    """Streams of a GPU for independent calls, each of which would not occupy it alone.
 
     Args:
         count: Number of calls.

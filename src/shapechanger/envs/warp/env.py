@@ -22,7 +22,7 @@ from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
 
 _OPTIONS: Final = ("bodies", "reset_mask")
-# Steps between two looks at whether the memory for contacts and constraints was too small.
+# Steps between two checks whether the memory for contacts and constraints was too small.
 _LOOKS_EVERY: Final = 256
 
 Tensors = Tensor | tuple[Tensor, ...]
@@ -53,8 +53,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     Args:
         reader: Compiles bodies.
-        bodies: The body of each world, None for the reader's; or, with `redraws`, the pool of
-            bodies.
+        bodies: The body of each world, None for the reader's default; or, with `redraws`, the pool
+            of bodies.
         num_envs: How many worlds there are.
         device: Name of the device.
         redraws: Whether `bodies` is a pool, of which each start of an episode draws one.
@@ -142,11 +142,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         """Start an episode in each world.
 
         Args:
-            seed: A number, which is the seed of the first world, the next of the next; or one seed
-                or None per world; None goes on with the present seeds.
-            options: `reset_mask`, an array or a tensor of one boolean per world, says which worlds
-                start again. `bodies` gives new bodies to the worlds that start again, one each, in
-                their order; each must have the arrays of its world's batch.
+            seed: A number, which is the seed of the first world and counts up from there; or one
+                seed or None per world. None continues with the present seeds.
+            options: `reset_mask`, an array or a tensor of one boolean per world, selects the worlds
+                to reset. `bodies` gives new bodies to these worlds, one each, in their order; each
+                must have the arrays of its world's batch.
 
         Returns:
             The observations of all worlds, and the infos of those that started again. The
@@ -154,7 +154,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
         Raises:
             VectorEnvError: If there are not as many seeds as worlds, as many bodies as worlds that
-                start, or if a body does not fit its batch; nothing has changed then.
+                start, or if a body does not fit its batch; all worlds are unchanged then.
             UnknownName: If there is no such option.
             ResetNeeded: If the mask leaves out worlds that have never been reset.
         """
@@ -264,7 +264,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         else:
             truncated = self.episode_steps >= self.max_episode_steps
         ended = terminated | truncated
-        # Whether an episode has ended is not asked: the answer would keep a GPU waiting.
+        # Ended episodes are not checked, because reading the result would synchronise the GPU.
         starts, start_infos = self._start(ended)
         infos: dict[str, Any] = {
             **{"final_obs": self._out(observations), "_final_obs": ended},
@@ -311,7 +311,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                 for i, (part, batch) in enumerate(zip(given, self.batches, strict=True))
             ]
         bad = [~part.isfinite().all(dim=1) for part in each]
-        # The only question to the device in a step, before its physics.
+        # The only synchronisation with the device in a step, before its physics.
         found = _list(torch.stack([one.any() for one in bad]))
         for batch, part, any_bad, one in zip(self.batches, each, found, bad, strict=True):
             if any_bad:

@@ -11,11 +11,11 @@ Two private functions of mujoco-warp 4.0 differ from MuJoCo or ignore differing 
   the capsule. mujoco-warp does so only where the capsule leans by more than 30 degrees from the
   plane's normal, and along the world's axes for steeper ones, which turns the pyramid by up to 45
   degrees: an ant's step with a steep shank on the floor then differs by a third in some velocities.
-  With elliptic cones, whose friction has no direction, both agree to 1e-5, so nothing else differs.
+  With elliptic cones, whose friction has no direction, both agree to 1e-5, so only this differs.
 - **Moment arms.** mujoco-warp keeps the arms of fixed tendons, `wrap_prm`, once for all worlds.
 
-Both are replaced only in the version whose code ours was written for; a test in
-`tests/envs/warp/test_kernels.py` fails as soon as a version needs one no longer.
+Both are replaced only in the version that the replacements were written for; a test in
+`tests/envs/warp/test_kernels.py` fails as soon as a version no longer needs one.
 """
 
 # Warp reads the annotations, so they must not become strings.
@@ -90,8 +90,7 @@ def uniforms(
     Args:
         seeds: The seed of each world, shape (n,), int64.
         episodes: How many episodes each world has begun, shape (n,), int64.
-        stream: Which numbers of the episode, also one per world, shape (n,), int64; other streams
-            are independent.
+        stream: Number of an independent stream of the episode, or one per world, shape (n,), int64.
         count: How many numbers a world gets.
         normal: Whether they are normally distributed (Box and Muller) instead.
     """
@@ -172,7 +171,7 @@ def _write_tendon(
 ):
     """Write the length of a tendon in a world, the sum of arms by angles, and its derivative."""
     world, tendon = wp.tid()
-    own = world * joints.shape[0]  # Its world's arms follow the previous worlds' arms.
+    own = world * joints.shape[0]  # Offset of this world's arms.
     length = float(0.0)  # noqa: UP018  # Warp tells variables from constants by this.
     for i in range(first[tendon], first[tendon] + count[tendon]):
         length += arms[own + i] * angles[world, angle_of[joints[i]]]

@@ -1,4 +1,4 @@
-"""Compile bodies, read what a device needs to know about them, and group those that fit."""
+"""Compile bodies, read their arrays for a device, and group bodies with equal shapes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _Make = Callable[[dict[str, Any]], gym.Env[Any, Any]]
 
 
 class BodyReader:
-    """Compiles bodies of a family, and reads what a device needs to know about them.
+    """Compiles bodies of a family, and reads their arrays for a device.
 
     Args:
         task: The batched functions of the task.
@@ -46,7 +46,7 @@ class BodyReader:
         self._usual: Body = self._envs[0].body
 
     def body(self, value: Any) -> Any:
-        """Return a body as it is kept, a value that hashes; None gives the arguments' body."""
+        """Return a body as a hashable value; None gives the body in the arguments."""
         return self._usual if value is None else self._envs[0].family.body(value)
 
     def read(self, body: Any) -> tuple[DeviceBody, DeviceTask]:
@@ -121,7 +121,7 @@ def make_reader(env_id: str, make: _Make, arguments: dict[str, Any]) -> BodyRead
 def grouped(
     reader: BodyReader, bodies: Sequence[Any], num_envs: int
 ) -> list[tuple[DeviceTask, list[int], dict[Any, DeviceBody], list[Any]]]:
-    """Compile bodies, and group worlds that have them in turn by the shapes of their arrays.
+    """Compile bodies, assign them to worlds in turn, and group worlds by the shapes of arrays.
 
     Returns:
         The first arguments of each group's `Worlds`.

@@ -37,7 +37,7 @@ from shapechanger.layout import Layout
 from shapechanger.morphology.pose import StartRules
 
 _SHAPES: Final = ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
-# Where the numbers of a joint have its quaternion.
+# Slice of the quaternion in the numbers of a joint.
 _QUATERNION_AT: Final = {int(mujoco.mjtJoint.mjJNT_FREE): 3, int(mujoco.mjtJoint.mjJNT_BALL): 0}
 # Streams of random numbers.
 _POSITIONS: Final = 0
@@ -87,7 +87,7 @@ class DeviceTask(ABC):
         """Serve worlds from here on.
 
         Raises:
-            VectorEnvError: If the body starts above something else than planes, or a geom that can
+            VectorEnvError: If the body starts above a geom that is not a plane, or a geom that can
                 touch the floor has a shape without a batched clearance.
         """
         model, rules = self.model, StartRules(self.model)
@@ -113,7 +113,7 @@ class DeviceTask(ABC):
         }
 
     def start(self, worlds: Worlds, mask: Tensor, seeds: Tensor, episodes: Tensor) -> None:
-        """Put some worlds, whose state is clear, into start states.
+        """Put some worlds, whose state has been cleared, into start states.
 
         Joints are moved inside their limits, orientations normalised, and a trunk whose feet are in
         the floor is lifted.
@@ -163,7 +163,7 @@ class DeviceTask(ABC):
         worlds.simulate()
 
     def place(self, worlds: Worlds) -> Tensor:
-        """Return the state from before the physics that the reward needs (a view)."""
+        """Return the part of the state before the physics that the reward needs (a view)."""
         return worlds.qpos[:, :0]
 
     @abstractmethod
@@ -176,7 +176,7 @@ class DeviceTask(ABC):
 
         Args:
             worlds: The worlds after the physics.
-            before: What `place` returned before.
+            before: Result of `place` before the physics.
             actions: Shape (n, nu).
         """
 
@@ -209,7 +209,7 @@ def _reach(shape: str, size: Tensor, towards: Tensor) -> Tensor:
 
 
 def _place_infos(worlds: Worlds) -> dict[str, Tensor]:
-    """Return the place of a trunk in the plane of the floor, m, as the infos of a reset."""
+    """Return the position of a trunk in the plane of the floor, m, for the infos of a reset."""
     place = worlds.qpos[:, :2]
     return {
         "x_position": place[:, 0].clone(),
@@ -355,7 +355,7 @@ class DeviceRunner(DeviceTask):
         env = self._env
         velocity = (self.place(worlds) - before) / worlds.constants["dt"][:, None]
         healthy = self._healthy(worlds)
-        # What Gymnasium's formula asks its env for.
+        # Attributes of the env that Gymnasium's formula reads.
         there = SimpleNamespace(
             _forward_reward_weight=env._forward_reward_weight,
             healthy_reward=healthy * getattr(env, "_healthy_reward", 0.0),
@@ -467,7 +467,7 @@ TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     SwimmerEnv: DeviceSwimmer,
     HumanoidEnv: DeviceHumanoid,
 }
-"""Batched functions of bodies by the class of their CPU env."""
+"""Batched functions of bodies, keyed by the class of their CPU env."""
 
 
 def _base(env: Any) -> Any:

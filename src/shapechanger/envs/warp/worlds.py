@@ -33,7 +33,7 @@ _ARRAYS: Final = (
     *("history", "time", "xpos", "xipos", "cinert", "cvel", "cfrc_ext", "ten_length"),
     *("ten_velocity", "site_xpos", "geom_xpos", "geom_xmat"),
 )
-# What of the state a restart clears, besides the positions.
+# Parts of the state that a restart clears, in addition to the positions.
 _CLEARED: Final = ("act", "qacc_warmstart", "ctrl", "qvel", "cfrc_ext", "time")
 # Overflows of the memory for contacts and constraints, by which results are wrong.
 _OVERFLOWS: Final = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
@@ -53,7 +53,7 @@ _ROWS_PER_EQUALITY: Final = 6
 
 
 class DeviceOutcome(NamedTuple):
-    """What a step earns.
+    """Rewards, ends and infos of a step.
 
     Attributes:
         rewards: Shape (n,).
@@ -84,7 +84,7 @@ class Worlds:
         device: Name of the device.
         redraws: Whether each start of an episode draws one of the bodies.
         limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
-            for; as many as it can ever have where a number is missing.
+            for; the largest possible number where one is missing.
 
     Attributes:
         count: How many worlds there are.
@@ -153,7 +153,7 @@ class Worlds:
         def __getattr__(self, name: str) -> Tensor: ...
 
     def row(self, name: str) -> Tensor:
-        """Return a field of the model, such as `geom_size`, as of each world, (n or 1, ...)."""
+        """Return a field of the model for all worlds, such as `geom_size`, (n or 1, ...)."""
         return self._rows.get(name, self._by_world(name, self._array(name)))
 
     def _by_world(self, name: str, array: Any) -> Tensor:
@@ -217,7 +217,7 @@ class Worlds:
                 self.constants[name] = table.new_empty((self.count, *table.shape[1:]))
 
     def _choose(self, chosen: Tensor) -> None:
-        """Give each world one of the held bodies, without asking the device anything."""
+        """Give each world one of the stored bodies, without synchronisation with the device."""
         self.chosen = chosen
         for name, table in self._tables.items():
             self._rows[name].copy_(table[chosen])
@@ -231,7 +231,7 @@ class Worlds:
         shape = (self.count * array.size,) if name == ARMS else (self.count, *array.shape[1:])
         with on(self.device):
             wide = wp.empty(shape, dtype=array.dtype)
-        wide._is_batched = True  # As mujoco-warp marks them.
+        wide._is_batched = True  # The mark of mujoco-warp for such arrays.
         former = self._by_world(name, array)
         view = self._rows[name] = as_torch(wide).view(self.count, *former.shape[1:])
         view[:] = former
@@ -244,7 +244,7 @@ class Worlds:
         """Take one step of the task in each world.
 
         A world whose simulation has diverged is terminated with the reward 0, and put back to its
-        pose at rest at once, so that nothing but its own results is lost.
+        pose at rest at once, so that only its own results are lost.
 
         Args:
             actions: Shape (n, nu).
@@ -259,7 +259,7 @@ class Worlds:
         observations = task.observations(self)
         self._before = task.place(self).clone()
         state = torch.cat([self.qpos, self.qvel, self.qacc], dim=1)
-        # Also where a number is not one.
+        # Also true for NaN.
         bounded = (state.abs() <= mujoco.mjMAXVAL).all(dim=1)
         diverged = ~(bounded & observations.isfinite().all(dim=1))
         observations = observations.masked_fill(~observations.isfinite(), 0.0)
@@ -292,9 +292,9 @@ class Worlds:
 
     @without_gradients()
     def set_state(self, qpos: Tensor, qvel: Tensor) -> None:
-        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else.
+        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear the rest.
 
-        Fingers have more than that: start them with `start`.
+        Fingers have further state: start them with `start`.
         """
         everywhere = torch.ones(self.count, dtype=torch.bool, device=qpos.device)
         self._clear(everywhere)
@@ -329,7 +329,7 @@ class Worlds:
         self._run("kinematics", lambda: mjw.kinematics(self._model, self._data))
 
     def forward(self) -> None:
-        """Compute all that follows from the state, forces included."""
+        """Compute all quantities that depend on the state, including forces."""
         self._run("forward", lambda: mjw.forward(self._model, self._data))
 
     def _run(self, name: str, function: Callable[[], None]) -> None:

@@ -60,7 +60,7 @@ class FingerLog:
         control_dt: Control period, s.
         source: Recorded env or robot, such as an env id.
         motors: A finger with the motors, the range of tensions and the command path of the rig;
-            None if nothing is known about them. A log says little about geared motors.
+            None if they are unknown. A log hardly identifies geared motors.
 
     Raises:
         FingerError: If the arrays differ in length, hold a number that is not finite, run backwards
@@ -230,7 +230,7 @@ def record_babble(
         env: Any env with the layout of a finger, simulated or on a bench, without a time limit.
         seconds: Duration, s.
         seed: Seed of the motions and of the env.
-        actions: What an action of the env commands.
+        actions: Meaning of an action of the env.
 
     Raises:
         LayoutError: If the env has no `observation_layout`.

@@ -1,4 +1,4 @@
-"""The certificate of a shift: what differs between two embodiments, proven, or a refusal."""
+"""Certificate of a shift: the proven differences between two embodiments."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ _LARGEST: Final = float(np.finfo(np.float64).max)
 # from the original by 4e-16 kg, its observations by at most 1e-11 after 10 steps and by 0.2 after
 # 94, and no step of six of Gymnasium's robots parts by more than 230 times as much as those before
 # (15 seeds). A difference in what is sensed, done or rewarded is there at once, even if late.
-_TOLERANCE: Final = 1e-8  # Of a number up to 1; of a larger one this part.
+_TOLERANCE: Final = 1e-8  # Absolute for numbers up to 1, relative for larger ones.
 _GROWTH: Final = 1e4
 
 
@@ -166,11 +166,11 @@ def certify(
         steps: Number of commands of the rollout.
         seed: Seed of the resets and of the commands.
         labels: Labels of the two; by default the ids of the environments, or their classes.
-        allow_empty: Whether to certify a shift that changes nothing.
+        allow_empty: Whether to certify a shift without differences.
 
     Raises:
-        MorphologyError: If one of them has no model, such as that of a vehicle.
-        EmptyShift: If nothing differs and `allow_empty` is false.
+        MorphologyError: If one of them has no model, such as a vehicle's env.
+        EmptyShift: If there is no difference and `allow_empty` is false.
     """
     inner, labelled = list[Any](), list[str]()
     for env in (source, target):

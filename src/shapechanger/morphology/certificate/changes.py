@@ -194,7 +194,7 @@ def _lengths(
 def differences(one: Numbers, two: Numbers) -> tuple[Change, ...]:
     """Return the differences of the numbers of two models, element by element.
 
-    Constants that MuJoCo derives count if nothing else differs.
+    Constants that MuJoCo derives count only if all other numbers are equal.
     """
     found: list[Change] = []
     for section in one:

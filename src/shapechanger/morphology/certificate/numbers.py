@@ -5,14 +5,14 @@ are elements that do nothing: geoms that neither touch nor guide a tendon, sites
 and bodies that carry nothing but those. Joints and actuators stand in the order of the model, which
 decides what the numbers of its state and its control mean; all else is sorted by name.
 
-A geom's friction alone decides nothing: the contact takes the larger of the two geoms'
-coefficients, so a slippery foot on a rough floor is a rough foot. `contact_arrays` follows the
+The friction of one geom may have no effect: a contact uses the larger coefficient of its two geoms,
+so a slippery foot on a rough floor acts like a rough foot. `contact_arrays` follows the
 rules by which MuJoCo 4.0.0 combines the parameters (`mujoco/doc/modeling.rst`, "Contact
 parameters"). The tests compare them with the contacts of simulated scenes.
 
 Measured, and easy to get wrong:
 
-- margins add up, and so do gaps, whatever the priority;
+- margins add up, and so do gaps, for any priority;
 - adhesions add up unless one geom has the higher priority;
 - a friction coefficient is never below 1e-5;
 - a time constant below two time steps counts as two time steps, unless the model switches
@@ -172,7 +172,7 @@ def made_arrays(m: mujoco.MjModel) -> dict[str, Any]:
 
 
 def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
-    """Return the pairs that MuJoCo tests for collision and whose contacts can move something.
+    """Return the pairs that MuJoCo tests for collision and whose contacts can have an effect.
 
     Returns:
         The indices of the explicit `<pair>` elements, shape (n,); and the geoms of every other
@@ -218,11 +218,11 @@ def geoms_of_pairs(model: mujoco.MjModel) -> _Ints:
 
 
 def contact_arrays(model: mujoco.MjModel) -> dict[str, NDArray[Any]]:
-    """Return the contacts that can move something, a row each, with the parameters that act.
+    """Return the contacts that can have an effect, a row each, with their effective parameters.
 
-    Called as in `pair_*` with `contact_` in front, and `contact_geoms` (n, 2). Friction (n, 5) is
-    slide, slide, spin, roll, roll, 0 where it does not act; `contact_softens` is true where it has
-    a solref that differs.
+    Keys are the names of `pair_*` with the prefix `contact_`, and `contact_geoms` (n, 2). Friction
+    (n, 5) is slide, slide, spin, roll, roll, 0 without effect; `contact_softens` is true for a
+    friction with a different solref.
     """
     explicit, dynamic = colliding_pairs(model)
     values: dict[str, NDArray[Any]] = {
@@ -293,7 +293,7 @@ def _safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
 
 
 def moved_numbers(model: mujoco.MjModel) -> Numbers:
-    """Return the numbers that decide the motion of a compiled model."""
+    """Return the numbers of a compiled model that determine its motion."""
     reader = _Reader(model)
     found = {section: reader.section(section) for section in MOVED}
     found["options"] = {"simulation": reader.rows(MOVED["options"], 1)[0]}
@@ -319,7 +319,7 @@ def moved_numbers(model: mujoco.MjModel) -> Numbers:
 
 
 def sensed_numbers(model: mujoco.MjModel, *, drawn: bool) -> Numbers:
-    """Return what may be read of a model besides its motion; `drawn` if frames are observed."""
+    """Return the readable numbers of a model that do not affect motion; `drawn` for frames."""
     reader = _Reader(model)
     found = {section: reader.section(section) for section in (SENSED if drawn else [*SENSED][:-2])}
     if drawn:
@@ -382,7 +382,7 @@ class _Reader:
             ]
             return np.array(words, np.str_)
         if field.array.endswith("quat") and not field.array.startswith("key_"):
-            # Of the two quaternions of each rotation, the one whose first number is above 0.
+            # Use the quaternion with a positive first number, of the two for each rotation.
             leading = np.argmax(values != 0.0, axis=1)[:, None]
             return values * np.where(np.take_along_axis(values, leading, axis=1) < 0.0, -1.0, 1.0)
         if "_solref" in field.array and not field.array.startswith("opt_"):

@@ -34,7 +34,7 @@ Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 EDITS: Final[dict[str, type[Edit]]] = {}
 """The kinds of edits by their names in JSON; a subclass of `Edit` with an `apply` enters itself."""
 
-# Of modules whose kinds of edits cannot be replaced.
+# Modules with kinds of edits that cannot be replaced.
 _SHIPPED: Final = "shapechanger."
 
 
@@ -61,7 +61,7 @@ class Edit(
 
     Attributes:
         amount: Share of the change that is made, 0 (none) to 1 (all).
-        needs: Flag of the model that disables what the edit changes, and the word for it.
+        needs: Flag of the model that disables the edited property, and a label for it.
 
     Raises:
         MorphologyError: If a field has the wrong type, or a number is not finite or out of its
@@ -127,7 +127,7 @@ class Edit(
         """Refuse an edit of something that the model's options switch off.
 
         Raises:
-            MorphologyError: If the edit would change nothing.
+            MorphologyError: If the edit would have no effect.
         """
         if self.needs is not None and spec.option.disableflags & int(self.needs[0]):
             raise MorphologyError(
@@ -146,7 +146,7 @@ def part_of_the_way(old: _N, new: _N, amount: float) -> _N:
 
 
 def require_gear(gear: float | None) -> None:
-    """Refuse a gear of zero, with which a motor moves nothing."""
+    """Refuse a gear of zero, with which a motor has no effect."""
     if gear == 0.0:
         raise MorphologyError(f"A motor needs a gear that is not zero, got {gear}.")
 

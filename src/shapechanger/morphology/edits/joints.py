@@ -16,7 +16,7 @@ from shapechanger.morphology.spec import require_free_name, select
 from shapechanger.morphology.spec.geometry import displace, limits, reference_of, set_limits
 from shapechanger.morphology.spec.references import OF_JOINTS, remove_joint
 
-# MuJoCo needs a range above zero; that of a partly locked joint is at least this.
+# MuJoCo needs a range above zero: smallest range of a partly locked joint.
 _NARROWEST_RAD: Final = 1e-3
 # A motor that exists in part is never weaker than this share.
 _WEAKEST_PART: Final = 0.01
@@ -134,7 +134,7 @@ class AddMotor(Edit, frozen=True):
         if not spec.joints:
             raise MorphologyError("The model has no joints, so there is nothing to add a motor to.")
         moved = {actuator.target for actuator in spec.actuators if actuator.trntype in OF_JOINTS}
-        # Also of a model that makes two joints follow each other: one of them has a motor.
+        # This includes models that make two joints follow each other: one of them has a motor.
         couplings = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT]
         moved |= {e.name1 for e in couplings if e.name2 and e.active and e.name1 != self.joint}
         one_way = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)

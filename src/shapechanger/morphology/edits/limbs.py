@@ -84,7 +84,7 @@ _HINGE_FIELDS: Final = (
 class Cut(Edit, frozen=True):
     """Cut a limb: shorten a segment, and remove what is attached to it beyond the cut.
 
-    What lies nearer stays as it is, and the geoms that the cut crosses become shorter. Sites, pins
+    The nearer part is unchanged, and geoms that the cut crosses become shorter. Sites, pins
     of loops, cameras and lights at the far end or past it mark the end, and move to the new one.
 
     Attributes:
@@ -155,8 +155,8 @@ class Remove(Edit, frozen=True):
 class Split(Edit, frozen=True):
     """Split a segment in two, with a hinge where it was split.
 
-    The nearer part keeps the body's name and joint. What lies wholly on one side of the plane of
-    the split stays whole and goes to that part, spheres and ellipsoids by their middle; geoms that
+    The nearer part keeps the body's name and joint. Elements on one side of the plane of the
+    split are not divided and go to that part, spheres and ellipsoids by their middle; geoms that
     the plane cuts are divided. The new hinge has the armature, damping and stiffness of the body's
     own joint.
 
@@ -167,7 +167,7 @@ class Split(Edit, frozen=True):
         lower: Lower limit of the hinge, rad.
         upper: Upper limit of the hinge, rad.
         gear: Torque of a motor for a control of 1, N·m; controls are -1 to 1. None for no motor.
-        axis: Axis of the hinge in the body's frame; None for that of the body's own hinge.
+        axis: Axis of the hinge in the body's frame; None for the axis of the body's hinge.
     """
 
     body: str
@@ -210,9 +210,9 @@ class Split(Edit, frozen=True):
     def _divide(
         self, geom: mujoco.MjsGeom, copy: mujoco.MjsGeom, piece: NearPart, place: np.ndarray
     ) -> None:
-        """Divide a geom into its nearer half and, from a copy on the other body, its farther."""
+        """Divide a geom: it becomes the nearer half, a copy on the other body the farther one."""
         whole = volume(geom)
-        # About its near end, which then goes to where the geom is cut.
+        # Scaled about its near end, which is then moved to the cut.
         move_by(copy, -piece.near)
         shorten(copy, piece._replace(near=np.zeros(3)), 1.0 - piece.share)
         end = piece.near + 2.0 * (place_of(geom) - piece.near)
@@ -241,8 +241,8 @@ class AddSegment(Edit, frozen=True):
         lower: Lower limit of the hinge, rad.
         upper: Upper limit of the hinge, rad.
         gear: Torque of a motor for a control of 1, N·m; controls are -1 to 1. None for no motor.
-        axis: Axis of the hinge in the frame of `body`; None for that of the segment's own hinge.
-        radius: Radius of the capsule, m; None for that of the segment.
+        axis: Axis of the hinge in the frame of `body`; None for the axis of the segment's hinge.
+        radius: Radius of the capsule, m; None for the radius of the segment.
     """
 
     body: str
@@ -285,7 +285,7 @@ class AddLimb(Edit, frozen=True):
         suffix: Suffix of the copied names, such as `_5`.
         angle: Turn of the copy about the z axis of the body to which the limb is attached, rad;
             positive is counter-clockwise seen from above.
-        size: Size of the copy over that of the limb, 0.01 to 100.
+        size: Size of the copy relative to the limb, 0.01 to 100.
     """
 
     like: str
@@ -331,7 +331,7 @@ def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None
 def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
     """Scale a limb that exists only in part, in size and strength."""
     _resize_limb(spec, limb, max(part, _SMALLEST_PART))
-    # Of a limb that is scaled by two edits, masses can fall below what MuJoCo accepts.
+    # If a limb is scaled by two edits, masses can fall below MuJoCo's minimum.
     spec.compiler.boundmass = max(spec.compiler.boundmass, LEAST_MASS)
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, LEAST_MASS)
 

@@ -115,7 +115,7 @@ class StartHeight(Edit, frozen=True):
 
 
 class PlaceGeom(Edit, frozen=True):
-    """Change the place, length and radius of one geom alone; nothing attached to its body moves.
+    """Change the place, length and radius of one geom only; the rest of its body is unchanged.
 
     Mass and inertia of its body follow at the same density.
 

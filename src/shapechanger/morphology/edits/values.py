@@ -1,7 +1,7 @@
 """Edits of one number: mass, density, gear, damping, stiffness, friction.
 
-Each is given as a ratio to what it was (`scale`) or as a new value (`to`), never both. The field's
-words for these are the operations `scale` and `abs` of domain randomization.
+Each is given as a ratio to what it was (`scale`) or as a new value (`to`), never both. In
+domain randomization, these are the operations `scale` and `abs`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _BIAS: Final = mujoco.mjtBias
 _LINEAR: Final = (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE), (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE)
 # A larger value, in any unit here, is a typing mistake, and MuJoCo's numbers overflow.
 _LARGEST: Final = 1e6
-# Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
+# Ten times the gravity at Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
 _LARGEST_GRAVITY: Final = 250.0
 _FRICTION_PLACES: Final = {"sliding": 0, "torsional": 1, "rolling": 2}
 
@@ -67,7 +67,7 @@ class ValueEdit(Edit, frozen=True, tag=None):
 class Mass(ValueEdit, frozen=True):
     """Change the mass of bodies, kg; the inertia follows, as if the material became denser.
 
-    `to` is the mass of each body by itself, without what hangs on it.
+    `to` is the mass of each body by itself, without attached bodies.
     """
 
     to: Annotated[float, Meta(gt=0.0, le=_LARGEST)] | None = None
@@ -77,7 +77,7 @@ class Mass(ValueEdit, frozen=True):
         # Only the compiler knows the volume of every shape.
         whole = compiled(spec) if self.to is not None else None
         for body in select("body", self.element, spec.bodies[1:]):
-            # By name: an earlier edit may have changed the indices of the bodies.
+            # Keyed by name, because an earlier edit may have changed the indices of the bodies.
             old = 1.0 if whole is None else float(whole.body(body.name).mass[0])
             if old <= 0.0:
                 raise MorphologyError(f"{body.name!r} has no mass, so none can be set.")
@@ -150,15 +150,15 @@ def _is_motor(actuator: mujoco.MjsActuator) -> bool:
 def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
     """Scale the force of an actuator; a servo keeps its targets, and a muscle its lengths.
 
-    The gear of a motor scales. The gear of any other actuator also scales what it measures, so of a
-    servo the gains, the bias and the force range scale instead.
+    For a motor, the gear is scaled. The gear of other actuators also scales their measurements, so
+    for a servo the gains, the bias and the force range are scaled instead.
     """
     if _is_motor(actuator):
         actuator.gear = actuator.gear * factor
         return
     gain, bias = np.array(actuator.gainprm), np.array(actuator.biasprm)
     if actuator.gaintype == _GAIN.mjGAIN_MUSCLE and actuator.biastype == _BIAS.mjBIAS_MUSCLE:
-        # The peak force, and what it is derived from where it is negative.
+        # The peak force, or the values that it is derived from if it is negative.
         for force in (gain[2:4], bias[2:4]):
             force[force > 0.0] *= factor
     elif actuator.gaintype in _LINEAR[0] and actuator.biastype in _LINEAR[1]:
@@ -177,7 +177,7 @@ def scale_strength(actuator: mujoco.MjsActuator, factor: float) -> None:
 def _scale_clamps(spec: mujoco.MjSpec, factors: Mapping[str, float]) -> None:
     """Scale the largest force of the joints and tendons whose actuators have all become as strong.
 
-    Without it, a stronger motor of a joint with `actuatorfrcrange` would change nothing. The
+    Without it, a stronger motor of a joint with `actuatorfrcrange` would have no effect. The
     factors are new forces over old ones, by the names of actuators.
     """
     driven = [(each.element, each.holder.name) for each in references(spec, "actuator")]
@@ -256,7 +256,7 @@ class Friction(ValueEdit, frozen=True):
 class Stretch(Edit, frozen=True):
     """Make segments longer or shorter at the same thickness, held at their joints.
 
-    What is attached to a segment moves outwards with it. Mass and inertia follow from the new
+    Elements attached to a segment move outwards with it. Mass and inertia follow from the new
     geometry at the same density. The length of a box or ellipsoid is its longest half-size, or the
     one along the given axis.
 

@@ -1,4 +1,4 @@
-"""Find elements of a model, name them, and make explicit what the compiler would derive.
+"""Find elements of a model, name them, and make explicit the values that the compiler derives.
 
 Edits change numbers in place. An element without a name cannot be selected, a pose relative to a
 frame has other axes than its body, and a size, mass or inertia that the compiler sets undoes any
@@ -124,11 +124,11 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return copy.compile()
 
 
-# --- What the compiler would derive again ------------------------------------------------------
+# --- Values that the compiler would derive again -----------------------------------------------
 
 
 def make_explicit(spec: mujoco.MjSpec) -> None:
-    """Name every element, and write out whatever the compiler would derive again, in place.
+    """Name every element, and write out all values that the compiler would derive, in place.
 
     These are frames, a total mass, least masses and inertias, and primitives that are fitted to
     meshes. The physics does not change.

@@ -1,4 +1,4 @@
-"""What a specification states by place or by order: keyframes, pins of loops, paths of tendons.
+"""Data that refer to positions or order: keyframes, pins of loops, paths of tendons.
 
 Edits see none of the keyframes, and pins as sites. MuJoCo states the pin of a loop in the frame of
 its first body, and takes its place on the second from the model's own pose. So each pin is two
@@ -50,7 +50,7 @@ _STILL: Final = 1e-12
 # A longer step, rad or m, can jump to another way to assemble the loop.
 _LONGEST_STEP: Final = 0.2
 _MOST_STEPS: Final = 200
-# Singular values below this share of the largest belong to motions that close nothing.
+# Singular values below this share of the largest belong to motions that do not close a loop.
 _SINGULAR: Final = 1e-6
 
 
@@ -103,7 +103,7 @@ class Keyframes:
             spec.delete(key)
 
     def copy(self, originals: Mapping[str, str]) -> None:
-        """Give copied joints, actuators and bodies the values of their originals, by name."""
+        """Give copied joints, actuators and bodies the values of their originals."""
         for known in (known for _, values in self._values for known in values.values()):
             known |= {new: known[old] for new, old in originals.items() if old in known}
 
@@ -134,7 +134,7 @@ class Keyframes:
 
 
 def _numbers(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, dict[str, Array]]:
-    """Return each element's numbers in `data`, by field of a keyframe and by name."""
+    """Return each element's numbers in `data`, keyed by field of a keyframe and by name."""
     joints = [data.joint(i) for i in range(model.njnt)]
     acts = zip(model.actuator_actadr, model.actuator_actnum, strict=True)
     mocap = [(model.body(b).name, model.body_mocapid[b]) for b in range(model.nbody)]
@@ -160,7 +160,7 @@ class _Tendon(NamedTuple):
 
 
 def _tendons(model: mujoco.MjModel) -> dict[str, _Tendon]:
-    """Return the tendons of a model in its own pose, by name."""
+    """Return the tendons of a model in its own pose, keyed by name."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     found: dict[str, _Tendon] = {}
@@ -205,7 +205,7 @@ def _follow_tendons(spec: mujoco.MjSpec, tendons: dict[str, _Tendon]) -> None:
         tendon = actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON
         muscle = actuator.gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
         if tendon and muscle and old and np.any(actuator.lengthrange):
-            # As in musculoskeletal models that are fitted to a person: S. Delp and others,
+            # The method of musculoskeletal models that are fitted to a person: S. Delp and others,
             # OpenSim, IEEE Transactions on Biomedical Engineering 54(11), 2007.
             longer = new[actuator.target].length / old.length
             actuator.lengthrange = actuator.lengthrange * longer
@@ -338,7 +338,7 @@ def _residuals(spec: mujoco.MjSpec, data: mujoco.MjData) -> dict[Element, float]
 def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     """Move the joints to the nearest pose in which the equalities hold; return whether there is."""
     kinds = model.jnt_type
-    # Whatever measures the turn of a ball would measure it from the new pose.
+    # The turn of a ball would be measured from the new pose.
     driven = model.actuator_trnid[np.isin(model.actuator_trntype, [int(t) for t in OF_JOINTS]), 0]
     measured = (model.jnt_limited != 0) | (model.jnt_stiffness != 0.0)
     measured |= np.isin(np.arange(model.njnt), driven)

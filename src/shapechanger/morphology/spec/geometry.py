@@ -24,7 +24,7 @@ _J: Final = mujoco.mjtJoint
 LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 UPRIGHT: Final = np.array([1.0, 0.0, 0.0, 0.0])
 _QUAT: Final = mujoco.mjtOrientation.mjORIENTATION_QUAT
-# Its method needs a specification, and none of what that holds.
+# The method needs any specification, even an empty one.
 _RESOLVER: Final = mujoco.MjSpec()
 _AXES: Final = {"x": 0, "y": 1, "z": 2}
 # A joint without limits turns all the way round; a slide without limits has no such number.
@@ -62,7 +62,7 @@ def inverse(quaternion: Array) -> Array:
 
 
 def orientation(element: Any, quat: str = "quat", alt: str = "alt") -> Array:
-    """Return the unit quaternion of an element, however its orientation is written.
+    """Return the unit quaternion of an element, for any notation of its orientation.
 
     That of a body's inertia is in the fields `iquat` and `ialt`.
     """
@@ -144,7 +144,7 @@ def volume(geom: mujoco.MjsGeom) -> float:
 
 @contextmanager
 def same_density(geom: mujoco.MjsGeom) -> Generator[None]:
-    """Scale a mass that is written out with the volume of a geom whose shape is changed."""
+    """Scale an explicit mass of a geom with its volume when its shape is changed."""
     before = volume(geom)
     yield
     if not math.isnan(geom.mass) and before > 0.0:
@@ -158,7 +158,7 @@ def scale_geom_mass(geom: mujoco.MjsGeom, factor: float) -> None:
 
 
 def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
-    """Scale a body's mass and inertia, however they are given."""
+    """Scale a body's mass and inertia, in any notation."""
     if body.explicitinertial:
         body.mass *= factor
         body.inertia = body.inertia * factor
@@ -198,13 +198,13 @@ def far_end(body: mujoco.MjsBody) -> Array:
 
 
 def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
-    """Return whether a body states its own mass and inertia instead of using those of its geoms."""
+    """Return whether a body states mass and inertia instead of deriving them from its geoms."""
     from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     return bool(body.explicitinertial) and not from_geoms
 
 
 def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
-    """Refuse a body whose mass and inertia would not follow a new shape of its geoms."""
+    """Refuse a body with mass and inertia that do not depend on the shapes of its geoms."""
     if inertia_is_written_out(spec, body):
         raise MorphologyError(
             f"{body.name!r} has its inertia written out, so it would not follow a new shape: "
@@ -281,7 +281,7 @@ def _lengthen(geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
 def carry_outwards(
     body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
 ) -> None:
-    """Move what is attached to a stretched segment: joints, sites, cameras, lights and bodies."""
+    """Move the elements on a stretched segment: joints, sites, cameras, lights and bodies."""
     modes = mujoco.mjtCamLight
     following = (modes.mjCAMLIGHT_TRACK, modes.mjCAMLIGHT_TRACKCOM)
     # Cameras and lights that follow a body do so at a distance.
@@ -348,7 +348,7 @@ def _as_written(joint: mujoco.MjsJoint, position: float) -> float:
 def displace(joint: mujoco.MjsJoint, by: float | Array) -> None:
     """Change the pose of a joint's body as if the joint had moved by an angle, rad, or a distance.
 
-    Of a ball it is the turn as a quaternion (w, x, y, z).
+    For a ball joint it is the turn as a quaternion (w, x, y, z).
     """
     body, quaternion = joint.parent, UPRIGHT.copy()
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
@@ -374,7 +374,7 @@ class NearPart(NamedTuple):
     """The part of a geom that lies on the near side of a plane."""
 
     near: Array  # End of its axis on that side, in the body's frame, m.
-    share: float  # Of its length: 1 for all of the geom, 0 for nothing of it.
+    share: float  # Share of its length: 1 for the whole geom, 0 for none of it.
     axis: int  # Index of the half-size that is its length.
 
 

@@ -1,4 +1,4 @@
-"""Copy and move limbs, geoms and sites within a model, and copy what names them."""
+"""Copy and move limbs, geoms and sites within a model, with the elements that refer to them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from shapechanger.morphology.spec.references import (
 
 _O: Final = mujoco.mjtObj
 _W: Final = mujoco.mjtWrap
-# In a name while another element still has it; no name of a model has it.
+# Part of temporary names, used while another element still has the name; models do not use it.
 _OLD: Final = "~old"
 # Set apart: names are unique, and orientations are written in units that belong to each element.
 _APART: Final = frozenset(
@@ -58,7 +58,7 @@ def copy_element(spec: mujoco.MjSpec, element: Any, place: Any, name: str) -> An
         copy.quat = orientation(element)
     if isinstance(element, mujoco.MjsBody):
         copy.iquat = orientation(element, "iquat", "ialt")
-    # Limits of attached models can have other units than those of elements that are added.
+    # Limits of attached models can have other units than the limits of added elements.
     turns = isinstance(element, mujoco.MjsJoint) and element.type != mujoco.mjtJoint.mjJNT_SLIDE
     if turns and element.compiler.degree != copy.compiler.degree:
         convert = np.rad2deg if copy.compiler.degree else np.deg2rad
@@ -92,7 +92,7 @@ def move(spec: mujoco.MjSpec, element: Any, parent: mujoco.MjsBody) -> Any:
 
     The new element is returned; the old handle is invalid.
     """
-    # References are by name: under another name the old elements go without them.
+    # References are by name, so renamed old elements lose them.
     if isinstance(element, mujoco.MjsBody):
         for body in subtree(element):
             for each in (body, *elements_on(body)):
@@ -131,7 +131,7 @@ def copy_limb(
     """
     turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
     inside, parent = elements_of(limb), limb.parent
-    # Before there is a copy, whose cameras name elements too.
+    # Done before the copy exists, because its cameras name elements too.
     mentions = references(spec)
     turned: set[tuple[mujoco.mjtObj, str]] = set()
     release_drawings(spec, inside, skins=False)
@@ -163,7 +163,7 @@ def copy_limb(
     holders = (*spec.tendons, *spec.equalities, *spec.excludes, *spec.pairs)
     for holder in (*holders, *spec.actuators, *spec.sensors):
         own = [mention for mention in mentions if mention.holder == holder]
-        # An actuator whose other end alone is on the limb moves another limb.
+        # An actuator with only its other end on the limb moves another limb.
         moves = [m for m in own if kind_of(holder) != "actuator" or m.field != "refsite"]
         if not any(mention.element in inside for mention in moves):
             continue

@@ -69,8 +69,8 @@ class Mention(NamedTuple):
     """One element of a model, the holder, that names another."""
 
     holder: Any
-    kind: str  # Of the holder, for messages.
-    field: str  # Of the holder, which has the name; `path` of a tendon.
+    kind: str  # Kind of the holder, for messages.
+    field: str  # Field of the holder that has the name; `path` of a tendon.
     element: Element  # The named one.
 
     def __str__(self) -> str:
@@ -175,7 +175,7 @@ def path_elements(tendon: mujoco.MjsTendon) -> list[Element]:
 
 
 def moves_only(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon, elements: set[Element]) -> bool:
-    """Return whether a tendon moves nothing but the limb with these elements."""
+    """Return whether a tendon moves only the limb with these elements."""
     staying = {*path_elements(tendon)} - elements
     if any(kind == _O.mjOBJ_JOINT for kind, _ in staying):
         return False
@@ -222,7 +222,7 @@ def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str
     """
     for mention in references(spec, *kinds):
         if mention.element == element:
-            # The place of a pin has no name of its own.
+            # The place of a pin has no name.
             name = "A pin" if element[1].startswith(MARK) else repr(element[1])
             raise MorphologyError(
                 f"{name} {why}, but {mention} names it: change or remove it first."
@@ -230,7 +230,7 @@ def require_unnamed(spec: mujoco.MjSpec, element: Element, why: str, *kinds: str
 
 
 def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[str]) -> None:
-    """Refuse to divide what names a whole segment, or one of its geoms that would be `cut`."""
+    """Refuse to split a segment if elements refer to it, or to a geom that would be `cut`."""
     for name in cut:
         require_unnamed(spec, (_O.mjOBJ_GEOM, name), "would be cut in two", "tendon", "sensor")
     for mention in references(spec, "actuator", "sensor"):
@@ -242,7 +242,7 @@ def require_divisible(spec: mujoco.MjSpec, body: mujoco.MjsBody, cut: Iterable[s
 
 
 def require_removable(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
-    """Refuse to remove a limb without which an element elsewhere would lose what moves it."""
+    """Refuse to remove a limb with the actuators or tendons of an element elsewhere."""
     gone = elements_of(limb)
     for tendon in spec.tendons:
         if gone.isdisjoint(path_elements(tendon)):
@@ -292,7 +292,7 @@ def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
 def remove_joint(
     spec: mujoco.MjSpec, joint: mujoco.MjsJoint, displacements: Mapping[str, float]
 ) -> None:
-    """Remove a locked joint; what is coupled to it is held where the coupling puts it.
+    """Remove a locked joint; elements coupled to it are held where the coupling puts them.
 
     Its motor and its sensors go with it, and so does a tendon whose joints are all locked, at these
     displacements from their references, rad or m.
@@ -326,10 +326,10 @@ def remove_joint(
 
 
 def _hold(spec: mujoco.MjSpec, kind: mujoco.mjtEq, name: str, locked: float) -> None:
-    """Hold what is coupled to a joint or tendon that is `locked`, rad or m, from its reference."""
+    """Hold the elements coupled to a joint or tendon that is `locked`, rad or m, from reference."""
     for equality in [e for e in spec.equalities if e.type == kind and name in (e.name1, e.name2)]:
         leader, polynomial = equality.name2, np.array(equality.data[:5])
-        # Of an equality of one element, the constant alone counts.
+        # For an equality of one element, only the constant counts.
         slope = polynomial[1] if leader else 0.0
         if leader == name:
             held, by = equality.name1, np.polynomial.polynomial.polyval(locked, polynomial)

@@ -39,7 +39,7 @@ class _PathKeys(Keys, frozen=True, kw_only=True):
     """A folder of JPEG files, or a stream of them.
 
     Attributes:
-        path: The folder, or the pipe, the file or "| program arguments" that streams.
+        path: The folder; or the source of the stream: a pipe, a file or "| program arguments".
     """
 
     path: FilePath
@@ -49,7 +49,7 @@ class CameraKind(NamedTuple):
     """A kind of camera.
 
     Attributes:
-        keys: Its keys in a profile, besides those of every camera.
+        keys: Its keys in a profile, in addition to the keys that all cameras have.
         opens: MODULE:NAME of its driver, which is called with the plan.
     """
 
@@ -64,7 +64,7 @@ CAMERAS: Final = {
     "pipe": CameraKind(_PathKeys, "shapechanger.robot.cameras.sources:Pipe"),
     "pattern": CameraKind(Keys, "shapechanger.robot.cameras.sources:Pattern"),
 }
-"""Kinds of cameras by driver."""
+"""Kinds of cameras, keyed by driver."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Frame:
         captured_ns: Time of capture on the robot's monotonic clock, ns.
         encoded_here: Whether this process encoded the JPEG from an image of the right size. Such a
             frame decodes, so it needs no further check.
-        skipped: Number of bytes between this frame and the one before that are part of no frame.
+        skipped: Number of bytes between the previous frame and this one that belong to no frame.
     """
 
     jpeg: bytes
@@ -118,7 +118,7 @@ class CameraPlan:
 
 
 class Camera:
-    """Source of frames, read by one thread, whose waits end with `close`, from any thread.
+    """Source of frames, read by one thread; `close` may be called from any thread and ends waits.
 
     Args:
         plan: The camera.

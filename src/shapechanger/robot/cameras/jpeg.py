@@ -16,13 +16,13 @@ _MAX_JPEG: Final = 4 * 1024 * 1024
 """Size of the largest frame, bytes."""
 
 _MAX_SKIPPED: Final = 1 << 20
-"""Bytes without a frame after which a stream is taken to have none; several lost frames fit."""
+"""Bytes without a frame after which a stream is invalid; enough for several lost frames."""
 
 
 def checked_frame(jpeg: bytes, captured_ns: int, plan: CameraPlan) -> Frame:
     """Return a frame of the camera's size, rotated by 180 degrees if the camera is upside down.
 
-    Header and end of the data are checked; it is decoded only in order to rotate it.
+    The header and the end of the data are checked; the frame is decoded only to rotate it.
     """
     if not simplejpeg.is_jpeg(jpeg) and len(jpeg) <= _MAX_JPEG:  # Some cameras pad their frames.
         splitter = JpegSplitter()
@@ -83,9 +83,9 @@ _LONGEST_TABLE: Final = 2 + 8 * (17 + 256)
 class JpegSplitter:
     """Split a byte stream into JPEG frames.
 
-    A frame is followed from marker to marker, so that a thumbnail in it, or a marker in a comment,
-    does not end it. Bytes that are part of no frame are skipped: the headers between the parts of
-    an HTTP stream, padding, a frame that was cut off.
+    A frame is parsed from marker to marker, so that a thumbnail in it, or a marker in a comment,
+    does not end it. Bytes outside frames are skipped: the headers between the parts of an HTTP
+    stream, padding, a frame that was cut off.
 
     Attributes:
         skipped: Number of bytes skipped so far.
@@ -126,9 +126,9 @@ class JpegSplitter:
         return None
 
     def _length_of_first(self) -> int | None:
-        """Skip what is before the first frame; see `_length` for the result."""
+        """Skip the bytes before the first frame; see `_length` for the result."""
         start = self._data.find(_START)
-        # Without a start, its first byte may be the last one here.
+        # Without a start marker, the last byte may be the first byte of one.
         self._skip(start if start >= 0 else len(self._data) - self._data.endswith(b"\xff"))
         return _length(self._data)
 
@@ -141,7 +141,7 @@ class JpegSplitter:
 def _length(data: bytes | bytearray) -> int | None:
     """Return the length of the frame at the start of the data; None while bytes are missing.
 
-    A negative result is the number of bytes that are part of no frame.
+    A negative result is the number of bytes to skip, because they belong to no frame.
     """
     at, has_scan = len(_START), False
     while at + 2 <= len(data):
@@ -164,15 +164,15 @@ def _length(data: bytes | bytearray) -> int | None:
                 break
             at, has_scan = found.start(), True
             if data[at + 1] == _START[1]:
-                return -at  # A frame that is cut off, and the next one.
+                return -at  # The frame is cut off; the next one begins here.
     return None
 
 
 def _start_of_another(jpeg: bytes) -> int:
-    """Return where a whole frame begins that ends with these bytes; 0 if they are one frame.
+    """Return where the complete frame begins that ends with these bytes; 0 for their start.
 
-    A segment of a frame that is cut off claims bytes of the next frame, and may end at a marker of
-    it. A thumbnail ends before its frame.
+    The length of a segment that is cut off may extend into the next frame, up to a marker there. A
+    thumbnail ends before its frame.
     """
     starts = (found.start() for found in _ANOTHER.finditer(jpeg, len(_START)))
     return next((at for at in starts if _length(jpeg[at:]) == len(jpeg) - at), 0)

@@ -54,7 +54,7 @@ class PiCamera(Camera):
                     self._camera.create_video_configuration(
                         main={"size": plan.size, "format": _FORMAT},
                         transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
-                        # Never a frame from before the call (picamera2#787).
+                        # Flush: a frame from before the call would be old (picamera2#787).
                         queue=False,
                         controls={"FrameDurationLimits": (period_us, period_us)},
                     )
@@ -81,7 +81,7 @@ class PiCamera(Camera):
         return encoded_frame(image, captured_ns, self.plan)
 
     def close(self) -> None:
-        """Stop the camera after a `read` in progress."""
+        """Stop the camera once a `read` in progress has ended."""
         with self._lock:
             if not self._closed:
                 super().close()

@@ -36,9 +36,9 @@ class Pipe(Camera):
     """JPEG stream from a named pipe, a file or a program such as rpicam-vid; see `Camera`.
 
     A frame may carry its time of capture in a comment segment (`captured_ns=`, monotonic).
-    Otherwise it gets the time of its last byte, which hides the delay of the source; so that frames
-    that waited in the pipe do not look new, the pipe is drained first, and of several frames the
-    newest is returned, except from a file.
+    Otherwise it gets the arrival time of its last byte, which hides the delay of the source. Frames
+    that waited in the pipe would look new, so the pipe is drained first, and the newest of several
+    frames is returned, except from a file.
 
     Its setting is `path`: a pipe, a file, or a program with arguments after `|`.
     """
@@ -102,7 +102,7 @@ class Pipe(Camera):
             self._program = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stdout=output)
 
     def _waiting(self) -> bytes | None:
-        """Return data that waits in the stream, b"" at its end; None without data."""
+        """Return the available data of the stream, b"" at its end; None if there is no data yet."""
         with suppress(BlockingIOError):
             return os.read(self._fd, _CHUNK)
         return None
@@ -113,7 +113,7 @@ class Pipe(Camera):
         self.wait(self._fd)
         data = self._waiting()
         if data is None:
-            return  # Another reader took it; a named pipe may have several.
+            return  # Another reader of the pipe took the data.
         if not data:
             # The next read reopens the pipe and waits for its next writer.
             self._splitter = JpegSplitter()
@@ -151,7 +151,7 @@ class Folder(Camera):
 
 
 _BARCODE_BYTES: Final = 6
-"""Bytes of the number. In nanoseconds they count 78 hours, and then start again."""
+"""Bytes of the number. In nanoseconds, it overflows after 78 hours."""
 
 _COLUMNS: Final = 32
 _ROWS: Final = 2

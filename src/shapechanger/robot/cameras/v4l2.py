@@ -109,7 +109,7 @@ class V4l2(Camera):
         return RobotError(f"The camera {self._device} does not answer: {error}.")
 
     def __del__(self) -> None:
-        # Not in `close`: a `read` in another thread may still use a buffer.
+        # Not done in `close`: a `read` in another thread may still use a buffer.
         super().__del__()
         for buffer in self._buffers:
             buffer.close()

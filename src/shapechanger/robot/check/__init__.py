@@ -1,1 +1,1 @@
-"""Checks of a robot: of its computer and settings, its wires, and LEDs instead of its motors."""
+"""Checks of a robot: computer and settings, wiring, and a test with LEDs instead of motors."""

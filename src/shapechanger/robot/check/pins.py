@@ -1,4 +1,4 @@
-"""Pins of a robot: their uses, their levels, two joined by a wire, and LEDs instead of motors."""
+"""Checks of a robot's pins: uses, levels, a loopback wire, and LEDs instead of motors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def require_pins(plan: GuardPlan) -> None:
     """Refuse a machine without GPIO pins."""
     if needs_pins(plan) and not any(Path("/dev").glob("gpiochip*")):
         raise RobotError(
-            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
+            f"{plan.name} uses GPIO pins, and this machine has none (no /dev/gpiochip0): "
             "`shapechanger robot serve --twin` runs it on simulated ones."
         )
 
@@ -73,7 +73,7 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
 
 
 def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:
-    """Toggle a pin and check the one that is wired to it, and return a sentence about the result.
+    """Toggle a pin, check that the pin that is wired to it follows, and describe the result.
 
     Args:
         output: BCM pin to drive, unused by the robot.
@@ -102,7 +102,7 @@ def check_jumper(output: int, sensed: int, plan: GuardPlan) -> str:
 
 
 def outside_level(pin: int, hardware: Hardware) -> int | None:
-    """Return the level that resistors outside give a pin; None if its own resistor decides."""
+    """Return the level of a pin with external resistors; None if the Pi's own one determines it."""
     up, down = (pin_level(pin, hardware, pull_up=pull_up) for pull_up in (True, False))
     return up if up == down else None
 
@@ -119,10 +119,10 @@ def pin_level(pin: int, hardware: Hardware, *, pull_up: bool) -> int:
 
 
 SHOWN_S: Final = 0.5
-"""Time for which an LED is lit when nobody is asked, s."""
+"""Time for which an LED is lit if no person is asked, s."""
 
 Ask = Callable[[str], bool | None]
-"""Asks a person a question; None if nobody answers."""
+"""Function that asks a person a question; it returns None without an answer."""
 
 
 class BenchLamp(NamedTuple):
@@ -153,8 +153,8 @@ def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
             found.append(BenchLamp(f"{name}, dimly", place, output, 1.0, None))
         elif not lights:
             raise RobotError(
-                f"Output {name} is a servo on a bus ({output.driver}), and an LED cannot stand for "
-                "it: take a robot whose outputs are on pins, such as `init car`."
+                f"Output {name} is a servo on a bus ({output.driver}), which LEDs cannot "
+                "replace: take a robot whose outputs are on pins, such as `init car`."
             )
         else:
             pins = [(settings[key], name + end, value) for key, end, value in lights]
@@ -175,10 +175,10 @@ def check_lamps(
 
     Args:
         plan: The robot.
-        connect_pins: Opens its pins and buses, which nothing else uses meanwhile.
+        connect_pins: Opens its pins and buses; no other program may use them meanwhile.
         ask: Asks the person.
         sees: Measures whether an LED is lit; None if it cannot.
-        shown_s: Time for which an LED is lit when nobody answers, s.
+        shown_s: Time for which an LED is lit if no person answers, s.
     """
     for lamp in lamps_of(plan):
         check = f"LED {lamp.place}"
@@ -202,7 +202,7 @@ def check_lamps(
 
 @contextmanager
 def _lit(lamp: BenchLamp, plan: GuardPlan, hardware: Hardware) -> Generator[None]:
-    """Light one LED, through the driver of its output, which puts it out when it is closed."""
+    """Light one LED through the driver of its output, which turns it off when it is closed."""
     if lamp.output is None:
         with closing(Switches(plan, hardware)) as switches:
             switches.toggle()  # From low to high.

@@ -29,10 +29,10 @@ Result = tuple[Level, str]
 """A level and a sentence."""
 
 Results = Iterable[Result]
-"""A check: its results, which are found when they are asked for."""
+"""A check: an iterator that performs it step by step and yields its results."""
 
 Checks = Iterable[tuple[str, Results]]
-"""Checks with their names; each begins when the one before has ended."""
+"""Checks with their names; each begins when the previous one has ended."""
 
 MARKS: Final[dict[Level, str]] = {"good": "good", "bad": "BAD", "unknown": "?"}
 """Words for the levels in reports."""
@@ -56,8 +56,8 @@ def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding
 
     Args:
         checks: The checks.
-        limit_s: Time for each, s, after which the next begins, as after an error of any kind; None
-            for checks that depend on those before.
+        limit_s: Time limit for each check, s, after which the next one begins; None for checks that
+            depend on the previous ones. The next one also begins after an error of any kind.
     """
     for name, results in checks:
         if limit_s is not None:
@@ -70,8 +70,8 @@ def run_checks(checks: Checks, limit_s: float | None = None) -> Iterator[Finding
 def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
     """Yield the results of a check until it ends, fails, or has taken `limit_s` seconds.
 
-    The check runs in a separate thread, which is left behind if its driver hangs; `late` is the
-    sentence about that.
+    The check runs in a separate thread, which is abandoned if its driver hangs; `late` is the
+    sentence to report then.
     """
     found: SimpleQueue[Result | None] = SimpleQueue()
 
@@ -133,8 +133,8 @@ def write_report(
     Args:
         parts: Name and findings of each part.
         say: Shows a person a line.
-        path: File for the lines, without names of the computer and its user; an existing one stays,
-            and a number is added. None for no file.
+        path: File for the lines, without the names of the computer and its user. If it exists, a
+            number is added to the name. None for no file.
         head: First lines of the file.
 
     Returns:
@@ -164,7 +164,7 @@ def write_report(
                 tell(f"{MARKS[level]:4}  {check}: {sentence}")
                 counts[level] += 1
     except BaseException as error:
-        # Also after Ctrl-C, a report is worth sending.
+        # Even after Ctrl-C, a report is worth sending.
         why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
         with suppress(OutputError):
             write(anonymous(f"\nIt ended early: {why or type(error).__name__}"))

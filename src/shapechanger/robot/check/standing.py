@@ -1,7 +1,7 @@
-"""Checks of a robot that move nothing: its settings, its computer and its wiring.
+"""Checks of a robot without any motion: its settings, its computer and its wiring.
 
-A check is a generator of results. They need the pins and buses for themselves, so they leave those
-of a served robot alone.
+A check is a generator of results. Checks of pins and buses need exclusive access, so they are
+skipped while the robot is served.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class StandingRobot:
         root: Root of the file system.
         hardware: Opens its pins and buses.
         motors_off: Whether the motors have no supply, so that their resistors can be tested.
-        installed: Whether it is installed on its computer, and not on a bench with LEDs.
-        on_twin: Whether it is a twin, whose computer has all pins and buses and no settings.
+        installed: Whether it is installed on its computer; False for a bench with LEDs.
+        on_twin: Whether it is a twin, whose computer has all pins and buses but no settings.
         credentials: Folder of its key and certificate; None for the folder of `init`.
     """
 
@@ -101,7 +101,7 @@ class StandingRobot:
 
 
 def examine(robot: StandingRobot) -> Iterator[Finding]:
-    """Check everything that a robot's safety and function depend on, without moving it.
+    """Check all requirements of a robot's safety and function, without moving it.
 
     A check that fails or hangs is a finding, and the others go on.
     """
@@ -227,7 +227,7 @@ def _enable_line(guard: GuardPlan) -> Result:
 
 
 def _latency_timers(robot: StandingRobot) -> Results:
-    """Check that the adapters pass on the servos' answers at once."""
+    """Check that the USB adapters forward the servos' answers without delay."""
     for device in servo_devices(robot.profile):
         path = robot.root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
         if not path.exists():
@@ -302,7 +302,7 @@ def _close(robot: StandingRobot) -> Results:
         robot.pins.close()
 
 
-_MODE1: Final = 0x00  # First register of a PCA9685; reading it changes nothing.
+_MODE1: Final = 0x00  # First register of a PCA9685; reading it has no side effect.
 _NO_BATTERY_V: Final = 1.0
 _DISTANCE_READS: Final = 6
 _PING_NS: Final = 70_000_000  # Longer than the 60 ms from ping to ping of an HC-SR04.
@@ -320,9 +320,9 @@ def _servo_enables(guard: GuardPlan) -> list[int]:
 def _resistors(robot: StandingRobot) -> Results:
     """Check the resistors that keep outputs off while no program holds their pins.
 
-    Each pin becomes an input with the Pi's own resistor of about 50 kOhm, first up and then down,
-    which 10 kOhm outside overrule. A motor could start where they are missing, so its supply must
-    be off.
+    Each pin becomes an input with the Pi's own resistor of about 50 kOhm, first up and then down;
+    an external resistor of 10 kOhm overrules it. A motor could start if one is missing, so the
+    supply of the motors must be off.
     """
     if not (robot.has_pins and robot.motors_off):
         lacks = "take the motors' supply off, and add --motors-off"
@@ -379,7 +379,7 @@ def _sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
 
 
 def _servo_board(robot: StandingRobot, bus: int, address: int) -> Results:
-    """Check that a PCA9685 answers; its pulses stay as they are."""
+    """Check that a PCA9685 answers, without changing its pulses."""
     name = f"The PCA9685 at {address:#04x} on I2C bus {bus}"
     wires = f"Look at SDA, SCL, 3.3 V and ground, and at `i2cdetect -y {bus}`."
     with (
@@ -395,7 +395,7 @@ def _servo_bus(robot: StandingRobot) -> Results:
     """Check that every servo of the bus answers and is the right one, without torque."""
     servos = tuple(output for output in robot.profile.outputs if output.driver == DRIVER)
     if not all(map(stops_itself, servos)):
-        yield "unknown", "Not asked: these servos have power only while the enable line has it."
+        yield "unknown", "Not tested: these servos have power only while the enable line is on."
         return
     with ExitStack() as opened:
         bank = OutputBank(replace(robot.profile, outputs=servos), robot.pins)

@@ -1,1 +1,1 @@
-"""Client of a robot on the network: its connection, its env, its recordings, and the keys."""
+"""Client of a robot on the network: connection, env, recordings, and keyboard control."""

@@ -32,7 +32,7 @@ from shapechanger.robot.link.messages import ClientMessage, Hello, RobotMessage,
 
 _Answer = TypeVar("_Answer", bound=RobotMessage)
 
-_MARGIN_S: Final = 2.0  # Of a call beyond the link's own time limit, s.
+_MARGIN_S: Final = 2.0  # Time of a call in addition to the link's time limit, s.
 # Shares of the silence timeout: when to send a ping, and how often to check.
 _PING_AFTER: Final = 0.4
 _CHECK_EVERY: Final = 0.1
@@ -48,7 +48,7 @@ def _own_name() -> str:
 
 
 class RobotClient(Inbox):
-    """Connection to a robot, made by `connect` and kept by its own thread.
+    """Connection to a robot, made by `connect` and maintained by a background thread.
 
     All methods may be called from any thread. They raise `RobotRefused` if the robot refuses, and
     `LinkError` if the link is lost or no answer arrives in time.
@@ -105,8 +105,8 @@ class RobotClient(Inbox):
 
         Raises:
             RobotRefused: If the robot's certificate differs, or it refuses the client.
-            LinkError: If no robot answers, or one with another version of the link. Without a
-                fingerprint the message shows the robot's.
+            LinkError: If no robot answers, or its version of the link differs. Without a
+                fingerprint, the message shows the robot's fingerprint.
         """
         if not timeout_s > 0.0:
             raise LinkError(f"timeout_s must be above 0, got {timeout_s:g}.")
@@ -168,7 +168,7 @@ class RobotClient(Inbox):
         ttl_ms: int | None = None,
         scale: float = 1.0,
     ) -> int:
-        """Send a command, in force until the next one or until it expires.
+        """Send a command, which is in force until the next one or until it expires.
 
         Args:
             values: One number for each action of the robot, in the order of its action layout.
@@ -190,7 +190,7 @@ class RobotClient(Inbox):
     def suggest(self, values: Sequence[float], *, answers: int) -> int:
         """Send a suggestion while another client has control; the robot only shows it.
 
-        A suggestion lives as long as a command, and asks for the next observation as one does.
+        A suggestion expires like a command, and also requests the next observation.
 
         Args:
             values: One number for each action of the robot, in the order of its action layout.
@@ -377,7 +377,7 @@ class RobotClient(Inbox):
         kind: type[_Answer],
         accepts: Callable[[_Answer], bool] = lambda _: True,
     ) -> _Answer:
-        """Send a request, and wait for its answer; a robot reads its disk for one at a time."""
+        """Send a request, and wait for its answer; a robot handles one request at a time."""
         # A field out of range is an error before anything is sent.
         messages.decode_client_message(messages.encode(message))
         is_prompt = kind in (messages.Lease, messages.Pong)
@@ -391,7 +391,7 @@ class RobotClient(Inbox):
     def _enqueue(self, message: ClientMessage) -> None:
         """Queue a message, replacing a waiting message of the same type.
 
-        After a blocked connection the robot so gets the newest command, and no older ones.
+        So after a blocked connection, the robot gets only the newest command.
         """
         self._pending = [m for m in self._pending if type(m) is not type(message)]
         self._pending.append(message)
@@ -423,7 +423,7 @@ class RobotClient(Inbox):
             await asyncio.gather(*tasks, return_exceptions=True)
             for task in done:
                 task.result()
-            # Should this fail, the robot notices the end of the connection anyway.
+            # If this fails, the robot detects the end of the connection anyway.
             with contextlib.suppress(LinkError, TimeoutError):
                 async with asyncio.timeout(connection.CLOSE_S):
                     await self._send_pending(websocket)
@@ -436,7 +436,7 @@ class RobotClient(Inbox):
             self.put(message)
 
     async def _watch(self) -> None:
-        """End a silent connection: a radio that dies closes nothing."""
+        """End a silent connection: if the radio fails, the connection is never closed."""
         loop, limit_s = asyncio.get_running_loop(), self._settings[2]
         while (silent_s := loop.time() - self._heard_at) <= limit_s:
             if silent_s > _PING_AFTER * limit_s:

@@ -44,7 +44,7 @@ _T = TypeVar("_T")
 async def open_connection(
     robot: KnownRobot, hello: messages.Hello, timeout_s: float
 ) -> AsyncGenerator[tuple[aiohttp.ClientWebSocketResponse, messages.Welcome]]:
-    """Connect and authenticate within a time limit; `hello` needs no proof."""
+    """Connect and authenticate within a time limit; the proof is added to `hello`."""
     address, expected = parse_address(robot.address), parse_trust(robot.fingerprint)
     sockets: list[socket.socket] = []
 
@@ -92,7 +92,7 @@ async def open_connection(
             await websocket.close()
         await session.close()
         await connector.close(abort_ssl=True)
-        # Wait until the loop has noticed the end of the sockets, which would stay open otherwise.
+        # Wait until the loop has closed the sockets.
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(CLOSE_S):
                 while any(each.fileno() != -1 for each in sockets):
@@ -161,7 +161,7 @@ class Received:
     Attributes:
         message: The observation.
         received_at: Time of arrival on this machine's monotonic clock, s.
-        jpeg: Frame number `message.frame_seq`, whichever message brought it; None without one.
+        jpeg: Frame number `message.frame_seq`, from this or an earlier message; None without one.
     """
 
     message: messages.Observation
@@ -232,7 +232,7 @@ class Inbox:
             self._changed.notify_all()
 
     def check(self) -> None:
-        """Do nothing while the link is up, in the process that made it."""
+        """Raise an error if the link is lost, or belongs to another process."""
         if self._process != os.getpid():
             raise LinkError("This connection belongs to another process: make one in this one.")
         if self.failure is not None:

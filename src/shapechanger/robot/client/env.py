@@ -80,15 +80,15 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         key: The robot's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
         size: Width and height of the images, pixels, such as (128, 128) in the original release;
-            see `resize_picture`. None for the camera's.
-        state: Whether observations have the state besides the image.
+            see `resize_picture`. None for the camera's size.
+        state: Whether observations have the state in addition to the image.
         image: Whether observations have an image; None if the robot has a camera.
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
             for each command and answers one period later.
         reward: Weights that replace the profile's, keyed by name.
         on_reset: "operator": a person puts the robot back and arms it; where anyone may arm it, the
             env does so at once. "person": always a person. "routine": the reset routine of the
-            profile. Or a function that is called with the seed.
+            profile. A function: it is called with the seed.
         on_waiting: Called with a sentence that describes what a reset waits for; None for a warning
             in the log of `shapechanger.robot.client.operator` after 2 s.
         reset_timeout_s: Time limit of a reset, s.
@@ -218,8 +218,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
                 "to it, or let its operator put it back with on_reset='operator'."
             )
         ready.take(robot)
-        # An armed robot must not be carried, nor may the last command stay in force. Arming it then
-        # confirms that it is at the start.
+        # An armed robot must not be carried, and the last command must not stay in force. Arming
+        # the robot again confirms that it is at the start.
         if self._on_reset != "routine" and self._has_stepped:
             ready.disarm(robot)
         if callable(self._on_reset):
@@ -396,7 +396,7 @@ def latencies(
         seq: Number of the command.
         sent_at: Time at which it was sent on this machine's clock, s.
         received: The observation after it.
-        clock: Source of the robot's time; a twin's seconds have another length than ours.
+        clock: Source of the robot's time; a twin may run faster or slower than real time.
 
     Returns:
         `capture_to_send`: from the capture of the frame to its sending, by the robot's clock. If

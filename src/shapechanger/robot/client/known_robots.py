@@ -32,7 +32,7 @@ KNOWN_ROBOT: Final = "known robot"
 """Kind of the name of a robot, in errors."""
 
 INSECURE: Final = "insecure"
-"""Instead of a fingerprint: no encryption, and no proof of the robot's identity."""
+"""Value instead of a fingerprint for no encryption and no proof of the robot's identity."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _FIELDS: Final = ("address", "key", "fingerprint")
@@ -57,7 +57,7 @@ class KnownRobot:
 
     name: str
     address: str
-    key: str = field(repr=False)  # It does not belong in a log.
+    key: str = field(repr=False)  # Keep the key out of logs.
     fingerprint: str
 
     def __post_init__(self) -> None:
@@ -143,7 +143,7 @@ def parse_trust(fingerprint: str) -> bytes | None:
 
 
 def untrusted(address: Address, timeout_s: float) -> LinkError:
-    """Return the error for a connection without a fingerprint, which shows the one to compare."""
+    """Return the error for a connection without a fingerprint; it shows the robot's fingerprint."""
     with translate_errors(
         OSError, to=lambda error: LinkError(f"No server shows a certificate at {address}: {error}.")
     ):

@@ -1,4 +1,4 @@
-"""Gymnasium spaces, observations and measured steps from the messages of a robot."""
+"""Gymnasium spaces and observations from the messages of a robot."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray
 
 
 class View(NamedTuple):
-    """Observation of an env, and facts for its `info`.
+    """Observation of an env, and fields for its `info`.
 
     Attributes:
         observation: The observation, which shares no memory.

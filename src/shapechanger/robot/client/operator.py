@@ -70,7 +70,7 @@ class Preparation:
             self._wait(f"{name} is still armed.", RobotRefused(f"{name} does not disarm."))
 
     def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
-        """Arm the robot if that is allowed, or wait for a person; we then have control."""
+        """Arm the robot if that is allowed, or wait for a person; the env then has control."""
         name = robot.welcome.robot
         because = "It waits for a person"
         first = "" if self.known_as else f"`shapechanger robot remember {name} …` once, then "
@@ -96,7 +96,7 @@ class Preparation:
             stopped = f" ({seen.stop_reason.rstrip('.')})" if seen.stop_reason else ""
             failure = RobotRefused(
                 f"{name} was not armed within {self.timeout_s:.0f} s. {because}{stopped}. "
-                f"To arm it, {how}; `reset_timeout_s` says how long to wait for that."
+                f"To arm it, {how}; `reset_timeout_s` sets how long to wait for that."
             )
             start = f"{name} waits for its operator: put it at the start and arm it: {how}."
             self._wait(start, failure)

@@ -1,4 +1,4 @@
-"""Recordings and robots: their list, their download, recording for a while, and replay."""
+"""Recordings of a robot: list, download, record and replay."""
 
 from __future__ import annotations
 
@@ -63,16 +63,16 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
     """Download one episode, or the new part of it.
 
     An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
-    here are kept after the robot's, so that they override these.
+    on this machine follow the robot's, so that they override them.
 
     Returns:
-        Number of new lines of the robot, and of marks and edits that were made here.
+        Number of new lines from the robot, and number of marks and edits made on this machine.
     """
     here, part = data / name, data / f".{name}.fetching"
     folder = here if is_episode(here) else part
     with translate_errors(OSError, to=lambda error: cannot_write(folder, error)):
         (folder / FRAMES).mkdir(parents=True, exist_ok=True)
-    file = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
+    file = lock(folder / STEPS, f"Another program fetches or changes {folder} at this moment.")
     try:
         have = _complete_lines(folder, file)
         # Lines up to the last step are the robot's; marks and edits of both sides follow.
@@ -95,14 +95,14 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
         if edits and (merged := have[:begin] + theirs + own) != have:
             write_atomic(folder / STEPS, b"".join(merged))
         os.fsync(file.fileno())
-        # A header that was closed here, by a repair, and only here, stays.
+        # Keep a header that was closed on this machine only, by a repair.
         if not (folder / HEADER).is_file() or read_header(folder)[1] is None:
             write_atomic(folder / HEADER, piece.header.encode())
             read_header(folder)
         if folder is part:
             part.rename(here)
     except OSError as error:
-        if isinstance(error, ConnectionError | OutputError):  # Of the link, or worded already.
+        if isinstance(error, ConnectionError | OutputError):  # Already a clear message.
             raise
         raise cannot_write(folder, error) from error
     finally:
@@ -111,7 +111,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> tuple[int, int]:
 
 
 def _without(lines: Sequence[bytes], others: Sequence[bytes]) -> list[bytes]:
-    """Return the lines that are not among others; of equal ones, the last ones remain."""
+    """Return the lines that are not in `others`; of duplicates, the last ones remain."""
     left = Counter(others)
     found: list[bytes] = []
     for line in lines:
@@ -127,7 +127,7 @@ def _complete_lines(folder: Path, file: io.FileIO) -> list[bytes]:
     lines = io.BytesIO((folder / STEPS).read_bytes()).readlines()
     if lines and not lines[-1].endswith(b"\n"):
         if (folder / HEADER).is_file():
-            raise DemosError(f"{folder} is not whole: `shapechanger demos repair {folder}` first.")
+            raise DemosError(f"{folder} is damaged: `shapechanger demos repair {folder}` first.")
         file.truncate(sum(map(len, lines[:-1])))
         lines.pop()
     return lines
@@ -185,7 +185,7 @@ def play_on_robot(episode: Episode, name: str, say: Callable[[str], None]) -> No
     known = recall(name)
     with Terminal() as terminal, RobotClient.connect(known, role="person", frames=False) as robot:
         _require_fit(episode, robot.welcome)
-        terminal.keys(0.0)  # Keys pressed before this line was shown are no consent.
+        terminal.keys(0.0)  # Discard keys that were pressed before the prompt was shown.
         say(
             f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
             f"{robot.welcome.robot} starts from its present place.\n"

@@ -100,8 +100,8 @@ STOPS: Final = frozenset({"space", "escape"})
 """Keys that stop the robot."""
 
 OTHER: Final = "other"
-"""Name of everything without its own meaning: function keys, Alt and Ctrl combinations, pasted
-text, mouse reports and replies of the terminal."""
+"""Name of all other input: function keys, Alt and Ctrl combinations, pasted text, mouse reports and
+replies of the terminal."""
 
 ESCAPE_WAIT_S: Final = 0.05
 """Time after which an escape character is the key Escape, s. Terminals send a sequence at once, so
@@ -129,11 +129,11 @@ _STOP_CODES: Final = re.compile(
     rf"{_ESCAPE}[\[O](?:(27|32)(?:;(?!\d*:3)[\d:;]*)?u|27;\d+;(27|32)~)"
 )
 _PASTES: Final = {f"{_ESCAPE}[200~": True, f"{_ESCAPE}[201~": False}  # Begin and end.
-_LONGEST: Final = 64  # Of a longer sequence only the begin and the last character count.
+_LONGEST: Final = 64  # The middle of a longer sequence is dropped.
 
 
 class NoTerminal(ShapechangerError, RuntimeError):
-    """No terminal to read keys from."""
+    """There is no terminal to read keys from."""
 
 
 def _is_whole(text: str) -> bool:
@@ -153,9 +153,9 @@ def _is_whole(text: str) -> bool:
 class KeyParser:
     r"""Parser of terminal input into keys.
 
-    Sequences are parsed whole (ECMA-48 and xterm's "ctlseqs"), however the reads split them, and
-    an unknown one is `OTHER` and never letters. Only Space and Escape count within a sequence or
-    within pasted text, because a stop must never be lost.
+    Sequences (ECMA-48 and xterm's "ctlseqs") are recognised even if they are split over several
+    reads, and unknown ones become `OTHER`, never letters. Only Space and Escape count within a
+    sequence or within pasted text, because a stop must never be lost.
 
     >>> KeyParser().feed(b"wW\x1b[A\x1b[1;5D \x1be", now_s=0.0)
     ['w', 'w', 'up', 'other', 'space', 'other']
@@ -165,7 +165,7 @@ class KeyParser:
         # A byte that is not UTF-8 becomes a lone surrogate.
         self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
         self._text = ""  # Sequence that has begun.
-        self._is_reported = False  # It was reported as Escape: its rest is nothing.
+        self._is_reported = False  # It was reported as Escape, so its rest is ignored.
         self._is_pasted = False
         self._last_s = 0.0
 
@@ -253,8 +253,8 @@ class KeyParser:
 def _as_typed(keys: list[str]) -> list[str]:
     """Return the keys of one read that a person can have meant.
 
-    A stop cancels the others. Three different keys at once are pasted text or old keys of a link
-    that stood still: many terminals mark pasted text, and some do not.
+    A stop cancels the others. Three different keys at once are pasted text, which not all
+    terminals mark, or old keys from a link that was interrupted.
     """
     stops = [key for key in keys if key in STOPS]
     if stops:
@@ -311,7 +311,7 @@ class Terminal:
                 return _as_typed(keys)
 
     def _read(self, wait_s: float) -> bytes:
-        """Return all input that is there, waiting for it up to a time."""
+        """Return all available input, waiting for some up to a time limit."""
         data = b""
         while select.select([self._fd], [], [], 0.0 if data else max(0.0, wait_s))[0]:
             more = os.read(self._fd, 4096)

@@ -24,7 +24,7 @@ def console_files(folder: Path = _FOLDER) -> dict[str, tuple[str, bytes]]:
     """Return the media type and the content (UTF-8) of each file of the console.
 
     Raises:
-        RobotError: If they cannot be read, as after a failed installation.
+        RobotError: If they cannot be read, for example after a failed installation.
     """
     failed = f"Cannot read the console in {folder}"
     with translate_errors(OSError, to=lambda error: RobotError(f"{failed}: {error}.")):

@@ -12,7 +12,7 @@ import simplejpeg
 from shapechanger.errors import ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 
-_FUTURE_NS: Final = 50_000_000  # Two readings of one clock may be seen in the other order.
+_FUTURE_NS: Final = 50_000_000  # Tolerance, because two readings of a clock may be reordered.
 _FIRST_PAUSE_S: Final = 0.1
 _LONGEST_PAUSE_S: Final = 2.0
 _BAD_UNTIL_REOPENED: Final = 10
@@ -22,7 +22,7 @@ _JOIN_S: Final = 2.0
 class FrameChecks:
     """Rejects frames that fail to decode, repeat the last one or have an impossible time.
 
-    `now_ns` is None where time moves in steps, and a frame may arrive before its time is known.
+    `now_ns` is None if time moves in steps: a frame may then arrive before its time is known.
     """
 
     def __init__(self, now_ns: Callable[[], int] | None = None) -> None:
@@ -34,12 +34,12 @@ class FrameChecks:
         """Return the reason to reject a frame, or "" if it is valid and new."""
         if not frame.encoded_here:
             try:
-                # The driver has checked the header. Strict rejects data that a decoder would fill
-                # up with grey.
+                # The driver has checked the header. Strict rejects missing data, which a decoder
+                # would otherwise fill with grey.
                 simplejpeg.decode_jpeg(frame.jpeg, colorspace="GRAY", fastdct=True, strict=True)
             except ValueError as error:
                 return f"The camera sent a JPEG that cannot be decoded: {error}."
-        # Sensor noise makes frames differ, so the same bytes are not a new frame at any time.
+        # Sensor noise makes frames differ, so the same bytes are never a new frame.
         if frame.jpeg == self._last:
             return "The camera repeats the same frame."
         self._last = frame.jpeg

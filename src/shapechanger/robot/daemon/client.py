@@ -1,4 +1,4 @@
-"""A client of the robot: its identity, and the messages that wait for it."""
+"""A client of the robot: its identity and its queue of messages."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from shapechanger.robot.link import messages
 NOT_READING: Final = "The client does not read its messages."
 
 _MAX_MESSAGES: Final = 256
-# Of these kinds, only the newest ones are kept.
+# Kinds of which only the newest messages are kept.
 _KEPT: Final = {messages.Lease: 1, messages.RecorderState: 1, messages.Event: 32}
 
 
 class Declined(Exception):
-    """The robot declines a request, for a reason that is a sentence; the connection goes on."""
+    """The robot declines a request; the message is the reason, and the connection continues."""
 
 
 class Sent(NamedTuple):
-    """An observation that a client was sent, and the newest frame at that time."""
+    """An observation that was sent to a client, and the newest frame at that time."""
 
     observation: messages.Observation
     frame: Frame | None
 
 
 class Client:
-    """A client as the robot reaches it: its identity, and the messages that wait for it.
+    """A client of the robot: its identity and its queue of messages.
 
-    Of messages other than observations it keeps the newest lease, the newest recorder state and the
-    newest 32 events. Others are accepted while fewer than 256 are queued.
+    The queue is for messages other than observations. It keeps the newest lease, the newest
+    recorder state and the newest 32 events; others are accepted while fewer than 256 are queued.
 
     Attributes:
         session: Number of the connection.
@@ -57,7 +57,7 @@ class Client:
         return self.role == "person"
 
     def post(self, message: messages.RobotMessage) -> None:
-        """Queue a message; one that does not fit is lost, and expels the client."""
+        """Queue a message; if the queue is full, the message is lost and the client is expelled."""
         kind = type(message)
         if kind in _KEPT:
             same = [queued for queued in self._messages if type(queued) is kind]

@@ -51,7 +51,7 @@ class Authenticator:
         certificate: Fingerprint of the certificate; empty without TLS.
     """
 
-    key: bytes = field(default=b"", repr=False)  # It does not belong in a log.
+    key: bytes = field(default=b"", repr=False)  # Keep the key out of logs.
     certificate: bytes = b""
 
     @property
@@ -82,7 +82,7 @@ def user_folder(variable: str, default: str) -> Path:
 def make_credentials(folder: Path, name: str) -> Credentials:
     """Make a key and a self-signed certificate that is valid for ten years.
 
-    Existing credentials stay, because clients know them.
+    Existing credentials are kept, because clients have stored them.
     """
     files = [folder / part for part in (_KEY, _PRIVATE_KEY, _CERTIFICATE)]
     if all(file.exists() for file in files):

@@ -1,4 +1,4 @@
-"""Session hub: state that all connections share, the path of commands to the guard, and time."""
+"""Session hub: state that all connections share, commands to the guard, and the robot's time."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _NOTHING: Final = PendingCommand(Client(0), (), 0)
 
 
 class SessionHub:
-    """The robot, as its connections see it. The hub never blocks and knows no sockets.
+    """State of the robot that its connections share. Its methods never block or use sockets.
 
     Attributes:
         plan: Description of the robot.
@@ -96,7 +96,7 @@ class SessionHub:
         self._drain = drain
         self._one_step_at_a_time = asyncio.Lock()
         self._frame_arrived = asyncio.Event()
-        self._unsettled = False  # An order was given that takes effect at the guard's next tick.
+        self._unsettled = False  # Whether an order is pending until the guard's next tick.
         self._clients: dict[int, Client] = {}
         # Lease and number of each command, and when it arrived, ns.
         self._arrivals: deque[tuple[tuple[int, int], int]] = deque(maxlen=_ARRIVALS)
@@ -113,7 +113,7 @@ class SessionHub:
     def join(self, client: Client) -> None:
         """Add an authenticated client.
 
-        A person always fits: where the limit is reached, the oldest client without control leaves.
+        A person is always accepted: at the limit, the oldest client without control is expelled.
         """
         programs = sum(not other.is_person for other in self._clients.values())
         is_full = len(self._clients) >= _MAX_CLIENTS
@@ -125,7 +125,7 @@ class SessionHub:
         others = [other for other in self._clients.values() if other is not self.holder]
         self._clients[client.session] = client
         if is_full:
-            # The person may want to stop the robot, and the others may be of somebody who does not.
+            # The person may need to stop the robot, so they always get a place.
             others[0].expel(f"{client.name} connected, and {_MAX_CLIENTS} clients are the limit.")
             self.leave(others[0])
 
@@ -210,7 +210,7 @@ class SessionHub:
     def observation(self, client: Client, seq: int, frame_sent: int | None) -> messages.Observation:
         """Build the observation for one client.
 
-        `frame_sent` is the number of the last frame sent to it; None if it wants no frames.
+        `frame_sent` is the number of the last frame sent to it; None if it requests no frames.
         """
         now_ns, state, frame, holder = self.now_ns(), self.state, self.frame, self.holder
         at_ns = state.at_ns or now_ns
@@ -265,7 +265,7 @@ class SessionHub:
             if state.refused_seq is None:
                 self._broadcast(refused)
             elif self.holder is not None:
-                # A refused command is the business of the lease holder alone.
+                # Only the lease holder needs to learn of a refused command.
                 self.holder.post(refused)
         self._notify()
 
@@ -277,16 +277,16 @@ class SessionHub:
         self._notify()
 
     async def step(self, seconds: float) -> None:
-        """Let `seconds` of the robot's time pass, and collect all that happened meanwhile."""
+        """Let `seconds` of the robot's time pass, and collect all state and events meanwhile."""
         if self.in_steps:
-            # Finish a step whose client disconnects: the clock would lose count otherwise.
+            # Finish a step even if its client disconnects, so that the clock stays consistent.
             await asyncio.shield(asyncio.ensure_future(self._one_step(seconds)))
         else:
             await self._clock.sleep(seconds)
             self._drain()
 
     async def settle(self) -> None:
-        """Let the guard handle an order that was just given; a real clock needs no help."""
+        """Let the guard handle an order that was just given; only needed if time is stepped."""
         if self.in_steps and self._unsettled:
             self._unsettled = False
             await self.step(1.0 / self.plan.card.tick_hz)

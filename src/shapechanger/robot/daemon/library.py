@@ -1,4 +1,4 @@
-"""Library of recordings: the list of episodes, pieces of them, and judgements."""
+"""Library of recordings: list episodes, read parts of them, and keep or drop steps."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MAX_TEXT: Final = 200
 
 
 class RecordingLibrary:
-    """Answers questions about a folder of episodes, one after another, in its own thread.
+    """Answers requests about a folder of episodes, one after another, in a separate thread.
 
     An unchanged episode is read once for the list.
     """
@@ -44,15 +44,15 @@ class RecordingLibrary:
         self._index = LineIndex(Path())
 
     def ask(self, question: Question, then: Callable[[Answer], None]) -> None:
-        """Ask a question; the caller bounds how many are open."""
+        """Queue a request; the caller limits the number of open requests."""
         self._worker.put(partial(self._answer, question), then)
 
     def close(self) -> None:
-        """End the thread, and wait for the disk, up to a limit."""
+        """End the thread, and wait for a request in progress, up to a time limit."""
         self._worker.close()
 
     def _answer(self, question: Question) -> Answer:
-        """Answer a question; errors of the disk are refusals."""
+        """Answer a request; errors of the disk become refusals."""
         try:
             match question:
                 case messages.Browse():
@@ -68,10 +68,10 @@ class RecordingLibrary:
             return messages.Refused(reason=str(error))
 
     def summary(self, name: str) -> messages.EpisodeSummary:
-        """Summarise one episode; the outcome of an unreadable one is the error."""
+        """Summarise one episode; if it is unreadable, its outcome is the error."""
         path = self._folder / name
         try:
-            # Numbers that change when the episode does.
+            # Values that change whenever the episode changes.
             found = ((path / STEPS).stat(), (path / HEADER).stat())
             stamp = tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)
             known = self._known.get(name)
@@ -103,7 +103,7 @@ class RecordingLibrary:
         return messages.Recordings(episodes=listed, more=len(found) > messages.MAX_EPISODES)
 
     def _path(self, name: str) -> Path:
-        """Return the folder of an episode, directly inside that of the recordings."""
+        """Return the folder of an episode, directly inside the folder of recordings."""
         path = self._folder / name
         if not _EPISODE_ID.fullmatch(name) or not _is_listed(path):
             raise DemosError(f"There is no episode {name!r} on this robot.")
@@ -163,7 +163,7 @@ class LineIndex:
     def lines(self, first: int, count: int) -> Iterator[str]:
         r"""Read up to `count` lines from number `first` on, and return them without their `\n`.
 
-        What was appended is read before, or all of the file if it was replaced or truncated.
+        Lines that were appended are indexed first, or all lines if the file was replaced.
         """
         with self.path.open("rb") as file:
             found = os.fstat(file.fileno())
@@ -179,5 +179,5 @@ class LineIndex:
 
 
 def _is_listed(path: Path) -> bool:
-    """Return True for the folder of an episode, and never for a link to another place."""
+    """Return True for the folder of an episode, but not for a link to another folder."""
     return bool(_EPISODE_ID.fullmatch(path.name)) and not path.is_symlink() and is_episode(path)

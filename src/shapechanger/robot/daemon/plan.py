@@ -1,4 +1,4 @@
-"""Settings of the daemon, as the command line passes them on."""
+"""Settings of the daemon, which the command line passes on."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         ready_file: File that the port is written to; "" for none.
         recordings: Folder of the recorded episodes; "" for none.
         policies: Folder of the policies that may drive on board; "" for none.
-        policy: Name of the one that starts with the robot; "" for none.
-        pilot: Module of the program that runs one of them; "" for none.
+        policy: Name of the policy that starts with the robot; "" for none.
+        pilot: Module of the program that runs a policy; "" for none.
     """
 
     card: RobotCard

@@ -1,8 +1,8 @@
-"""Policies on board: each drives from its own process, as a client like any other.
+"""Policies on board: each drives from a separate process, as a normal client.
 
-The process has no other way to the outputs than the link, so lease, deadline, guard and the person
-who takes over hold for it. A policy that crashes loses its connection, and with it control; one
-that hangs lets the deadline of its last command pass.
+The process can reach the outputs only through the link, so lease, deadline, guard and takeovers
+apply to it as to any client. A policy that crashes loses its connection, and so its control; if it
+hangs, the deadline of its last command passes.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ _log = logging.getLogger(__name__)
 ENDING: Final = ".onnx"
 """Ending of the files of policies that run on board."""
 
-_END_S: Final = 2.0  # For a policy to release the robot and exit.
+_END_S: Final = 2.0  # Time for a policy to release the robot and exit.
 _MOST_NAMES: Final = 256
-_LONGEST: Final = 1024  # Of a line that a policy's process writes, characters.
+_LONGEST: Final = 1024  # Longest line that a policy's process may write, characters.
 
 
 class _Said(msgspec.Struct):
-    """Message of a policy's process: how it goes, or why it ends."""
+    """Message of a policy's process: a note on its state, or why it failed."""
 
     note: str = ""
     failed: str = ""
 
 
 def policies_in(folder: Path) -> list[str]:
-    """Return the names of the policies in a folder, in order; none if it cannot be read."""
+    """Return the names of the policies in a folder, sorted; () if it cannot be read."""
     files: list[str] = []
     with contextlib.suppress(OSError):
         files = sorted(path.name for path in folder.iterdir() if path.suffix == ENDING)
@@ -99,7 +99,7 @@ class PolicyRunner:
         await _cancel(self._task)
 
     async def _supervise(self, before: asyncio.Task[None] | None, name: str) -> None:
-        """Run a policy's process, and report what it says."""
+        """Run a policy's process, and report its messages."""
         await _cancel(before)
         if not name:
             self._report("", "")
@@ -108,14 +108,14 @@ class PolicyRunner:
         process = await asyncio.create_subprocess_exec(
             *self._command, stdin=PIPE, stdout=PIPE, limit=_LONGEST
         )
-        # However much it computes, commands and images go first.
+        # Commands and images take precedence over the computation of a policy.
         run_normally(process.pid)
         assert process.stdin is not None
         assert process.stdout is not None
         try:
             failure = await self._listen(process.stdin, process.stdout, name)
         finally:
-            process.stdin.close()  # Its end, which it should follow.
+            process.stdin.close()  # The process should then exit.
             try:
                 await asyncio.wait_for(process.wait(), _END_S)
             except TimeoutError:
@@ -134,8 +134,8 @@ class PolicyRunner:
         task = {"policy": str(Path(self._plan.policies, name + ENDING)), "robot": self._robot}
         failure = ""
         try:
-            # The key goes through a pipe, because others can read a command line. The pipe stays
-            # open: its end tells the process that this one is gone.
+            # The key goes through a pipe, because other users can read command lines. The pipe
+            # stays open: if it is closed, this process has ended.
             stdin.write(json.dumps(task).encode() + b"\n")
             await stdin.drain()
             while line := await stdout.readline():
@@ -144,7 +144,7 @@ class PolicyRunner:
                     failure = said.failed or failure
                     self._report(name, said.note or self._text)
         except ConnectionError:
-            pass  # It is gone, and its exit code says more.
+            pass  # The process has ended; its exit code is reported.
         except ValueError:
             failure = failure or f"its process wrote a line of more than {_LONGEST} characters."
         return failure

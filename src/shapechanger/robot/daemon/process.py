@@ -38,13 +38,13 @@ from shapechanger.robot.link.authentication import fingerprint_short
 
 _log = logging.getLogger("shapechanger.robot.daemon")
 
-_HEARTBEAT_S: Final = 0.05  # The supervisor expects one each 100 ms.
+_HEARTBEAT_S: Final = 0.05  # The supervisor expects a heartbeat every 100 ms.
 _BEATS_A_REPORT: Final = 20  # The recorder reports once a second.
 
 LIFELINE: Final = b"life"
 """The message that carries the lifeline's descriptor."""
 
-# Orders that must arrive in any case. One of each kind is enough, because repeats mean the same.
+# Orders that must arrive in any case. Repeats have no further effect, so one of each kind is kept.
 _URGENT: Final = ("end", "emergency", "disarm", "halt")
 _CLONE_FILES: Final = 0x400  # linux/sched.h
 _READY_S: Final = 1.0
@@ -146,7 +146,7 @@ class Daemon:
         self._guard_reported = asyncio.Event()  # The guard has reported, or never will.
         self._why = ""
         self._loop = asyncio.get_running_loop()
-        self._guard = GuardLink(guard_fd, self._on_state, lambda: self.end("The guard is gone."))
+        self._guard = GuardLink(guard_fd, self._on_state, lambda: self.end("The guard has ended."))
         self._hub = SessionHub(plan, clock, self._guard.send, self._guard.drain, self._call)
         self._heartbeat_fd = heartbeat_fd
 
@@ -184,7 +184,7 @@ class Daemon:
                     announcement = await announce(plan.card, plan.host, port, fingerprint)
             await self._ended.wait()
         finally:
-            # First of all the guard stops the robot, when it sees this socket close.
+            # Closed first, because the guard then stops the robot.
             self._guard.close()
             if hub.recorder.on:
                 hub.recorder.end()
@@ -217,7 +217,7 @@ class Daemon:
             if heartbeat is not None:
                 heartbeat.beat()
                 if heartbeat.lost:
-                    self.end("The supervisor is gone.")
+                    self.end("The supervisor has ended.")
                     return
             if beats % _BEATS_A_REPORT == 0:
                 self._hub.recorder.tick()
@@ -248,7 +248,7 @@ class Daemon:
         return FrameReader(plan, checks, deliver, report)
 
     def _report_ready(self, port: int, fingerprint: bytes) -> None:
-        """Report the port in the log, and in the file that says that the robot can be reached."""
+        """Report the port in the log, and in the ready file if there is one."""
         plan = self._hub.plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
         _log.info("%s listens at %s, %s.", plan.card.robot, Address(plan.host, port), secured)
@@ -316,7 +316,7 @@ def send_lifeline(guard_fd: int) -> None:
     is_held = held.wait(_READY_S)
     os.close(theirs)
     if is_held:
-        # If the guard is gone already, the reader of the socket notices.
+        # If the guard has ended already, the reader of the socket detects it.
         with (
             socket.socket(fileno=os.dup(guard_fd)) as guard,
             contextlib.suppress(BrokenPipeError, ConnectionResetError),
@@ -326,13 +326,13 @@ def send_lifeline(guard_fd: int) -> None:
 
 
 def _hold(fd: int, held: threading.Event) -> None:
-    """Hold a file that no other thread has, until the process or the other end is gone."""
+    """Hold a file that no other thread has open, until the process ends or the file is closed."""
     if ctypes.CDLL(None).unshare(_CLONE_FILES) != 0:
         return
     os.closerange(0, fd)
     os.closerange(fd + 1, os.sysconf("SC_OPEN_MAX"))
     ended = select.poll()
-    ended.register(fd, 0)  # Only the error condition, that the other end is closed.
+    ended.register(fd, 0)  # Only the error condition that the other end is closed.
     held.set()
     ended.poll()
 

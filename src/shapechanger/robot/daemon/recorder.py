@@ -32,7 +32,7 @@ _MAX_JOBS: Final = 256  # Over ten seconds of steps at 20 Hz: memory cards pause
 _MAX_BYTES: Final = 16 << 20  # Bytes of queued frames.
 _CLOSE_S: Final = 5.0
 
-# Facts of the card that an episode keeps, under the same names.
+# Fields of the card that are copied to the header of an episode.
 _SHARED: Final = tuple(f.name for f in fields(EpisodeHeader) if hasattr(RobotCard, f.name))
 
 _T = TypeVar("_T")
@@ -47,7 +47,7 @@ class _Decided(NamedTuple):
 
 
 class Worker:
-    """Thread that does one job after another; a disk that hangs keeps no process alive.
+    """Thread that runs jobs in order; it is a daemon thread, so a hanging disk cannot block exit.
 
     `call` calls a function in the event loop's thread.
     """
@@ -58,13 +58,13 @@ class Worker:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def put(self, job: Callable[[], _T], then: Callable[[_T], None]) -> None:
-        """Do a job after those before it, and pass its result to a function in the event loop."""
+        """Queue a job, and pass its result to a function in the event loop."""
         if self._thread.ident is None:
             self._thread.start()
         self._jobs.put(lambda: partial(then, job()))
 
     def close(self) -> None:
-        """End the thread after the jobs so far, and wait for it, up to a limit."""
+        """End the thread after the queued jobs, and wait for it, up to a time limit."""
         if self._thread.ident is not None:
             self._jobs.put(None)
             self._thread.join(_CLOSE_S)
@@ -75,12 +75,12 @@ class Worker:
 
 
 class _Episode:
-    """An episode, which the recorder's thread writes; a full one goes on in the next."""
+    """An episode, which the recorder's thread writes; a full one is continued in another one."""
 
     def __init__(self, folder: Path, header: EpisodeHeader, starter: Client) -> None:
         self.starter = starter
-        # Of the event loop: the newest state it knows, whose text is an error that ended the
-        # episode; and how many jobs wait for the disk, with how many bytes of frames.
+        # Used in the event loop only: the newest state, whose text is an error that ended the
+        # episode; the number of queued jobs, and the bytes of their frames.
         self.progress = messages.RecorderState()
         self.jobs = self.bytes = 0
         self._trouble = ""
@@ -88,7 +88,7 @@ class _Episode:
         self._writer: EpisodeWriter | None = None
 
     def attempt(self, job: Callable[[EpisodeWriter], object]) -> tuple[str, messages.RecorderState]:
-        """Do a job unless there was an error. Return why it is declined, and the state then."""
+        """Run a job unless there was an error; return the reason of a refusal, and the state."""
         declined = ""
         try:
             if not self._trouble:
@@ -96,10 +96,10 @@ class _Episode:
                 job(self._writer)
         except Declined as error:
             declined = str(error)
-        except Exception as error:  # Whatever it is, the robot drives on.
+        except Exception as error:  # No error of a recording may stop the robot.
             is_ours = isinstance(error, ShapechangerError)
             self._trouble = str(error) if is_ours else f"Recording failed: {error!r}."
-            # On a full disk this may fail too. All steps are there all the same, and
+            # On a full disk this may fail too. All steps are on disk nevertheless, and
             # `shapechanger demos repair` closes the episode.
             with contextlib.suppress(ShapechangerError):
                 if self._writer is not None:
@@ -126,10 +126,9 @@ class Recorder:
     """Records one episode at a time, with any client in control. It never waits for the disk.
 
     While the robot is armed, each observation that is answered by a command becomes a step. The
-    next observation of the same client completes it, because it reports the applied outputs. Of two
-    commands that answer the same observation the later one counts. A command that answers an
-    observation older than the last step's is ignored, so that time never runs backwards in an
-    episode.
+    next observation of the same client completes it, because it reports the applied outputs. If two
+    commands answer the same observation, the later one counts. A command that answers an older
+    observation than the last step is ignored, so that time never runs backwards in an episode.
 
     Attributes:
         on: Whether an episode is recorded.
@@ -268,7 +267,7 @@ class Recorder:
             self._put(episode, partial(episode.add, step, jpeg), size=size)
         else:
             self._stop(episode, DISK_TOO_SLOW)
-            self._broadcast(self.state())  # Again when the disk responds.
+            self._broadcast(self.state())  # Sent again when the disk responds.
 
     def _stop(self, episode: _Episode, outcome: str) -> None:
         self.on, self._decided = False, None
@@ -284,7 +283,7 @@ class Recorder:
         reports: bool = False,
         client: Client | None = None,
     ) -> None:
-        """Let the thread do a job with a frame of a size; report the new state, or a refusal."""
+        """Queue a job with a frame of `size` bytes; report the new state, or a refusal."""
         episode.jobs += 1
         episode.bytes += size
 
@@ -295,7 +294,7 @@ class Recorder:
             episode.progress = now
             if now.text and not before.text:
                 _log.warning("Recorder: %s", now.text)
-                if not now.episode:  # It could not even begin.
+                if not now.episode:  # The episode could not begin.
                     episode.starter.post(messages.Refused(reason=now.text))
             elif declined and client is not None:
                 client.post(messages.Refused(reason=declined))

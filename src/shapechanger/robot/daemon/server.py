@@ -1,4 +1,4 @@
-"""HTTP server of the robot: its connections from acceptance on, the link, and the console."""
+"""HTTP server of the robot: acceptance of connections, the link, and the console."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from shapechanger.robot.link.messages import VERSION
 
 _log = logging.getLogger(__name__)
 
-_PRE_AUTH_TIMEOUT_S: Final = 3.0  # For its first request, and for each one after it.
+_PRE_AUTH_TIMEOUT_S: Final = 3.0  # Time limit for each request before authentication.
 _MAX_TOTAL: Final = 48
 _MAX_PER_ADDRESS: Final = 16  # A browser opens six, and a person may have two pages open.
 _BACKLOG: Final = 32
 _SEND_BUFFER: Final = 32 * 1024  # Bytes that the kernel holds for one client: a few frames.
-_ACCEPT_PAUSE_S: Final = 0.05  # After a failed accept, most likely for want of descriptors.
+_ACCEPT_PAUSE_S: Final = 0.05  # Pause after a failed accept, usually a lack of descriptors.
 
 
 class Listener:
-    """Accepts connections, of which few have not authenticated, and those for a short time.
+    """Accepts connections, and limits the number and time of unauthenticated ones.
 
-    Each one is registered before its TLS handshake. A new connection is never turned away, because
-    it may be the person who wants to stop the robot: it replaces the oldest connection of the
-    address that has the most.
+    Each one is registered before its TLS handshake. A new connection is never refused, because it
+    may come from the person who wants to stop the robot: it replaces the oldest connection from the
+    address with the most connections.
     """
 
     def __init__(
@@ -110,15 +110,15 @@ class Listener:
             connection.timer.cancel()
 
     def remove(self, key: Hashable) -> AcceptedSocket | None:
-        """Forget a connection that has authenticated or ended, and return it if it was here."""
+        """Remove and return a connection that has authenticated or ended; None if unknown."""
         if connection := self._waiting.pop(key, None):
             connection.timer.cancel()
         return connection
 
     def drop_one(self) -> None:
-        """Drop the oldest connection of the address that has the most."""
+        """Drop the oldest connection from the address with the most connections."""
         counts = Counter(connection.address for connection in self._waiting.values())
-        if self._waiting:  # Of keys with equal counts, the first one is the oldest.
+        if self._waiting:  # If keys have equal counts, the first one is the oldest.
             self._drop(max(self._waiting, key=lambda key: counts[self._waiting[key].address]))
 
     def _drop(self, key: Hashable) -> None:
@@ -148,7 +148,7 @@ class Listener:
 class AcceptedSocket:
     """A connection from its acceptance on, through the TLS handshake."""
 
-    timer: asyncio.TimerHandle  # It drops the connection.
+    timer: asyncio.TimerHandle  # Drops the connection after the time limit.
 
     def __init__(
         self,
@@ -172,7 +172,7 @@ class AcceptedSocket:
         if self._transport is not None:
             self._transport.abort()
             return
-        # The handshake then reads the end of the stream, however far it has come.
+        # The handshake then reads the end of the stream at any stage.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
@@ -182,17 +182,17 @@ class AcceptedSocket:
             self._transport, _ = await loop.connect_accepted_socket(
                 lambda: protocol, self._socket, ssl=tls
             )
-        except OSError as error:  # The other end speaks no TLS, or has left.
+        except OSError as error:  # The other end does not use TLS, or has disconnected.
             _log.debug("The TLS handshake with %s failed: %s", self.address, error)
 
 
-_SHUTDOWN_S: Final = 0.2  # A daemon that ends has nothing left to send.
+_SHUTDOWN_S: Final = 0.2  # Short, because no messages remain to be sent.
 _GUARD_SILENT_NS: Final = 1_000_000_000
 _CONSOLE: Final = "/console/"
 
 _HEADERS: Final = {
     "Cache-Control": "no-store",
-    # Nothing inline, and nothing from another server.
+    # No inline scripts or styles, and no content from other servers.
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
         "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'; form-action 'none'"
@@ -207,8 +207,8 @@ _HEADERS: Final = {
 def origin_refusal(origin: str | None, host: str, *, is_open: bool) -> str:
     """Return the reason why a web page must not open a connection, or "" if it may.
 
-    A robot that accepts every client (`is_open`) must be opened under a name that a foreign name
-    server cannot point at it (DNS rebinding).
+    The console of a robot that accepts every client (`is_open`) must be opened by an address that
+    no foreign name server can control (DNS rebinding).
     """
     if origin is None:
         return ""
@@ -277,7 +277,7 @@ class Server:
 
     async def _robot(self, _: web.Request) -> web.Response:
         """Describe the robot to a page before authentication."""
-        # A page cannot read the certificate of its connection, and the proof needs its fingerprint,
+        # A page cannot read the certificate of its connection, but the proof needs its fingerprint,
         # which is not secret.
         return web.json_response(
             {

@@ -36,18 +36,18 @@ _log = logging.getLogger(__name__)
 _LARGEST_VALUE: Final = 1e6  # The guard clips to 1 in any case; this keeps sums from overflowing.
 _WINDOW: Final = 64  # More than a second at 50 Hz; older observations are stale in any case.
 _NS_PER_MS: Final = 1_000_000
-_SEND_S: Final = 2.0  # A client that does not read for so long is disconnected.
+_SEND_S: Final = 2.0  # A client that does not read for this long is disconnected.
 _CLOSE_S: Final = 1.0
-_UNANSWERED_MS: Final = 4_000  # Unacknowledged data then ends the connection.
+_UNANSWERED_MS: Final = 4_000  # Data that stays unacknowledged for this long ends the connection.
 # A dead radio sends nothing: the connection ends 6 s after it fell silent.
 _HEARTBEAT_S: Final = 4.0
-# A key of 128 bits cannot be guessed. The pause keeps an attempt from costing the robot more than
-# its sender, and does not delay a client with the right key at the same address.
+# A key of 128 bits cannot be guessed. The pause limits the cost of attempts for the robot, and does
+# not delay a client with the right key at the same address.
 _WRONG_KEY_S: Final = 0.5
 
-# A camera that is about as fast as the commands sets the pace, so that each observation has a new
-# frame. It is worth waiting for a frame that is a little late: an observation without it would use
-# up the client's credit.
+# If the camera is about as fast as the commands, it sets the pace, so that each observation has a
+# new frame. The robot waits for a frame that is a little late, because an observation without it
+# would use up the client's credit.
 _FRAME_PACE: Final = 1.25
 
 
@@ -67,8 +67,8 @@ def printable(text: str) -> str:
 class Session:
     """Session of one client.
 
-    `introduce`, `receive` and `observe` are the rules, and know no socket; `run` serves the client
-    on a WebSocket: it receives, answers, and sends observations when they are due.
+    `introduce`, `receive` and `observe` are the rules, without sockets; `run` serves the client on
+    a WebSocket: it receives, answers, and sends observations when they are due.
 
     Attributes:
         client: Identity of the client, and the messages for it other than observations.
@@ -103,8 +103,7 @@ class Session:
             autoping=False,  # Pings count as messages here, so that they cannot flood the robot.
             heartbeat=_HEARTBEAT_S,
             compress=False,
-            # Above the limit, so that an oversized message gets an error message, and still
-            # bounded.
+            # Slightly above the limit, so that an oversized message gets an error message.
             max_msg_size=4 * messages.MAX_CLIENT_MESSAGE,
             writer_limit=0,
         )
@@ -197,9 +196,9 @@ class Session:
             case messages.Undo():
                 hub.recorder.edit(message, client)
             case messages.Browse() | messages.Fetch() | messages.Judge():
-                # An answer may be large, so the next question waits until it has left.
+                # An answer may be large, so the next request is accepted once it has been sent.
                 if self._awaits_library or client.awaits(messages.Recordings, messages.Piece):
-                    raise Declined("Ask one question about recordings at a time.")
+                    raise Declined("Send one request about recordings at a time.")
                 self._awaits_library = True
                 hub.library.ask(message, self._library_answered)
             case _:
@@ -215,7 +214,7 @@ class Session:
         hub.recorder.observed(self.client, observation)
         if observation.frame is not None:
             self._frame_seq = observation.frame_seq
-        if self._pace == "lockstep":  # The robot set the pace, however fast.
+        if self._pace == "lockstep":  # The robot sets the pace, at any rate.
             self._tokens = min(self._messages_per_s, self._tokens + 1.0)
         self._credit = False
         return observation
@@ -255,8 +254,8 @@ class Session:
         elif not all(math.isfinite(v) and abs(v) <= _LARGEST_VALUE for v in message.values):
             fault = f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
         if fault:
-            # The previous command is no longer what the client wants. A late or repeated command
-            # proves nothing of that kind, and must not stop a newer one.
+            # The invalid command supersedes the previous one. A late or repeated command does not,
+            # and must not stop a newer one.
             if is_command:
                 hub.halt()
             raise Declined(fault)
@@ -291,7 +290,7 @@ class Session:
         if not person and hub.holder is not self.client:
             raise Declined("Only the client in control, or a person, can arm this robot.")
         self._answered(arm.answers, "Not armed. ")
-        # The guard knows every emergency stop; this process only those reported to it.
+        # The guard counts every emergency stop; this process sees only the reported ones.
         hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _library_answered(self, answer: Answer) -> None:
@@ -317,11 +316,11 @@ class Session:
             if isinstance(error, WrongKey):
                 await asyncio.sleep(_WRONG_KEY_S)
         finally:
-            # If this client was in control, the robot stops before anything else happens.
+            # If this client was in control, stop the robot first.
             self._hub.leave(client)
         if reason is not None:
             _log.info("%s: %s", client.name or request.remote, reason)
-            with contextlib.suppress(LinkError):  # The client may read no more.
+            with contextlib.suppress(LinkError):  # The client may no longer read.
                 await self._send(messages.Refused(reason=str(reason), fatal=True))
         await self._hub.settle()
         try:
@@ -374,7 +373,7 @@ class Session:
             self.receive(data)
             await self._hub.settle()
             if self.client.awaits():
-                await asyncio.sleep(0)  # A client that asks faster than it is answered waits.
+                await asyncio.sleep(0)  # Let other tasks run, even if requests come very fast.
 
     async def _answer(self) -> None:
         client = self.client
@@ -417,8 +416,8 @@ class Session:
         if self._by_frames and hub.frame is not None:
             self._due_s = now_s + _FRAME_PACE * self._period_s
         else:
-            # Counted from the time it was due, so that delays do not add up; but a client that
-            # was away gets no burst.
+            # Counted from the due time, so that delays do not add up, but without a burst after a
+            # long silence of the client.
             was_s = self._due_s if now_s - self._due_s < self._period_s else now_s
             self._due_s = was_s + self._period_s
 
@@ -447,11 +446,11 @@ def _ended(error: ConnectionError | RuntimeError) -> LinkError:
 
 
 def _tune(transport: asyncio.Transport | None) -> None:
-    """Send at once, buffer little, and notice when the other end is gone."""
+    """Disable delays, limit buffers, and detect when the other end has disconnected."""
     if transport is None:
         raise LinkError("The connection ended.")
-    # Not 0: asyncio's TLS would then call an empty buffer full every second time, and a message
-    # that was sent would wait for the next one before it counts as sent.
+    # Not 0: asyncio's TLS would then report an empty buffer as full every second time, so that a
+    # message would only count as sent when the next one is.
     transport.set_write_buffer_limits(high=1, low=0)
     accepted = transport.get_extra_info("socket")
     accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -1,6 +1,6 @@
 """Magnetic encoders AS5600 at joints, behind a multiplexer TCA9548A, over I2C.
 
-All AS5600 have one address, so each joint's has a channel of the multiplexer. Registers: ams,
+All AS5600 have the same address, so each encoder has a channel of the multiplexer. Registers: ams,
 AS5600 data sheet v1-06, 2018-06-20, figures 21 to 23. Multiplexer: Texas Instruments, TCA9548A data
 sheet SCPS207F, section 8.5.4.
 """
@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # The guard loads neither.
     from shapechanger.layout import Feature
 
 ADDRESS: Final = 0x36
-"""Of every AS5600."""
+"""Address of every AS5600."""
 
 COUNTS_PER_TURN: Final = 4096
 
@@ -92,7 +92,7 @@ class As5600Keys(Keys, frozen=True, kw_only=True):
                 raise KeyMistake(name, f"has the channel {joint.channel}, which {other} has, too")
 
     def claims(self) -> Iterator[Claim]:
-        """Return the claims of the addresses; all encoders of a bus answer at the same one."""
+        """Return the claims of the addresses; all encoders of a bus share one address."""
         yield from i2c_claims(self.bus, "mux", self.mux)
         yield Claim("driver", f"address {ADDRESS:#x} of I2C bus {self.bus}")
 
@@ -116,7 +116,7 @@ class As5600(I2cDevice):
         self._missed = dict.fromkeys(keys.rows, 0)
 
     def measure(self, joint: str) -> tuple[int, Magnet]:
-        """Read the raw angle of one joint, 0 to 4095, which a missing magnet makes meaningless."""
+        """Read the raw angle of one joint, 0 to 4095; it is meaningless without a magnet."""
         channel = self.joints[joint].channel
         with device_errors(self.name):
             self._bus.write_byte(self._address, 1 << channel)
@@ -177,7 +177,7 @@ _STATUS_OF: Final = {
 
 
 class SimulatedAs5600(SimulatedChip):
-    """AS5600: magnetic encoder of a joint, with what reads its angle, rad."""
+    """AS5600: magnetic encoder of a joint, with a function that returns the angle, rad."""
 
     def __init__(self, keys: JointKeys, angle: Callable[[], float]) -> None:
         self._keys = keys
@@ -191,7 +191,7 @@ class SimulatedAs5600(SimulatedChip):
         self._magnet = state
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, starting at a register; those that no driver reads are 0."""
+        """Read bytes, starting at a register; unused registers are 0."""
         counts = 0
         if self._magnet != "gone":
             turned = self._keys.direction * self._angle() / (2.0 * math.pi)
@@ -208,7 +208,7 @@ class Tca9548a(SimulatedChip):
         control: Its register, with a bit for each channel.
     """
 
-    is_logged = False  # It moves nothing, and hundreds of writes a second would fill the ledger.
+    is_logged = False  # It has no outputs, and hundreds of writes a second would fill the ledger.
 
     def __init__(self, channels: Mapping[int, SimulatedChip]) -> None:
         self.channels = channels
@@ -220,7 +220,7 @@ class Tca9548a(SimulatedChip):
         return [self.control] * length
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write the control register; of all bytes, the register byte included, the last counts."""
+        """Write the control register; only the last byte counts, including the register byte."""
         self.control = (register, *data)[-1]
 
 
@@ -235,7 +235,7 @@ class ChannelsBehind(SimulatedChip):
         mux = self._mux
         chips = [chip for channel, chip in mux.channels.items() if mux.control >> channel & 1]
         if not chips:
-            raise OSError(errno.EREMOTEIO, "no chip answers")  # As the kernel's driver.
+            raise OSError(errno.EREMOTEIO, "no chip answers")  # Same error as from the kernel.
         data = [0xFF] * length
         for chip in chips:
             data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]
@@ -246,10 +246,10 @@ class SimulatedJoints(SimulatedSensor):
     """A multiplexer and the encoders behind it.
 
     `measured_angle` of the world returns one reading of a joint's angle, rad, with the noise of its
-    encoder, and raises RobotError for a joint of which it has none. Without it all stand at zero.
+    encoder, and raises RobotError for an unknown joint. Without it, all angles are zero.
 
     Attributes:
-        encoders: Encoders by joint.
+        encoders: Encoders, keyed by joint.
     """
 
     def __init__(self, plan: SensorPlan, world: World) -> None:

@@ -1,4 +1,4 @@
-"""Chips: sensors, outputs and sources of pulses, each with keys, driver and simulation in one file.
+"""Base classes and registries of chips: sensors, outputs and sources of pulses.
 
 The module of a chip has its keys in a profile, its driver and its simulation, and a `SensorChip`,
 `OutputChip` or `PulseSource` that names them. Other packages add chips by entry points of the group
@@ -49,14 +49,14 @@ def _printable(longest: int) -> Meta:
 
 
 Text = Annotated[str, _printable(64)]
-"""A name, as long as names in messages may be; see `shapechanger.robot.link.messages`."""
+"""A name that fits into messages; see `shapechanger.robot.link.messages`."""
 
 FilePath = Annotated[str, _printable(4096)]
 """Path of a file or a device."""
 
 
 class KeyMistake(ValueError):
-    """A value of a key that the other keys of its table do not allow.
+    """A value of a key contradicts other keys of its table.
 
     `text` is the reason, as the end of a sentence that begins with the key and its table.
     """
@@ -67,7 +67,7 @@ class KeyMistake(ValueError):
 
 
 class Claim(NamedTuple):
-    """Something that only one key of a profile may use.
+    """A resource that only one key of a profile may use.
 
     Attributes:
         key: Name of the key that claims it.
@@ -86,12 +86,12 @@ class Keys(msgspec.Struct, frozen=True):
     """Keys of one table; a subclass raises `KeyMistake` for values that contradict each other."""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of a plan, as JSON can hold them."""
+        """Return the settings of a plan, as JSON values."""
         return cast("dict[str, Any]", msgspec.to_builtins(self, enc_hook=int))
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> Self:
-        """Return the keys from the settings of a plan, which may have others, too."""
+        """Return the keys from the settings of a plan; other settings are ignored."""
         return msgspec.convert(settings, cls, dec_hook=lambda kind, pin: kind(pin))
 
     def connected(self) -> Iterator[tuple[str, Pin]]:
@@ -127,7 +127,7 @@ class I2cKeys(Keys, frozen=True, kw_only=True):
 
 
 def i2c_claims(bus: int, key: str, address: int, group: str = "") -> Iterator[Claim]:
-    """Return the claims of an address, which has a key, and of its bus; see `Claim` for groups."""
+    """Return the claims of an address and its bus; `key` is the key of the address."""
     yield Claim(key, f"address {address:#x} of I2C bus {bus}", group)
     for pin in I2C_PINS.get(bus, ()):
         yield Claim("bus", f"GPIO{pin}", f"I2C bus {bus}", f", a wire of I2C bus {bus},")
@@ -139,7 +139,7 @@ def device_errors(device: str) -> Generator[None]:
     try:
         yield
     except _kinds() as error:
-        # A device that could not be opened frees its pins when nothing refers to it any more. In
+        # A device that could not be opened frees its pins once it has no more references. In
         # Python 3.13 the frame that opened it would live until a garbage collection.
         traceback.clear_frames(error.__traceback__)
         raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
@@ -203,7 +203,7 @@ class SensorDriver(Protocol):
     """Driver of one sensor, without threads, that blocks for at most a few milliseconds."""
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return the measurements in SI units, keyed like `GuardState.quantities`.
+        """Return the measurements in SI units, with the keys of `GuardState.quantities`.
 
         Args:
             now_ns: Monotonic time, ns.
@@ -221,7 +221,7 @@ class SensorDriver(Protocol):
 class PulseChannel:
     """Source of the pulses of one servo, in whole microseconds, sent only when they change.
 
-    A kind defines `_pulse`, or has other steps and its own `write_us` and `release`.
+    A subclass defines `_pulse`, or overrides `write_us` and `release` if it has other steps.
     """
 
     _width_us: int | None = None
@@ -255,10 +255,10 @@ class SensorChip:
 
     Attributes:
         measures: Its quantities; see `SensorPlan.measures`.
-        keys: Its keys in a profile, besides `driver`.
+        keys: Its keys in a profile, in addition to `driver`.
         open: Opens its driver.
-        simulate: Its simulation; None where a twin's board has the real one, such as a file.
-        features: Features of a state that it alone measures; None where `measures` tells them.
+        simulate: Its simulation; None if a twin uses the real one, such as a file.
+        features: Features of a state that it alone measures; None if `measures` determines them.
         rows: Keys of each nested table, such as a joint's; None without any. `keys` has them
             as `rows`, keyed by name.
     """
@@ -285,20 +285,20 @@ class OutputChip:
     """A kind of motor, servo or controller.
 
     Attributes:
-        keys: Its keys in a profile, besides those of every output and of its pulse source.
+        keys: Its keys in a profile, in addition to the keys of all outputs and of its pulse source.
         open: Opens its driver.
         wire: Its wiring on a twin, which reads its state from the levels of the board's outputs;
             called with the output, its value at rest, and the duty of a pin.
         unpowered: State without power, if power goes through the one-shot of the enable line, as
             it does for motors; None for a steering servo or a joint.
-        obeys: The value that a controller makes of its pulses, with its own memory; None for
-            the value of the pulses.
+        obeys: Creates a stateful function from the value of the pulses to the value of the motor;
+            None if both are equal.
         pulses: Keys of the pulse widths at -1, 0 and 1; empty for an output without pulses.
-        differs: Why its value may differ from the one that was asked for.
-        lights: LEDs of a bench that stand for it: the key of each pin, words after the name of the
-            output, and the value that lights it; empty if an LED cannot.
-        drives: Whether it can propel a robot, whatever part it moves.
-        stops_itself: Whether it stops by itself without the guard, and must be left alone then.
+        differs: Why its value may differ from the requested one.
+        lights: LEDs that replace it on a bench: the key of each pin, a label after the name of the
+            output, and the value that lights it; empty if LEDs cannot replace it.
+        drives: Whether it can propel a robot, regardless of its part.
+        stops_itself: Whether it stops by itself without the guard, and must not be written to then.
     """
 
     keys: type[Keys]
@@ -315,12 +315,12 @@ class OutputChip:
 
 @dataclass(frozen=True, slots=True)
 class PulseSource:
-    """A source of the pulses of servos and controllers, which their key `over` names.
+    """A source of the pulses of servos and controllers, selected by their key `over`.
 
     Attributes:
         keys: Its keys in a profile.
         open: Opens the channel of an output, without sending any pulses.
-        pulse_us: Reads the width of its pulses on a twin, µs; None for a source that no twin has.
+        pulse_us: Reads the width of its pulses on a twin, µs; None if it has no simulation.
         chips: Its chips on I2C buses.
     """
 
@@ -349,11 +349,11 @@ def _others() -> dict[str, SensorChip | OutputChip | PulseSource]:
 
 
 class Chips(Mapping[str, _Chip]):
-    """Chips of one kind by driver, loaded on demand, so that a guard loads only its own.
+    """Chips of one kind, keyed by driver and loaded on demand, so that a guard loads only its own.
 
     Args:
         kind: Class of the chips.
-        **own: MODULE:NAME of each of ours, in this folder; other packages cannot replace one.
+        **own: MODULE:NAME of each chip in this folder; other packages cannot replace these.
     """
 
     def __init__(self, kind: type[_Chip], **own: str) -> None:

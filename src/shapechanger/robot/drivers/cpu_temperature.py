@@ -39,7 +39,7 @@ class CpuTemperature:
         return {"temperature": self._celsius}
 
     def close(self) -> None:
-        """Do nothing: no file stays open."""
+        """Do nothing, because no file stays open."""
 
     def _measure(self) -> float:
         with device_errors(self._name):

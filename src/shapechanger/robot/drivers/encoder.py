@@ -31,7 +31,7 @@ class EncoderKeys(Keys, frozen=True, kw_only=True):
 
     Attributes:
         a: Pin of its first channel.
-        b: Pin of its second; -1 for one channel, whose sign is the command's.
+        b: Pin of its second channel; -1 for one channel, which takes its sign from the command.
         counts_per_turn: Rising edges of one channel for a turn of the wheel.
         wheel_m: Circumference of the wheel, m.
     """
@@ -51,7 +51,7 @@ class Encoder:
     """Encoder with one or two channels; see `SensorDriver`.
 
     With two channels (quadrature) it measures the direction, and each edge is a quarter of a count.
-    With one, each rising edge is a count, and the direction is the propulsion's.
+    With one channel, each rising edge is a count, and the direction is taken from the propulsion.
     """
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
@@ -89,7 +89,7 @@ class Encoder:
             if len(edges) > 1 and (took_s := edges[-1][0] - edges[0][0]) > 0.0:
                 self._speed = sum(step for _, step in edges[1:]) * self._edge_m / took_s
         else:
-            # The next edge is not here yet, which bounds the speed.
+            # The time since the last edge bounds the speed.
             since_s = (now_ns - self._last_edge_ns) / 1e9
             if since_s > _STANDS_AFTER_S:
                 self._speed = 0.0
@@ -128,7 +128,7 @@ class SimulatedEncoder(SimulatedSensor):
         self._pins = (keys.a, keys.b)
         self._states = ((0,), (1,)) if keys.b == NO_PIN else _FORWARD
         self._edge_m = keys.count_m / len(self._states)
-        # The distance rolled before power-on makes no edges.
+        # Distance before power-on causes no edges.
         self._travelled = world.inputs().travelled_m
         self._position = math.floor(self._travelled / self._edge_m)
         state = self._states[self._position % len(self._states)]

@@ -43,7 +43,7 @@ class Hcsr04Keys(Keys, frozen=True, kw_only=True):
 
 
 class Hcsr04:
-    """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it."""
+    """Distance sensor; see `SensorDriver`. `read` returns the echo of an earlier ping."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         keys = Hcsr04Keys.of(plan.settings)
@@ -104,8 +104,8 @@ class Hcsr04:
                 self._rise = None
 
 
-# A ping takes eight cycles of 40 kHz, and the echo line is high for as long as the sound travels;
-# after 38 ms without an echo it gives up. It measures 2 cm to 4 m.
+# A ping takes eight cycles of 40 kHz, and the echo line is high for as long as the sound travels,
+# at most 38 ms. The sensor measures 2 cm to 4 m.
 _PING_NS: Final = 450_000
 _NO_ECHO_NS: Final = 38_000_000
 _NEAREST_M: Final = 0.02
@@ -116,7 +116,7 @@ class SimulatedHcsr04(SimulatedSensor):
     """An HC-SR04, which answers a ping at the falling edge of its trigger.
 
     Attributes:
-        override_m: Distance to measure, m; None for the truth.
+        override_m: Distance to measure, m; None for the true distance.
         dead: Whether it does not answer at all.
     """
 

@@ -51,7 +51,7 @@ class Ina219(I2cDevice):
 
 
 class SimulatedIna219(SimulatedChip):
-    """INA219: voltage of the battery, in registers of 16 bits; no other one is simulated."""
+    """INA219: voltage of the battery, in a register of 16 bits; only this register is simulated."""
 
     def __init__(self, world: World) -> None:
         self._world = world

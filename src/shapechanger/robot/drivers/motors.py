@@ -56,7 +56,7 @@ class HBridgeKeys(_DutyKeys, frozen=True, kw_only=True):
     enable: OptionalPin = NO_PIN
 
     def drive(self, duty: Callable[[Pin], float]) -> float:
-        """Return the signed duty of the motor from those of the pins, -1 to 1."""
+        """Return the signed duty of the motor from the duties of the pins, -1 to 1."""
         enabled = 1.0 if self.enable == NO_PIN else duty(self.enable)
         return (duty(self.forward) - duty(self.backward)) * enabled
 
@@ -73,7 +73,7 @@ class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
     enable: Pin
 
     def drive(self, duty: Callable[[Pin], float]) -> float:
-        """Return the signed duty of the motor from those of the pins, -1 to 1."""
+        """Return the signed duty of the motor from the duties of the pins, -1 to 1."""
         # A phase that is high part of the time turns the motor back and forth.
         return duty(self.enable) * (1.0 - 2.0 * duty(self.phase))
 
@@ -122,7 +122,7 @@ class _DutyMotor:
         return math.copysign(self._duty.size_at(abs(drive)), drive) if drive else 0.0
 
     def release(self) -> None:
-        """Disable a bridge that can be disabled, and set the speed to zero."""
+        """Disable the bridge if it has an enable input, and set the speed to zero."""
         self._written = None
         with device_errors(self._name), ExitStack() as stack:
             stack.callback(self._drive, 0.0, None)
@@ -135,7 +135,7 @@ class _DutyMotor:
             self._opened.close()
 
     def _drive(self, drive: float, written: float | None) -> None:
-        """Set a signed duty; `written` is the previous one, or None if that is in doubt."""
+        """Set a signed duty; `written` is the previous one, or None if it is unknown."""
         raise NotImplementedError
 
 

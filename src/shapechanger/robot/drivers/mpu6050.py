@@ -40,8 +40,8 @@ _STANDARD_GRAVITY: Final = 9.80665  # m/s2
 _M_PER_S2: Final = _STANDARD_GRAVITY / 8192.0  # 8192 LSB/g at 4 g.
 _RAD_PER_S: Final = math.radians(1.0) / 65.5  # 65.5 LSB/(deg/s) at 500 deg/s.
 
-# A gyroscope at rest reads up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"). So
-# its zero follows its readings slowly while the robot is not commanded to move.
+# A gyroscope at rest reads up to 20 deg/s (product specification PS-MPU-6000A, "ZRO tolerance"), so
+# its zero is estimated by a slow filter while the robot is not commanded to move.
 _MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
 _ZERO_SHARE: Final = 0.02
 
@@ -75,11 +75,11 @@ class Mpu6050(I2cDevice):
         Gravity is part of the acceleration.
 
         Raises:
-            RobotError: If it does not respond, or sleeps, as after a loss of power.
+            RobotError: If it does not respond, or sleeps, for example after a loss of power.
         """
         measured = self.read_registers(_ACCEL_XOUT_H, _MEASURED.size)
         x, y, z, _, _, _, yaw = _MEASURED.unpack(measured)
-        if x == y == z == 0:  # Not even gravity is measured.
+        if x == y == z == 0:  # An awake sensor would measure at least gravity.
             raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
         rate = yaw * _RAD_PER_S
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:

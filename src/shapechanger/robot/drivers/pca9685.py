@@ -85,13 +85,13 @@ class Pca9685Keys(I2cKeys, frozen=True, kw_only=True):
 class Pca9685(I2cDevice):
     """One chip, shared by its channels within the process.
 
-    The known state of each channel is cached, so that nothing is sent twice. A failed transfer may
-    have taken partial effect; after one, all channels are in doubt, and the outputs are disabled,
-    if there is a pin for it, until all channels have been rewritten.
+    The state of each channel is cached, so that unchanged widths are not sent again. A failed
+    transfer may have taken partial effect, so after one the state of all channels is unknown, and
+    the outputs are disabled, if there is a pin for it, until all channels have been rewritten.
 
     Attributes:
-        steps: Width of the pulses of each open channel, steps of 1/4096 of the period; None for a
-            channel in doubt.
+        steps: Width of the pulses of each open channel, steps of 1/4096 of the period; None if it
+            is unknown.
         step_us: Width of a step, µs: 4.88 µs at 50 Hz.
     """
 
@@ -143,7 +143,7 @@ class Pca9685(I2cDevice):
                 self._switch(False)  # First, because a hanging bus takes a second to fail.
 
     def leave(self, channel: int) -> None:
-        """Remove a channel; the last one closes the chip."""
+        """Remove a channel; removing the last one closes the chip."""
         self.steps.pop(channel, None)
         if not self.steps:
             self._opened.close()
@@ -243,7 +243,7 @@ _FIRST_ALL_LED: Final = 0xFA
 class SimulatedPca9685(SimulatedChip):
     """PCA9685: 16 PWM channels, which continue when the process that set them has ended.
 
-    Unlike at the chip, channels that were on before a sleep go on after it without a RESTART.
+    Unlike on the real chip, channels that were on before a sleep continue without a RESTART.
     """
 
     def __init__(self) -> None:
@@ -272,7 +272,7 @@ class SimulatedPca9685(SimulatedChip):
 
     def write(self, register: int, data: Sequence[int]) -> None:
         """Write bytes from a register on; without auto-increment all to that register."""
-        # Auto-increment is as MODE1 had it when the transfer began.
+        # Auto-increment is taken from MODE1 at the start of the transfer.
         for at, byte in zip(self._addressed(register, len(data)), data, strict=True):
             if _FIRST_ALL_LED <= at <= _ALL_OFF_H:
                 first = _CHANNEL_0 + at - _FIRST_ALL_LED

@@ -1,4 +1,4 @@
-"""Pins of a Raspberry Pi's header: how a profile writes them, and inputs with interrupts."""
+"""Pins of a Raspberry Pi's header: their notation in profiles, and inputs with interrupts."""
 
 from __future__ import annotations
 

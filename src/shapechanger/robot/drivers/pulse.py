@@ -41,7 +41,7 @@ class PulsedKeys(Keys, frozen=True, kw_only=True):
     """
 
     widths: ClassVar[tuple[str, str, str]]
-    """Keys of the widths at -1, 0 and 1; that at 1 is the smaller one for a turned servo."""
+    """Keys of the widths at -1, 0 and 1; the width at 1 may be smaller than the width at -1."""
 
     over: str
     hz: Annotated[int, Meta(ge=40, le=400)] = 50
@@ -196,7 +196,7 @@ class _PulsedOutput:
 
 
 def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
-    """Return what reads an output's state from its pulses; see `OutputChip.wire`."""
+    """Return a function that reads an output's state from its pulses; see `OutputChip.wire`."""
     keys, stands_still = pulsed_keys(plan), OUTPUTS[plan.driver].drives
     if (pulse_us := PULSES[keys.over].pulse_us) is None:
         has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_us)
@@ -223,11 +223,11 @@ class ServoKeys(PulsedKeys, frozen=True, kw_only=True):
     """Keys of a servo.
 
     Attributes:
-        left_us: Pulse width at -1; larger than `right_us` for one that turns the other way.
+        left_us: Pulse width at -1; larger than `right_us` for a servo that turns the other way.
         centre_us: Pulse width at 0.
         right_us: Pulse width at 1.
         travel_deg_per_s: Largest speed; infinite for no limit. A servo is assumed to turn by 180
-            degrees from end to end; for one that turns by 90, double the speed.
+            degrees from end to end; if yours turns by 90, double the speed.
     """
 
     widths: ClassVar = ("left_us", "centre_us", "right_us")
@@ -280,8 +280,8 @@ class EscKeys(PulsedKeys, frozen=True, kw_only=True):
         neutral_us: Pulse width at rest.
         forward_us: Pulse width at full speed.
         arm_s: Time at neutral before it obeys, s.
-        reverse: "double" for one that brakes at the first pulse backward and reverses at the
-            second, "none" for one without reverse.
+        reverse: "double" if it brakes at the first pulse backward and reverses at the second,
+            "none" if it cannot reverse.
         brake_ms: How long "double" brakes, and then waits at neutral, ms.
     """
 
@@ -355,10 +355,10 @@ _ARM_SHARE: Final = 0.8
 
 
 class SpeedController:
-    """Hobby speed controller: turns the value of its pulses into the motor's.
+    """Hobby speed controller: converts the value of its pulses to the value of the motor.
 
-    With `reverse` "double" the first backward pulses after driving forward brake; only those after
-    another neutral drive backward.
+    With `reverse` "double", the first backward pulses after driving forward brake; backward pulses
+    after another neutral drive backward.
     """
 
     def __init__(self, plan: OutputPlan) -> None:

@@ -1,7 +1,7 @@
 """Simulations of chips: levels of a board's outputs, edges of its inputs, and interfaces.
 
-The simulation of a chip is in the chip's own module, with its driver. It is plain Python over
-`shapechanger.contract.world.World`; a twin's board runs it, and no robot does.
+The simulation of a chip is in the same module as its driver. It is plain Python that uses
+`shapechanger.contract.world.World`, and runs only on a twin's board.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Pulse(NamedTuple):
 
 
 NO_PULSE: Final = Pulse(0.0, 0.0)
-"""None, at no frequency."""
+"""No pulses."""
 
 
 class PwmChannel(NamedTuple):
@@ -58,9 +58,9 @@ class Levels:
 
     Attributes:
         duties: Share of the time at which a pin is high, for each driven pin.
-        pulses: Servo pulses by pin.
-        channels: Pulses by channel of a chip.
-        edges_ns: Time at which a pin last changed between low and high, PWM aside.
+        pulses: Servo pulses, keyed by pin.
+        channels: Pulses, keyed by channel of a chip.
+        edges_ns: Time of the last change of a pin between low and high, ns, without PWM.
     """
 
     duties: dict[int, float] = field(default_factory=dict[int, float])
@@ -94,7 +94,7 @@ class WiredOutput(NamedTuple):
     """State of an output.
 
     Attributes:
-        value: Value from -1 to 1, as its driver takes it; None for a servo or speed controller
+        value: Value from -1 to 1, on the scale of its driver; None for a servo or speed controller
             without pulses or power.
         at_rest: Whether it is in the state after a stop; a motor with any duty above 0 is not.
     """
@@ -107,7 +107,7 @@ class SimulatedChip:
     """A chip at one address of an I2C bus.
 
     Attributes:
-        is_logged: Whether the ledger has what is written to it.
+        is_logged: Whether the ledger records the bytes written to it.
     """
 
     is_logged = True
@@ -118,19 +118,19 @@ class SimulatedChip:
         return ()
 
     def read(self, register: int, length: int) -> list[int]:
-        """Read bytes, the first one of them at a register."""
+        """Read bytes, starting at a register."""
         raise NotImplementedError
 
     def write(self, register: int, data: Sequence[int]) -> None:
-        """Write bytes, the first one at a register; a chip without settings ignores them."""
+        """Write bytes, starting at a register; a chip without settings ignores them."""
 
 
 I2cChips = Mapping[tuple[int, int], SimulatedChip]
-"""Chips by bus and address."""
+"""Chips, keyed by bus and address."""
 
 
 class SimulatedSensor:
-    """A sensor at a twin's board; a kind, made of its plan and the world, overrides what it has.
+    """A sensor at a twin's board; subclasses override the methods that they need.
 
     Attributes:
         chips: Its chips on I2C buses.

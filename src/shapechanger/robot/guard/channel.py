@@ -17,8 +17,8 @@ import msgspec
 MAX_DATAGRAM: Final = 16 * 1024
 """Size of the largest datagram, bytes."""
 
-# A daemon cannot send more between two rounds than its socket holds; this bounds a round all the
-# same, should it send as fast as it is read.
+# Between two rounds, a daemon can send only as much as its socket holds. This also limits a round
+# if it sends as fast as it is read.
 _MOST_ORDERS_A_ROUND: Final = 1024
 
 
@@ -26,9 +26,9 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Request from the daemon to the guard, checked strictly when it is decoded.
 
     Attributes:
-        kind: "command" moves; "halt" takes the newest command back and leaves the robot armed;
-            "arm" lets commands move, and ends an emergency stop; "disarm" ends that; "emergency"
-            stops until armed again; "end" ends the guard.
+        kind: "command" moves; "halt" cancels the newest command and leaves the robot armed; "arm"
+            enables motion, and ends an emergency stop; "disarm" blocks motion; "emergency" stops
+            the robot until it is armed again; "end" ends the guard.
         session: Number of the lease that it belongs to; commands of an older one are refused.
         seq: Number of a command; each is larger than the one before in its session.
         issued_ns: When the daemon received it. Needed for "command" and "arm", which are refused
@@ -36,9 +36,9 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ttl_ms: How long a command acts at most, counted from `issued_ns`.
         frame_ns: When the newest image was taken; None without a camera or an image.
         values: One finite number for each action; JSON has no others.
-        emergency: For "arm": how many emergency stops whoever arms has seen. One that came since
-            is not ended.
-        reason: Why, in words, for "disarm" and "emergency".
+        emergency: For "arm": number of emergency stops that the sender has seen; a newer one stays
+            in force.
+        reason: For "disarm" and "emergency": the reason, for people to read.
         person: For "arm": whether a person arms; only persons end an emergency stop.
     """
 
@@ -55,7 +55,7 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Report from the guard: what it applies and senses.
+    """Report from the guard: applied actions and sensor readings.
 
     Attributes:
         at_ns: Time of the report, ns.
@@ -67,12 +67,12 @@ class GuardState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         applied_session: Session of the underlying command.
         applied_seq: Its sequence number; None while the robot is at rest without a command.
         applied_ns: When it reached the outputs.
-        refused: Why the newest command was refused; empty if none was since the last state.
+        refused: Why the newest command was refused; empty if none was refused since the last state.
         refused_seq: Its number.
         outputs: Value of each output, -1 to 1.
         quantities: Sensor readings in SI units, keyed by name: "speed" m/s signed, "distance" m,
             "bump" 0 or 1, "battery" V, "yaw_rate" rad/s, "acceleration_x" m/s2, "temperature" C,
-            "stall" 0 or 1, "collision" 0 or 1; without those that nothing measures.
+            "stall" 0 or 1, "collision" 0 or 1; without quantities that are not measured.
         sources: Where a quantity comes from: name of a sensor, or "estimated".
         bumps: How many bumps there were since the guard started.
     """
@@ -129,11 +129,11 @@ class _Socket:
         self._socket = socket.socket(fileno=fd)
         self._socket.setblocking(False)
         self._socket.set_inheritable(False)
-        self._dead = select.poll()  # What can be read only once the other process is dead.
+        self._dead = select.poll()  # Descriptors that are readable once the other process is dead.
         self.lost = False
 
     def _look(self) -> None:
-        """Notice whether the other process is alive."""
+        """Update `lost`."""
         if self._dead.poll(0):
             self.lost = True
 
@@ -220,7 +220,7 @@ class Heartbeat(_Socket):
         return self._socket.fileno()
 
     def beat(self) -> None:
-        """Send a beat if one is due, and notice whether the supervisor is alive."""
+        """Send a beat if one is due, and check whether the supervisor is alive."""
         self._look()
         now_ns = time.monotonic_ns()
         if not self.lost and now_ns - self._beaten_ns >= self._period_ns:
@@ -231,7 +231,7 @@ class Heartbeat(_Socket):
     def leave(self) -> int:
         """Stop beating, but keep the socket open until the process exits; return its descriptor.
 
-        The supervisor takes its end as the death of the process: closed too early, it would kill a
-        process that is about to exit by itself.
+        The supervisor treats the end of the stream as the death of the process. If it were closed
+        too early, the supervisor would kill a process that is about to exit by itself.
         """
         return self._socket.detach()

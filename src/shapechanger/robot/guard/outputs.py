@@ -1,4 +1,4 @@
-"""Outputs of a robot: opening, writing, stopping, and what they really do."""
+"""Outputs of a robot: open, write and stop them, and estimate the applied actions."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ class Switches:
                 device.close()
 
 
-# Pulses and duties have steps: a PCA9685's at 50 Hz are 1 % of a servo's range and 5 % of
-# that of a controller whose profile uses a fifth of it.
+# Pulses and duties have steps: at 50 Hz, a step of a PCA9685 is 1 % of a servo's range, and 5 % of
+# the range of a controller whose profile uses a fifth of it.
 _STEP: Final = 0.06
 
 
@@ -73,7 +73,8 @@ def estimated(
 ) -> tuple[tuple[float, ...], str]:
     """Estimate the applied actions of a robot from the values that its outputs have.
 
-    An action whose outputs deviate has the value farthest from rest among the outputs of it alone.
+    If outputs of an action deviate, its value is the one farthest from rest, among the outputs that
+    only this action moves.
 
     Returns:
         One number for each action; and which outputs differ from the decision and why, "" if none.
@@ -193,7 +194,7 @@ class OutputBank:
 
 @contextlib.contextmanager
 def errors_noted(failures: list[str], source: str = "") -> Generator[None]:
-    """Note an error instead of raising it: whatever it is, the next output must rest too."""
+    """Record any error instead of raising it, because the next output must rest too."""
     try:
         yield
     except Exception as error:

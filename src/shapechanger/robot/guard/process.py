@@ -62,7 +62,7 @@ class Guard:
         self._period_ns = round(1e9 / plan.tick_hz)
         now_ns = self._clock.now_ns()
         with contextlib.ExitStack() as undo:
-            # Outputs first: until they are open, their pins keep doing what they did.
+            # Outputs first: until they are open, their pins keep their previous state.
             self._outputs = OutputBank(plan, hardware)
             undo.callback(self._close_outputs)
             self._switches = Switches(plan, hardware)
@@ -102,7 +102,7 @@ class Guard:
             has_something = self._clock.wait(fds, until_ns, _WAIT_S)
             heartbeat.beat()
             if heartbeat.lost:
-                self.ended = "the supervisor is gone"
+                self.ended = "the supervisor has ended"
             elif has_something:
                 until_ns = self.round(self._clock.now_ns())
 
@@ -167,7 +167,7 @@ class Guard:
             text = shortened(malformed[-1])
             self._log.warning("%d datagrams were no orders: %s", self._malformed, text)
         if self._daemon.lost:
-            self._rules.disarm("the daemon is gone.")
+            self._rules.disarm("the daemon has ended.")
 
     def _sense(self, now_ns: int) -> None:
         self._rules.press(self._switches.pressed)
@@ -193,7 +193,7 @@ class Guard:
                 if decision.seq is not None:  # A robot at rest obeys, if slightly later.
                     reason = f"{reason} {text}".strip()
                 decision = replace(decision, actions=actions, stop_reason=reason)
-        except Exception as error:  # Whatever a driver raises, the other outputs must rest.
+        except Exception as error:  # After any error of a driver, the other outputs must rest.
             self._rules.fail(str(error) or type(error).__name__, now_ns)
             return self._recover(decision, now_ns)
         if self._applied != (decision.session, decision.seq):
@@ -239,7 +239,7 @@ class Guard:
             self._log.info("%s", fact)
             self._logged = fact
         sent = self._sent
-        # The next tick would be too late for some of them.
+        # Some outputs need the first attempts sooner than the next tick.
         is_news = (
             sent is None
             or now_ns + self._period_ns - sent.at_ns > _STATE_EVERY_NS
@@ -254,7 +254,7 @@ def main(arguments: Sequence[str]) -> None:
     """Run the guard.
 
     The arguments are `--plan-fd N --daemon-fd N --heartbeat-fd N`, and before them
-    `--after-failure` where processes of this robot failed before it.
+    `--after-failure` if processes of this robot failed before it.
     """
     log = log_to_stderr("guard")
     try:

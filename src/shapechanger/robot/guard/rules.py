@@ -1,8 +1,8 @@
 """Safety rules: whether and how the outputs move, as a function of time.
 
-No pins, sockets or clocks, so that every rule can be tested at any time. The guard process
-(`shapechanger.robot.guard.process`) passes in orders and sensor readings, and writes what
-`Rules.tick` decides.
+The rules use no pins, sockets or clocks, so that they can be tested at any time. The guard process
+(`shapechanger.robot.guard.process`) passes in orders and sensor readings, and writes the decisions
+of `Rules.tick`.
 """
 
 from __future__ import annotations
@@ -67,14 +67,14 @@ class RobotHealth:
 
     @property
     def reason(self) -> str:
-        """Return why nothing may move, or an empty string."""
+        """Return why the robot must not move, or an empty string."""
         return " ".join(filter(None, (*self._others, self._battery)))
 
     def sense(self, sensing: Sensing, now_ns: int) -> None:
         """Update with a new sensing."""
         failing: list[str] = []
         for name, why in sensing.failures.items():
-            if name in sensing.slow:  # Even one without a reflex delays every stop.
+            if name in sensing.slow:  # A slow sensor delays every stop, even without a reflex.
                 failing.append(f"Sensor {name} holds up the robot: {why}")
             elif name in self._protecting:
                 failing.append(f"Sensor {name} fails, and can protect no longer: {why}")
@@ -158,14 +158,14 @@ class OutputDecision:
 class Rules:
     """Safety rules of one robot.
 
-    It starts disarmed. An emergency stop latches until a person who saw it arms.
+    The robot starts disarmed. An emergency stop latches until a person who has seen it arms.
 
     Attributes:
         armed: Whether commands move anything.
         emergency: Whether an emergency stop is in force.
         emergencies: Number of emergency stops.
-        disarmed: Why nothing may move; empty while armed.
-        senses: Newest sensor readings, and what follows from them.
+        disarmed: Why the robot must not move; empty while armed.
+        senses: Newest sensor readings, and quantities derived from them.
     """
 
     def __init__(self, plan: GuardPlan, now_ns: int) -> None:
@@ -273,7 +273,7 @@ class Rules:
         self.senses = sensing
 
     def tick(self, now_ns: int) -> OutputDecision:
-        """Decide what the outputs do from now on."""
+        """Return the decision on the outputs from now on."""
         # A pause of the process must not cause a jump.
         elapsed_ns = min(now_ns - self._ticked_ns, 2 * self._period_ns)
         self._ticked_ns = now_ns
@@ -312,8 +312,8 @@ class Rules:
     def _offer_command(self, order: Order, now_ns: int) -> str:
         """Accept a command, or return why it is refused.
 
-        Older ones are refused even after a command that was refused itself, because their sender
-        has superseded them.
+        Older commands than the newest one are refused even if that was refused, because their
+        sender has superseded them.
         """
         limit_ms = min(self._plan.limits.deadline_ms, order.ttl_ms)
         expiry_ns = min(order.issued_ns, now_ns) + limit_ms * _NS_PER_MS
@@ -340,7 +340,7 @@ class Rules:
 
     def _arm(self, order: Order, now_ns: int) -> str:
         age_ns = now_ns - order.issued_ns
-        seen = f"there were {self.emergencies} emergency stops, and whoever armed has seen "
+        seen = f"there were {self.emergencies} emergency stops, and the sender has seen "
         refusals = (
             (self._is_pressed, "the emergency button is pressed."),
             (age_ns >= _ARM_WITHIN_NS, f"the order to arm is {age_ns / 1e9:.1f} s old."),

@@ -1,4 +1,4 @@
-"""How the processes of a robot run: the plan that they inherit, their log and their priority.
+"""Plan, log and priority of the processes of a robot.
 
 The command line checks a profile once, turns it into a `ServePlan` and starts the supervisor with
 it. Guard and supervisor log one line per event on standard error. The reader may be stalled, such
@@ -35,15 +35,15 @@ class ServePlan:
     """Everything that supervisor, guard and daemon need.
 
     Attributes:
-        guard: What the guard needs.
+        guard: Plan of the guard.
         daemon: Fields of the `DaemonPlan`, which the guard does not import.
         hardware: Factory of the hardware and its argument; see
             `shapechanger.robot.hardware.connect`.
         python: The interpreter that runs the processes.
         patience_ms: Lower bound on the silence after which guard and daemon are killed, ms; their
             own limits apply if those are longer. 0 on a robot, and on a twin in real time, whose
-            guard beats while its board is held up. A twin's clock waits for a busy machine, and is
-            paused while a world is drawn; a guard that waits for it is alive.
+            guard sends heartbeats while its board is delayed. The clock of other twins is paused
+            while the machine is busy or a world is drawn, and a guard that waits for it is alive.
     """
 
     guard: GuardPlan
@@ -134,7 +134,7 @@ class _Lines(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         try:
             text = self.format(record)
-        except Exception as error:  # An argument's own, when it is printed.
+        except Exception as error:  # Formatting an argument may raise anything.
             text = f"A line of {record.filename}:{record.lineno} fails: {type(error).__name__}."
         if self._lost:
             text = f"{text} ({self._lost} lines before it were lost.)"
@@ -153,7 +153,7 @@ class _Lines(logging.Handler):
 
 
 def log_to_stderr(program: str, name: str | None = None) -> logging.Logger:
-    """Return the log `name`, or of the program, whose name begins each line."""
+    """Return the log of `name`, or else of the program; the name begins each line."""
     logging.raiseExceptions = False  # An unprintable message must not stop the guard.
     # Without standard error, its number may belong to any file.
     handler = logging.NullHandler() if sys.__stderr__ is None else _Lines(_STDERR)

@@ -14,8 +14,8 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SENSORS, SensorDriver
 from shapechanger.robot.hardware import Hardware
 
-# Larger is more cautious, and the most cautious reading wins: of two speeds the smaller, so that a
-# turning track does not hide a stalled one. Of other quantities the last reading wins.
+# Larger values are more cautious, and the most cautious reading is used: the smaller of two speeds,
+# so that a turning track does not hide a stalled one. Otherwise the last reading is used.
 _CAUTION: Final[dict[str, Callable[[float], float]]] = {
     "bump": operator.pos,
     "collision": operator.pos,
@@ -60,8 +60,7 @@ class Sensing:
     def conclude(self, *, speed: float | None, stalled: bool | None) -> None:
         """Add the quantities that follow from the readings.
 
-        `speed` is the estimated speed, m/s, and `stalled` is None where nothing watches for a
-        stall.
+        `speed` is the estimated speed, m/s, and `stalled` is None if stalls are not detected.
         """
         quantities, sources = self.quantities, self.sources
         if stalled is not None:
@@ -69,14 +68,14 @@ class Sensing:
         if "speed" not in quantities and speed is not None:
             quantities["speed"], sources["speed"] = speed, _ESTIMATED
         signs = [name for name in ("bump", "stall") if name in quantities]
-        if signs:  # A collision shows in a bumper, or else in a stall.
+        if signs:  # A collision is detected by a bumper, or else by a stall.
             sign = next((name for name in signs if quantities[name] > 0.0), signs[0])
             quantities["collision"] = float(quantities[sign] > 0.0)
             sources["collision"] = _ESTIMATED if sign == "stall" else sources[sign]
 
 
 _MOST_READ_NS: Final = 20_000_000
-"""Longest response time of a sensor, ns; no stop can happen meanwhile."""
+"""Longest response time of a sensor, ns; it delays all stops."""
 
 
 class Sensors:

@@ -42,10 +42,10 @@ from shapechanger.robot.hardware import connect
 class Child:
     """A child process with a heartbeat.
 
-    The process gets one end of a pair of sockets as `--heartbeat-fd`. When the supervisor dies,
-    however it dies, the kernel closes the other end, and the process ends itself. This is why there
-    is no PR_SET_PDEATHSIG here: a signal would kill the guard at once, whereas the end of the
-    stream lets it put its pins to rest.
+    The process gets one end of a pair of sockets as `--heartbeat-fd`. When the supervisor dies for
+    any reason, the kernel closes the other end, and the process ends itself. PR_SET_PDEATHSIG is
+    not used, because a signal would kill the guard at once, whereas the end of the stream lets it
+    put its pins to rest.
 
     Attributes:
         name: Name of the process.
@@ -90,7 +90,7 @@ class Child:
         try:
             beats = self._heart.recv(1 << 16)
         except BlockingIOError:
-            pass  # There was none since the last look.
+            pass  # There was no heartbeat since the last check.
         except ConnectionResetError:
             beats = b""
         if beats:
@@ -158,13 +158,13 @@ _FAILED_TOO_OFTEN: Final = 1
 _CANNOT_START: Final = 2
 _NOT_SAFE: Final = 3
 
-# To the first heartbeat: a Pi Zero takes several seconds to load the daemon.
+# Time to the first heartbeat: a Pi Zero takes several seconds to load the daemon.
 _START_S: Final = 30.0
-_END_S: Final = 1.0  # For a process to exit after SIGTERM.
-_REAP_S: Final = 0.05  # For a killed process to disappear; the pins wait no longer.
-_AGAIN_S: Final = 0.1  # Between attempts to put the outputs to rest.
-_UNSAFE_S: Final = 5.0  # For such attempts when there is nothing else to wait for.
-_CHECK_S: Final = 0.02  # Between checks of the heartbeats.
+_END_S: Final = 1.0  # Time for a process to exit after SIGTERM.
+_REAP_S: Final = 0.05  # Longest wait for a killed process before the outputs are put to rest.
+_AGAIN_S: Final = 0.1  # Time between attempts to put the outputs to rest.
+_UNSAFE_S: Final = 5.0  # Time limit for such attempts when the supervisor is to end.
+_CHECK_S: Final = 0.02  # Time between checks of the heartbeats.
 # A longer gap between checks means that the supervisor itself did not run.
 _PAUSE_NS: Final = 100_000_000
 
@@ -191,7 +191,7 @@ class Supervisor:
         preload(self._plan.guard, self._plan.hardware[0])
         signal.set_wakeup_fd(self._waker.fileno(), warn_on_full_buffer=False)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-            if signal.getsignal(number) != signal.SIG_IGN:  # As `nohup` has it.
+            if signal.getsignal(number) != signal.SIG_IGN:  # `nohup` ignores SIGHUP.
                 signal.signal(number, self._end)
         run_promptly(SUPERVISOR)
         after_failure: tuple[str, ...] = ()
@@ -205,7 +205,7 @@ class Supervisor:
                     self._log.critical("gives up: %s, and not all outputs are at rest.", why)
                     return _NOT_SAFE
                 if not self._restarts.may_restart(time.monotonic_ns()):
-                    self._log.critical("gives up: %s, once too often.", why)
+                    self._log.critical("gives up after too many failures: %s.", why)
                     return _FAILED_TOO_OFTEN
                 self._log.warning("%s; both start afresh, and the robot is not armed.", why)
                 self._pause(self._restarts.pause_s)
@@ -261,7 +261,7 @@ class Supervisor:
             for child, limit_ns in silence_ns.items():
                 child.beaten_ns += paused_ns
                 if child.is_gone(now_ns):
-                    return f"the {child.name} is gone"
+                    return f"the {child.name} has ended"
                 if not child.has_beaten:
                     limit_ns = round(_START_S * 1e9)
                 if now_ns - child.beaten_ns >= limit_ns:
@@ -276,7 +276,7 @@ class Supervisor:
             if guard.code == 0:
                 self._end_reason = self._end_reason or "the guard was ended"
         elif not guard.killed:
-            # A guard that does not exit may hold the outputs anywhere, so the time is short.
+            # A guard that does not exit may leave the outputs at any value, so the time is short.
             guard.end(self._plan.guard_silence_ms / 1e3, _REAP_S)
         self._has_guarded = self._has_guarded or guard.has_beaten
         daemon.terminate()
@@ -285,7 +285,7 @@ class Supervisor:
         else:
             self._secure(guard)
         daemon.end(_END_S, _END_S)
-        try:  # So that no client connects to the old port.
+        try:  # Removed, so that no client connects to the old port.
             if ready_file := self._plan.daemon.get("ready_file"):
                 Path(ready_file).unlink(missing_ok=True)
         except OSError as error:
@@ -305,13 +305,13 @@ class Supervisor:
         started_ns = time.monotonic_ns()
         until_ns: int | None = None
         while True:
-            has_ended = guard.has_ended()  # First, so that its last write cannot come afterwards.
+            has_ended = guard.has_ended()  # Checked first: it may still write until it has ended.
             self._make_safe()
             now_ns = time.monotonic_ns()
             if self._is_safe and has_ended:
                 took_ms = (now_ns - started_ns) / 1e6
                 self._log.warning(
-                    "the guard left; all outputs are at rest, after %.1f ms.", took_ms
+                    "the guard has exited; all outputs are at rest, after %.1f ms.", took_ms
                 )
                 return
             if self._is_safe:

@@ -1,4 +1,4 @@
-"""Network addresses of robots, as people write them."""
+"""Parse the network addresses of robots that people write."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def address_here(host: str, port: int) -> Address:
 
 def cannot_listen(host: str, port: int, error: OSError) -> RobotError:
     """Return the error of a robot that cannot be served at an address."""
-    # Python adds the address to the text of the system; the numbers of the resolver are negative.
+    # Python adds the address to the text of the system; error numbers of the resolver are negative.
     why = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
     return RobotError(f"Cannot listen at {host} port {port}: {why}. Is the robot served already?")
 

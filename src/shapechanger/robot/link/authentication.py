@@ -18,7 +18,7 @@ from shapechanger.errors import LinkError, translate_errors
 
 _KEY_BYTES: Final = 16  # 128 bits, which cannot be guessed.
 _KEY_CHARACTERS: Final = 26  # 16 bytes in base 32 (RFC 4648) without padding.
-_PURPOSE: Final = b"shapechanger link 1"  # Keeps proofs apart from other uses of the key.
+_PURPOSE: Final = b"shapechanger link 1"  # Separates proofs from other uses of the key.
 
 # Characters outside base 32 that people write by mistake, and separators.
 _MISREAD: Final = str.maketrans({"0": "O", "1": "I", "8": "B", "-": "", " ": "", "\n": ""})
@@ -69,12 +69,12 @@ def make_proof(key: bytes, nonce: bytes, certificate: bytes, role: str) -> bytes
     """
     digest = hmac.new(key, digestmod="sha256")
     for part in (_PURPOSE, nonce, certificate, role.encode()):
-        digest.update(len(part).to_bytes(4, "big") + part)  # Lengths keep the parts apart.
+        digest.update(len(part).to_bytes(4, "big") + part)  # Lengths make the parts unambiguous.
     return digest.digest()
 
 
 def is_proof(proof: bytes, key: bytes, nonce: bytes, certificate: bytes, role: str) -> bool:
-    """Return True if a proof equals `make_proof`, in a time that does not depend on the answer."""
+    """Return True if a proof equals `make_proof`, by a comparison in constant time."""
     return hmac.compare_digest(proof, make_proof(key, nonce, certificate, role))
 
 

@@ -19,9 +19,9 @@ class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
         robot: Name of the robot.
         body: Kind of robot, such as "car".
         action_layout: JSON of the `Layout` of `Command.values`.
-        state_layout: JSON of the `Layout` of `Observation.state`. A feature takes the value of the
-            guard's quantity of the same name, "NAME/applied" that of the applied action NAME, and
-            NaN if no sensor measures it.
+        state_layout: JSON of the `Layout` of `Observation.state`. A feature has the value of the
+            guard's quantity of the same name, or of the applied action NAME for "NAME/applied"; NaN
+            if it is not measured.
         image_size: Width and height of the frames, pixels; None without a camera.
         camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if the
             profile does not state it.
@@ -72,7 +72,7 @@ def card_of(
 
     Args:
         profile: The robot.
-        arming: Who may arm it, instead of the profile's; "" for the profile's.
+        arming: Who may arm it; "" for the setting of the profile.
         clock: Source of its time.
         pictures: Whether its camera is used.
     """
@@ -95,5 +95,5 @@ def card_of(
 
 
 def _limit(slew_per_s: float) -> float:
-    """Return a slew as JSON can hold it: 0 for no limit."""
+    """Return a slew for JSON, which has no infinity: 0 for no limit."""
     return slew_per_s if math.isfinite(slew_per_s) else 0.0

@@ -1,6 +1,6 @@
 """Messages between a client and a robot, each one binary WebSocket message; see `docs/wire.md`.
 
-A message is a msgpack map with its type under `kind`; JPEG bytes are sent as they are. Unknown
+A message is a msgpack map with its type under `kind`; JPEG bytes are embedded unchanged. Unknown
 keys are ignored, so that newer minor versions stay readable; unknown types are refused. Times are
 nanoseconds of the robot's monotonic clock. Clocks of two machines are never subtracted: the age of
 a command is the time since the robot sent the observation that it answers.
@@ -27,13 +27,13 @@ MAX_ROBOT_MESSAGE: Final = 4 * 1024 * 1024
 """Largest message that a client reads, bytes."""
 
 MAX_PIECE: Final = 256 * 1024
-"""Approximate size of a `Piece`, bytes, to keep observations from waiting on a slow radio."""
+"""Approximate size of a `Piece`, bytes, so that it does not delay observations on a slow radio."""
 
 MAX_EPISODES: Final = 200
 """Most episodes in one `Recordings`; `Browse.before` asks for older ones."""
 
 Role = Literal["person", "program"]
-"""Kind of client. A person takes control from a program at once, never the other way round."""
+"""Kind of client. A person can take control from a program at once, but not the reverse."""
 
 Pace = Literal["realtime", "lockstep"]
 """Pace: both sides follow their clocks, or the robot waits for a command and answers with the
@@ -55,7 +55,7 @@ class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_
     """A message of either side."""
 
     def __repr__(self) -> str:
-        """Show only the number of bytes: frames and proofs do not belong in a log."""
+        """Show only the number of bytes, to keep frames and proofs out of logs."""
         fields = (
             f"{name}=<{len(value)} bytes>" if isinstance(value, bytes) else f"{name}={value!r}"
             for name, value in msgspec.structs.asdict(self).items()
@@ -204,7 +204,7 @@ class Browse(ClientMessage, frozen=True):
 
 
 class Fetch(ClientMessage, frozen=True):
-    """Request for a `Piece` of an episode; until it has been sent, further questions are refused.
+    """Request for a `Piece` of an episode; until it has been sent, further requests are refused.
 
     Attributes:
         episode: Id of the episode.
@@ -218,7 +218,7 @@ class Fetch(ClientMessage, frozen=True):
 
 
 class Judge(ClientMessage, frozen=True):
-    """Judgement by a person that steps are bad, or good after all; answered by `Recordings`.
+    """Decision of a person to drop or keep steps for training; answered by `Recordings`.
 
     Attributes:
         episode: Id of the episode, which must not be the one being recorded.
@@ -237,7 +237,8 @@ class RunPolicy(ClientMessage, frozen=True):
     """Start of a policy on board, instead of the running one; only from a person.
 
     Answered by `PolicyState` to all clients, or by `Refused`. The policy is a separate client, a
-    program: it waits until nobody has control, takes it, and drives once a person arms the robot.
+    program: it waits until no client has control, takes it, and drives once a person arms the
+    robot.
 
     Attributes:
         policy: Name of the policy, one of `PolicyState.names`; "" to end the one that runs.
@@ -445,8 +446,8 @@ class Piece(RobotMessage, frozen=True):
         total: Number of complete lines in `steps.jsonl` now.
         lines: Lines from `first` on, without line ends; fewer than requested at the end of the
             file, and if they would make the message too large.
-        frames: JPEG that the `frame` of each line names; None without a frame, or to repeat the
-            line before.
+        frames: JPEG of each line's `frame`; None without a frame, or if it is the same as in the
+            previous line.
         header: Text of `episode.json` now.
     """
 
@@ -462,9 +463,9 @@ class PolicyState(RobotMessage, frozen=True):
     """The policies on board, sent to a new client and at each change.
 
     Attributes:
-        names: Names of those that can be started.
-        running: Name of the one that runs; "" for none.
-        text: What it does, or why the last one ended, a sentence; "" for nothing to say.
+        names: Names of the policies that can be started.
+        running: Name of the running policy; "" for none.
+        text: A sentence on its state, or why the last policy ended; may be empty.
     """
 
     names: tuple[str, ...]
@@ -490,7 +491,7 @@ _OF_A_CLIENT: Final = msgspec.msgpack.Decoder(Union[*ClientMessage.__subclasses_
 _OF_A_ROBOT: Final = msgspec.msgpack.Decoder(Union[*RobotMessage.__subclasses__()])
 
 decode_client_message: Final = partial(_decoded, _OF_A_CLIENT, MAX_CLIENT_MESSAGE)
-"""Decode the bytes of a client's message; raise `LinkError` for any others."""
+"""Decode a message of a client; raise `LinkError` for other bytes."""
 
 decode_robot_message: Final = partial(_decoded, _OF_A_ROBOT, MAX_ROBOT_MESSAGE)
-"""Decode the bytes of a robot's message; raise `LinkError` for any others."""
+"""Decode a message of a robot; raise `LinkError` for other bytes."""

@@ -70,7 +70,8 @@ def profile_text(path: str | os.PathLike[str]) -> str:
     try:
         with path.open("rb") as file:
             data = file.read(_LARGEST + 1)
-        # Like tomllib for files; Windows editors may prepend a byte-order mark.
+        # Newlines are converted as in `tomllib.load`; Windows editors may prepend a byte-order
+        # mark.
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as error:
         raise ProfileError(f"There is no file {path}{_instead_of(path)}.") from error
@@ -155,11 +156,11 @@ def write_profile(
 def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile:
     """Change values, or add keys to existing tables, atomically.
 
-    Comments, order and blank lines stay.
+    Comments, order and blank lines are kept.
 
     Args:
         path: The file; a symbolic link is followed.
-        changes: New values by dotted name, such as `output.steering.centre_us`.
+        changes: New values, keyed by dotted name, such as `output.steering.centre_us`.
 
     Returns:
         The profile after the change.

@@ -62,9 +62,9 @@ def _state_features(plan: GuardPlan) -> list[Feature]:
 
 
 def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]:
-    """Return the span and its unit of each action that alone moves one tendon.
+    """Return span and unit of each action that moves exactly one tendon.
 
-    From 0 to 1 a tension rises by so many N, or a length falls by so many m.
+    The span is the rise of the tension, N, or the fall of the length, m, from 0 to 1.
     """
     moved = [name for output in outputs for name in output.mix]
     spans: dict[str, tuple[float, str]] = {}
@@ -109,12 +109,11 @@ class RobotTable:
         name: Name of the robot.
         body: Kind of robot, such as "car".
         control_hz: Expected rate of commands, Hz.
-        calibrated: Date of the calibration, which `shapechanger robot calibrate` writes; None if it
-            never was.
-        turn_deg_per_m: Turn for each metre at full steering, degrees, which policies of waypoints
-            need on board: a car's; None if not measured.
-        turn_deg_per_s: Turn for each second at full steering, degrees, of vehicles that turn in
-            place: a tank's; None if not measured.
+        calibrated: Date of the last `shapechanger robot calibrate`; None if there was none.
+        turn_deg_per_m: Turn for each metre at full steering, degrees, such as of a car; None if
+            not measured. Policies with waypoints need it on board.
+        turn_deg_per_s: Turn for each second at full steering, degrees, for vehicles that turn in
+            place, such as a tank; None if not measured.
     """
 
     name: Text
@@ -131,7 +130,7 @@ class CommandTable:
 
     Attributes:
         max_observation_age_ms: Largest age of the observation that a command answers, ms.
-        arming: Who may arm it: a person alone, or anyone, such as a program.
+        arming: Who may arm it: only a person, or anyone, including programs.
     """
 
     max_observation_age_ms: Annotated[int, Meta(ge=20, le=5000)] = 400
@@ -140,7 +139,7 @@ class CommandTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Profile(GuardPlan, RobotTable, CommandTable):
-    """A robot: what it moves and senses, its caps, and when it stops.
+    """A robot: actions, outputs, sensors, limits, camera and reward.
 
     Attributes:
         path: The file that it was read from.
@@ -164,7 +163,7 @@ class Profile(GuardPlan, RobotTable, CommandTable):
         return math.radians(self.turn_deg_per_m or 0.0), math.radians(self.turn_deg_per_s or 0.0)
 
     def guard_plan(self) -> GuardPlan:
-        """Return only what the guard needs."""
+        """Return the plan of the guard, without other settings."""
         return GuardPlan(**{field.name: getattr(self, field.name) for field in fields(GuardPlan)})
 
     def action_layout(self) -> Layout:

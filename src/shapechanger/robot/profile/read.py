@@ -103,7 +103,7 @@ DRIVERS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
 """Chips that a key of a table chooses from; their keys are keys of the table."""
 
 GIVEN: Final = ("name", "measures", "settings", "rows")
-"""Fields of `TABLES` and of chips that are no keys of a table, but follow from it."""
+"""Fields of `TABLES` and of chips that are derived instead of being keys of a table."""
 
 
 def read_profile(text: str, path: Path) -> Profile:
@@ -183,7 +183,7 @@ def _read_action(table: Table) -> ActionPlan:
 
 
 def _read_sensor(table: Table) -> SensorPlan:
-    """Read one sensor; one with a table for each joint has these as its rows."""
+    """Read one sensor; tables for its joints become its rows."""
     name, chip = table.place[-1], SENSORS[table.chosen("driver", SENSORS)]
     given: dict[str, Any] = {"name": name, "measures": chip.measures}
     if chip.rows is not None:

@@ -1,7 +1,7 @@
 """Rules between the tables of a profile: pins, mixes, stops, limits and the servo bus.
 
-Each returns the profile, completed by what follows from several tables, or raises a `ProfileError`
-with the line and one sentence.
+Each rule returns the profile, with fields that depend on several tables filled in, or raises a
+`ProfileError` with the line and one sentence.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def check_claims(root: Table, profile: Profile) -> Profile:
 
 
 def share_boards(root: Table, profile: Profile) -> Profile:
-    """Give outputs the frequency and the enable pin that a PCA9685 has once."""
+    """Set the frequency and the enable pin of a PCA9685 for all of its outputs."""
     boards: dict[tuple[int, ...], dict[str, Any]] = {}
     for output in profile.outputs:
         for name in ("hz", "output_enable") if (board := _board(output)) else ():
@@ -69,7 +69,7 @@ _NEARLY_ZERO: Final = 1e-9
 
 
 def check_mix(root: Table, profile: Profile) -> Profile:
-    """Refuse outputs and actions without a connection, and a rest that drives."""
+    """Refuse outputs and actions without a connection, and outputs that drive at rest."""
     rests = {action.name: action.rest for action in profile.actions}
     for output in profile.outputs:
         table = root.table("output", output.name)
@@ -150,7 +150,7 @@ def check_limits(root: Table, profile: Profile) -> Profile:
     return replace(profile, limits=replace(limits, camera_stale_ms=stale_ms))
 
 
-# Time in which servos start whose power comes with the guard, s.
+# Boot time of servos that the guard powers, s.
 _START_S: Final = 0.5
 
 
@@ -171,7 +171,7 @@ def join_servo_bus(root: Table, profile: Profile) -> Profile:
         second = (sensor.name for sensor in sensing[1:2])
         raise root.error(f"{text}reports their failures", "sensor", *second)
     if profile.stop.then != "release":
-        text = 'must be "release", so that no servo pulls while nobody commands'
+        text = 'must be "release", so that no servo pulls without a command'
         raise root.table("stop").refused("then", text)
     (bus,) = on_bus.decode(ServoBusKeys)
     settings = bus.settings()

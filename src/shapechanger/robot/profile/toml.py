@@ -1,4 +1,4 @@
-"""Tables of a TOML file, decoded by msgspec; every mistake names its line and the way out."""
+"""Tables of a TOML file, decoded by msgspec; errors name the line and suggest a remedy."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def line_of(text: str, place: Place) -> int:
     lines = text.split("\n")
 
     def depth(count: int) -> int:
-        """Return how much of the place is in the first lines, with all of their last statement."""
+        """Return how many parts of `place` the first lines have, with all of the last statement."""
         while True:
             with suppress(tomllib.TOMLDecodeError):
                 data: Any = tomllib.loads("\n".join(lines[:count]))
@@ -78,7 +78,7 @@ def shown(value: Any) -> str:
     return "a number too large to write"
 
 
-_MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
+_MOST_NAMED: Final = 64  # Limit of the messages, see `shapechanger.robot.link.messages`.
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 _PATH: Final = re.compile(r" - at `\$\.(\w+)")
 
@@ -129,7 +129,7 @@ class Table:
 
     Attributes:
         path: The file.
-        text: All of its content.
+        text: The whole text of the file.
         place: Path of the table.
         keys: Its keys and nested tables; anything else is refused.
         decoded: All tables of the file that were decoded so far, with their `Keys`.
@@ -142,7 +142,7 @@ class Table:
     decoded: list[tuple[Table, Keys]] = field(default_factory=list["tuple[Table, Keys]"])
 
     def __post_init__(self) -> None:
-        """Refuse a value that is no table."""
+        """Refuse a value that is not a table."""
         if not isinstance(cast("Any", self.keys), dict):
             raise self.refused("", f"must be a table, not {shown(self.keys)}")
 
@@ -174,7 +174,7 @@ class Table:
         return replace(self, place=(*self.place, *names), keys=keys)
 
     def named(self) -> dict[str, Table]:
-        """Return the nested tables keyed by name; refuse names that no part may have."""
+        """Return the nested tables, keyed by name; refuse invalid names."""
         if len(self.keys) > _MOST_NAMED:
             text = f"must have at most {_MOST_NAMED} tables, not {len(self.keys)}"
             raise self.refused("", text)
@@ -185,7 +185,7 @@ class Table:
         return {name: self.table(name) for name in self.keys}
 
     def chosen(self, key: str, names: Iterable[str]) -> str:
-        """Return the value of a key that is one of some names."""
+        """Return the value of a key that must be one of some names."""
         kind = inspect.LiteralType(tuple(names))
         if self.keys.get(key) not in kind.values:
             raise self._unfit(key, kind)
@@ -201,7 +201,7 @@ class Table:
 
         Args:
             kinds: Structs and dataclasses.
-            given: Fields that are no keys of the table.
+            given: Fields that are not keys of the table.
             drivers: Chips that a key of the table chooses from, keyed by this key: an unknown key
                 may belong to another one.
         """

@@ -1,1 +1,1 @@
-"""Setup of a robot: checks, calibration, zeros of joints and tendons, and the systemd unit."""
+"""Setup of a robot: calibration, zeros of joints and tendons, and the systemd unit."""

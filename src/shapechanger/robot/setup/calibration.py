@@ -21,7 +21,7 @@ from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.hardware import Hardware
 
 # A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
-# full range of standard servos, and 900 to 2100 us as what most of them reach.
+# full range of standard servos, and 900 to 2100 us as the range that most of them reach.
 _WIDEST_US: Final = (600, 2400)
 
 
@@ -40,7 +40,7 @@ def reading(output: OutputPlan, value: float) -> str:
 
 
 def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
-    """Return the changes for an output that was jogged, whole microseconds by dotted name.
+    """Return the changes for an output that was jogged, whole microseconds keyed by dotted name.
 
     `found` has the values of its low end, middle and high end, -1 to 1.
     """
@@ -57,7 +57,7 @@ def pulse_changes(output: OutputPlan, found: Sequence[float]) -> dict[str, int]:
 def motor_changes(
     output: OutputPlan, went: Literal["forward", "backward"], starts_at: float
 ) -> dict[str, Any]:
-    """Return the changes for a motor, by dotted name.
+    """Return the changes for a motor, keyed by dotted name.
 
     At a forward command it turned in the direction `went`, from a duty of `starts_at`, 0 to 1.
     """
@@ -85,7 +85,7 @@ def wheel_changes(sensor: str, wheel_m: float, measured_m: float) -> dict[str, f
     return {f"sensor.{sensor}.wheel_m": round(wheel_m / measured_m, 4)}
 
 
-_START_TICKS: Final = 50  # Half a second, in which servos start that get their power now.
+_START_TICKS: Final = 50  # Half a second: boot time of servos that were just powered.
 _READINGS: Final = 50  # Half a second; single readings differ by a count or two.
 # Chosen: half a percent of the longest excursion of a finger's tendon.
 _STILL_M: Final = 0.2e-3
@@ -105,14 +105,14 @@ def find_joint_zeros(
         wait: Waits for about 10 ms.
 
     Returns:
-        Counts of each encoder, 0 to 4095, by sensor and joint, such as `joints.MCP_flexion`.
+        Counts of each encoder, 0 to 4095, keyed by sensor and joint, such as `joints.MCP_flexion`.
     """
     zeros: dict[str, int] = {}
     counts_per_rad = COUNTS_PER_TURN / (2.0 * math.pi)
     for sensor in (one for one in plan.sensors if one.driver == "as5600"):
         with closing(As5600(sensor, hardware)) as opened:
             for joint in opened.joints:
-                # The mean direction: the mean of counts around 0 would be half a turn.
+                # The mean direction, because the mean of counts around 0 would be half a turn.
                 mean = 0j
                 for _ in range(_READINGS):
                     mean += cmath.exp(1j * opened.counts(joint) / counts_per_rad)
@@ -125,7 +125,7 @@ def find_joint_zeros(
 def require_homing(settings: BusSettings) -> None:
     """Refuse a homing tension below the gears' measured friction.
 
-    Its servo would stand still at once, with its tendon slack.
+    The servo would stop immediately, with a slack tendon.
     """
     for servo in settings.servos:
         pull, friction = servo.homing_n, servo.known.friction_nm / servo.spool_radius_m
@@ -137,13 +137,13 @@ def require_homing(settings: BusSettings) -> None:
 
 
 def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
-    """Pull all tendons of a held bus until nothing moves, so that they hold a known posture.
+    """Pull all tendons of a held bus until all servos stand still, in a known posture.
 
     Slack tendons are taken up meanwhile.
 
     Args:
         bus: The bus.
-        cycle: Sends what its servos are requested to pull, runs a cycle, and returns its time, ns.
+        cycle: Sends the requested tensions, runs a cycle, and returns its time, ns.
 
     Returns:
         Position of each servo at the zero of its tendon, in counts, keyed by name.
@@ -168,7 +168,7 @@ def home(bus: ServoBus, cycle: Callable[[], int]) -> dict[str, int]:
             servo, at = one.settings, one.position
             wound_m = (starts.setdefault(name, at) - at) * servo.metre_per_count
             if wound_m > _TRAVEL_M:
-                reason = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
+                reason = f"it was wound in by {1e3 * wound_m:.0f} mm without resistance"
                 raise RobotError(f"{servo.label} has no zero: {reason}. Its tendon has come off.")
             was_at, _ = moved.setdefault(name, (at, now_ns))
             if abs((at - was_at) * servo.metre_per_count) > _STILL_M:
@@ -188,7 +188,7 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
     A person holds the finger straight, and no other process may have the bus open.
 
     Returns:
-        Position of each servo, counts, by the name of its output.
+        Position of each servo, counts, keyed by the name of its output.
     """
     outputs = [output for output in plan.outputs if output.driver == DRIVER]
     if not outputs:

@@ -1,7 +1,7 @@
-"""Put a robot in place on a Raspberry Pi: its service, its user's groups and its interfaces.
+"""Install a robot on a Raspberry Pi: its service, its user's groups and its interfaces.
 
-Every change is checked first, so a second run changes nothing, and afterwards, so that a command
-without an effect is reported. Commands run as root, by one function that tests replace.
+Every change is checked before, so a second run has no effect, and afterwards, so that commands
+without an effect are reported. Commands run as root, by one function that tests replace.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _LATENCY: Final = (
     'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"\n'
 )
 _MODULES: Final = "etc/modules-load.d/i2c-dev.conf"
-# Overlays of Raspberry Pi's cameras, for those that are not detected.
+# Overlays of Raspberry Pi cameras, needed if a camera is not detected.
 _CAMERAS: Final = ("dtoverlay.imx", "dtoverlay.ov5647", "dtoverlay.ov9281")
 
 
@@ -91,7 +91,7 @@ def unit_word(text: str) -> str:
 def write_unit(
     robot: str, profile: Path, credentials: Path | None = None, user: str = ""
 ) -> tuple[Path, bool]:
-    """Write the unit next to a profile, and return it and whether it is new; an old one stays.
+    """Write the unit next to a profile unless it exists; return it and whether it is new.
 
     Args:
         robot: Name of the robot.
@@ -110,7 +110,7 @@ def write_unit(
         "OPTIONS": options,
     }
     template = (Path(__file__).parent / "robot.service").read_text(encoding="utf-8")
-    # At once, because a path may hold what looks like another placeholder.
+    # In one pass, because a path may contain the text of another placeholder.
     text = re.sub("@([A-Z]+)@", lambda match: values[match[1]], template)
     with translate_errors(OSError, to=partial(cannot_write, path)), suppress(FileExistsError):
         write_new(path, text.encode())
@@ -125,7 +125,7 @@ class RootCommand(NamedTuple):
     text: str = ""
 
     def __str__(self) -> str:
-        """Return it as a person types it."""
+        """Return the command for a shell."""
         typed = f"sudo {shlex.join(self.arguments)}"
         quoted = shlex.quote(self.text.replace("\\", "\\\\").replace("\n", "\\n"))
         return f"printf '%b' {quoted} | {typed}" if self.text else typed
@@ -147,7 +147,7 @@ def run_as_root(command: RootCommand) -> str:
 
 
 def _root(command: str, *more: object, text: str = "") -> RootCommand:
-    """Return a command of some words and of arguments that may have blanks, with its input."""
+    """Return a command from words and from arguments that may have blanks, with its input."""
     return RootCommand((*command.split(), *map(str, more)), text)
 
 
@@ -197,7 +197,7 @@ class Machine:
         return found
 
     def sets(self, parameter: str) -> bool:
-        """Return whether it switches a parameter of the device tree on, such as "i2c"."""
+        """Return whether config.txt enables a parameter of the device tree, such as "i2c"."""
         return self.settings().get(f"dtparam.{parameter}") in {"on", "1", "true", "yes"}
 
     def finds_camera(self) -> bool:
@@ -206,7 +206,7 @@ class Machine:
         return found.get("camera_auto_detect") == "1" or any(k.startswith(_CAMERAS) for k in found)
 
     def i2c_hz(self) -> int:
-        """Return the speed of the I2C bus that it sets, bits per second; 0 without one."""
+        """Return the speed of the I2C bus in config.txt, bits per second; 0 without one."""
         speed = self.settings().get("dtparam.i2c_baudrate", "")
         return int(speed) if speed.isdecimal() else 0
 
@@ -238,12 +238,12 @@ class SystemChange:
     """A change of the machine.
 
     Attributes:
-        name: What it is about, such as "group i2c".
+        name: Short name, such as "group i2c".
         state: Sentence that is true once it is made.
         is_made: Whether it is made.
-        commands: What makes it; empty if no command can.
-        then: What has to follow, such as a restart of the computer.
-        instead: What a person has to do if no command can.
+        commands: Commands that make it; empty if it has to be made by hand.
+        then: Required step afterwards, such as a restart of the computer.
+        instead: Instruction for a person if there are no commands.
     """
 
     name: str
@@ -265,10 +265,10 @@ class Outcome(NamedTuple):
 def make_changes(
     changes: Iterable[SystemChange], run: Callable[[RootCommand], str], *, dry: bool = False
 ) -> Iterator[Outcome]:
-    """Make each change that is not made yet, in order; say only what would be done if `dry`.
+    """Make each change that is not made yet, in order; if `dry`, only report the commands.
 
-    Commands run as root by `run`; see `Machine.run`. A generator of changes sees the effect of
-    those before.
+    Commands run as root by `run`; see `Machine.run`. A generator of changes is resumed after each
+    change, so it can check the effects.
     """
     for change in changes:
         typed = " && ".join(map(str, change.commands))
@@ -287,7 +287,7 @@ def make_changes(
 
 
 def changes_to_remove(unit_name: str, root: Path) -> Iterator[SystemChange]:
-    """Yield what removes a robot's service; groups and interfaces stay."""
+    """Yield the changes that remove a robot's service; groups and interfaces are kept."""
     path = root / _UNITS / unit_name
     yield SystemChange(
         "service",
@@ -359,7 +359,7 @@ def _group(group: str, machine: Machine) -> SystemChange:
 
 
 def _interfaces(profile: Profile, machine: Machine) -> Iterator[SystemChange]:
-    """Yield the lines that config.txt needs."""
+    """Yield the changes of config.txt."""
 
     def line(
         name: str, state: str, text: str, is_made: Callable[[], bool], *more: RootCommand

@@ -1,6 +1,6 @@
 """The twin's board, a separate process: pins, chips, ledger, world and time.
 
-It is started before the robot and outlives the robot's processes, as hardware does. It ends on
+It is started before the robot and outlives the robot's processes, like hardware. It ends on
 SIGTERM, or with the process at the other end of its owner's descriptor. Its arguments are that
 descriptor and its `BoardSettings`.
 """
@@ -32,11 +32,11 @@ from shapechanger.robot.twin.start import BoardAt, BoardSettings, open_world
 from shapechanger.robot.twin.wiring import TwinWiring
 
 START_NS: Final = 1_000_000_000
-"""First time of the twin's clock; not 0, which could be taken for "never"."""
+"""First time of the twin's clock; not 0, which could mean "never"."""
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05
-"""Interval of looking for a reader of the images while time stands still."""
+"""Interval of checks for a reader of the images while time stands still."""
 _LATER: Final = object()
 """Result of a function that the board answers later, or never."""
 
@@ -53,14 +53,14 @@ def _served(function: Callable[..., object]) -> Callable[[BoardConnection, msgsp
     hints = get_type_hints(function)
     hints.pop("return", None)
     takes_caller = hints.pop("caller", None) is not None
-    # The function itself refuses other words than those of a `Literal`, with the nearest one.
+    # The function itself refuses values outside a `Literal`, and suggests the nearest one.
     kinds = [str if get_origin(hint) is Literal else hint for hint in hints.values()]
     decode: Any = msgspec.msgpack.Decoder(tuple[*kinds]).decode
 
     def run(caller: BoardConnection, arguments: msgspec.Raw) -> object:
         with translate_errors(
             msgspec.MsgspecError,
-            to=lambda error: RobotError(f"The board's {function.__name__} takes others: {error}."),
+            to=lambda error: RobotError(f"Wrong arguments of {function.__name__}: {error}."),
         ):
             given = dict(zip(hints, decode(arguments), strict=True))
         return function(**given, **({"caller": caller} if takes_caller else {}))
@@ -85,7 +85,7 @@ class Board:
         at = BoardAt(Path(settings.folder))
         parts = {output.part for output in plan.outputs if output.part}
         world = open_world(settings.place, parts, camera, seed)
-        # Let the world prepare what takes a while, before a guard in real time waits for it.
+        # Run slow preparations of the world before a guard in real time waits for it.
         world.put_back()
         world.place(seed)
         self._camera: FrontCameraPipe | None = None
@@ -107,7 +107,7 @@ class Board:
         own = (self.greet, self.leave, self.wait, self.sleep)
         functions = (*own, *self._pins.functions, *operator_functions(self._pins))
         self._functions = {one.__name__: _served(one) for one in functions}
-        # Clients by descriptor, in the order in which they connected.
+        # Clients, keyed by descriptor, in the order in which they connected.
         self._connections: dict[int, BoardConnection] = {}
         self._owner_fd = owner_fd
         self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -121,7 +121,7 @@ class Board:
 
     def run(self) -> None:
         """Serve clients and advance time until an error."""
-        run_early()  # Hardware is never late because the machine is busy.
+        run_early()  # Raise the priority, because hardware is not delayed by a busy machine.
         step_ns = self.now_ns()
         while True:
             due_ns = step_ns if self._camera is None else min(step_ns, self._camera.next_ns)
@@ -139,7 +139,7 @@ class Board:
         return Greeting(self._clock, self.now_ns())
 
     def leave(self, caller: BoardConnection) -> None:
-        """Announce that a process ends in order."""
+        """Announce the orderly end of a process."""
         caller.has_left = True
 
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
@@ -162,7 +162,7 @@ class Board:
             raise _OwnerGone
         for connection in [one for fd, one in self._connections.items() if fd in ready]:
             self._execute_all(connection)
-        # Last, so that the successor of a process that died follows its end.
+        # Accepted last, so that the end of a process is handled before its successor.
         if self._listening.fileno() in ready:
             connected, _ = self._listening.accept()
             self._connections[connected.fileno()] = BoardConnection(connected)
@@ -233,8 +233,8 @@ class _Sleeper(NamedTuple):
 class TwinTimeBoard(Board):
     """A board whose time advances only while a client sleeps, and waits for all that take part.
 
-    A client takes part from its first `wait`. It is granted time at each tick of the guard, and at
-    its own `until_ns`.
+    A client takes part from its first `wait`. Its wait ends at each tick of the guard, and at its
+    own `until_ns`.
     """
 
     def __init__(self, settings: BoardSettings, owner_fd: int) -> None:
@@ -242,7 +242,7 @@ class TwinTimeBoard(Board):
         self._ticks = 0
         self._sleepers: list[_Sleeper] = []
         self._sleeps = 0
-        self._wanted_ns: dict[BoardConnection, int] = {}  # Next grant of each that takes part.
+        self._wanted_ns: dict[BoardConnection, int] = {}  # Next end of each participant's wait.
         super().__init__(settings, owner_fd)
 
     def now_ns(self) -> int:
@@ -250,7 +250,7 @@ class TwinTimeBoard(Board):
         return self._now_ns
 
     def wait(self, caller: BoardConnection, until_ns: int) -> object:
-        """Finish the grant of a client, which takes part from now on, until its next is due."""
+        """Let a client, which takes part from now on, wait until its next tick."""
         self._wanted_ns[caller] = until_ns
         caller.waits = caller.call_id
         return _LATER
@@ -271,7 +271,7 @@ class TwinTimeBoard(Board):
             else:
                 found = camera is None or camera.find_reader()
                 self._serve(None if found else _LOOK_FOR_READER_S)
-            # Clients that are gone no longer sleep.
+            # Clients that have disconnected no longer sleep.
             self._sleepers = [one for one in self._sleepers if not one.connection.closed]
             if not self._sleepers:
                 continue
@@ -284,7 +284,7 @@ class TwinTimeBoard(Board):
                 first.connection.reply(first.call_id, Slept(self._now_ns, newest_ns))
 
     def _step(self, end_ns: int) -> None:
-        """Advance to the next time at which anything happens."""
+        """Advance to the time of the next event."""
         now_ns = self._now_ns
         while (tick_ns := START_NS + round(self._ticks * 1e9 / self._tick_hz)) <= now_ns:
             self._ticks += 1

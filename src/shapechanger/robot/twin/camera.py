@@ -35,7 +35,7 @@ class FrontCameraPipe:
         newest_ns: Capture time of the newest image that was written; None before.
     """
 
-    path: Path  # Of the FIFO.
+    path: Path  # Path of the FIFO.
     plan: CameraPlan
     world: World
     start_ns: int  # Time of the first image.
@@ -50,7 +50,7 @@ class FrontCameraPipe:
         self.newest_ns: int | None = None
         self._taken = 0
         self._fd: int | None = None
-        self._rest = b""  # Of an image that did not fit into the pipe, with its time.
+        self._rest = b""  # Rest of an image that did not fit into the pipe.
         self._rest_ns: int | None = None
         self._last, self._last_ns = b"", 0
         self._noise = random.Random("camera")
@@ -95,7 +95,7 @@ class FrontCameraPipe:
             self._rest = b""
 
     def find_reader(self) -> bool:
-        """Open the pipe if it has a reader, which waits for that; return whether it is open."""
+        """Open the pipe if a reader waits for that; return whether it is open."""
         if self._fd is None:
             try:
                 self._fd = os.open(self.path, os.O_WRONLY | os.O_NONBLOCK)
@@ -107,7 +107,7 @@ class FrontCameraPipe:
         return True
 
     def _ready(self) -> bool:
-        """Return whether the reader wants an image."""
+        """Return whether the reader is ready for an image."""
         if not self.find_reader():
             return False
         if self._rest:
@@ -117,13 +117,13 @@ class FrontCameraPipe:
         return not any(fcntl.ioctl(self._fd, _FIONREAD, bytes(4)))  # Bytes that wait in the pipe.
 
     def _write(self, data: bytes, captured_ns: int | None) -> None:
-        """Write what fits; the rest of an image is written first the next time."""
+        """Write as much as fits; the rest of an image is written first the next time."""
         if self._fd is None:
             return
         try:
             written = os.write(self._fd, data)
         except BlockingIOError:
-            return  # An image that does not fit at all is dropped; a rest keeps waiting.
+            return  # An image that does not fit at all is dropped; the rest of one is kept.
         except BrokenPipeError:
             self.close()
             return

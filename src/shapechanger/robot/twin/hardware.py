@@ -45,7 +45,7 @@ class SteadyClock(Clock):
                 return bool(ready) or now_ns >= until_ns
 
     def _take_edges(self) -> None:
-        """Dispatch the edges that have arrived, and have the board report further ones."""
+        """Dispatch the edges that have arrived, and request further ones from the board."""
         while self._client.wait():
             pass
         self._client.dispatch()
@@ -105,7 +105,7 @@ class TwinBus:
         self._bus = bus
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte, which on the bus is a register without data."""
+        """Send one byte: on the bus, it is a register without data."""
         self.write_i2c_block_data(i2c_addr, value, [])
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
@@ -119,7 +119,7 @@ class TwinBus:
         self._board.ask(None, "write_chip", self._bus, i2c_addr, register, list(data))
 
     def close(self) -> None:
-        """Let go of the bus; its chips keep running."""
+        """Close the bus; its chips keep running."""
 
 
 class TwinServoPort:
@@ -140,7 +140,7 @@ class TwinServoPort:
         return self._board.ask(dict[int, ServoReply], "write_servos", self._device, dict(data), at)
 
     def close(self) -> None:
-        """Do nothing: the bus outlives the port."""
+        """Do nothing, because the bus outlives the port."""
 
 
 class TwinHardware(Hardware):
@@ -168,7 +168,7 @@ class TwinHardware(Hardware):
         return TwinServoPort(self.board, settings.device)
 
     def close(self) -> None:
-        """Let go of the pins and leave the board."""
+        """Release the pins and disconnect from the board."""
         super().close()
         self.board.close()
 

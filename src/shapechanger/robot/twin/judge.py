@@ -1,4 +1,4 @@
-"""Judge from the ledger alone whether a robot moved without permission.
+"""Decide from the ledger alone whether a robot moved without permission.
 
 The inputs are the ledger, the wiring and the times at which the robot was permitted to move, but
 nothing from the robot's own programs.
@@ -21,14 +21,14 @@ class Interval(NamedTuple):
     output: str
     start_ns: float
     end_ns: float  # Infinite if it does not end.
-    value: float  # Of the largest size; 0 if unknown.
+    value: float  # Value with the largest magnitude; 0 if unknown.
 
 
 def propelled(ledger: Iterable[Transition], wiring: TwinWiring) -> list[Interval]:
     """Return when each propelling output was not at rest.
 
-    A pin with PWM counts by its duty. The last levels stay, unless the one-shot of the
-    enable line ends them.
+    A pin with PWM counts with its duty. The last levels remain, unless the one-shot of the enable
+    line cuts the power.
     """
     found: list[Interval] = []
     running: dict[str, Interval] = {}

@@ -1,4 +1,4 @@
-"""Operator of a twin: moves the vehicle, breaks and presses things, and knows the truth."""
+"""Operator of a twin: moves the vehicle, causes faults, presses buttons, and reads true states."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Whereabouts(NamedTuple):
         heading: Angle from the x axis, rad, counter-clockwise seen from above.
         speed: Speed along the heading, m/s.
         travelled_m: Distance rolled by the wheels, m; driving backward counts down.
-        bumped: Whether something presses the bumper.
+        bumped: Whether the bumper is pressed.
         distance_m: Free distance ahead of the nose, m.
         truth: Quantities that no sensor measures, such as the progress along a course, keyed by
             name.
@@ -52,7 +52,7 @@ class Whereabouts(NamedTuple):
 def _at_board(
     function: Callable[Concatenate[Operator, _P], _R],
 ) -> Callable[Concatenate[Operator, _P], _R]:
-    """Let a method ask the board, in whose process its body runs with `_board`."""
+    """Decorate a method so that its body runs in the board's process, with `_board`."""
 
     @functools.wraps(function)
     def ask(self: Operator, *args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -66,7 +66,7 @@ def _at_board(
 
 
 class Operator:
-    """A person next to the robot, who moves the vehicle and breaks and presses things.
+    """A person next to the robot, who moves the vehicle, causes faults and presses buttons.
 
     Each request takes effect after everything that the robot's processes sent before it.
 
@@ -99,7 +99,7 @@ class Operator:
 
     @_at_board
     def place(self, seed: int) -> None:
-        """Place the vehicle at the start that follows from a seed."""
+        """Place the vehicle at the start that a seed selects."""
         self._board.world.place(seed)
         self._board.record("place", seed=seed)
 
@@ -107,7 +107,7 @@ class Operator:
     def put_back(self) -> None:
         """Put a vehicle that has collided back on its lane, at rest, to continue from there.
 
-        In the plain room, which has no lane, it returns to its start. Its truth counts on.
+        In the plain room, which has no lane, it returns to its start. Its progress is kept.
         """
         with translate_errors(
             WorldError, to=lambda error: RobotError(f"The vehicle cannot be put back: {error}")
@@ -119,8 +119,8 @@ class Operator:
     def lay_out(self, seed: int) -> None:
         """Replace the surroundings, and place the vehicle at a start in them.
 
-        On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
-        for the first `put_back` on it. A twin that is started with another seed has no such wait.
+        On a course in MuJoCo, this delays the board by some tenths of a second, as does the first
+        `put_back` on it. Starting a twin with another seed has no such delay.
         """
         self._board.world.lay_out(seed)
         self._board.record("course", seed=seed)
@@ -154,7 +154,7 @@ class Operator:
 
     @_at_board
     def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
-        """Let distance sensors measure so much, None for the truth, or not answer if `dead`."""
+        """Override the readings of distance sensors, m; None for true ones; `dead` for none."""
         for sensor in self._board.of_kind(SimulatedHcsr04):
             sensor.override_m, sensor.dead = metres, dead
         self._board.record("fault", detail=f"distance {'dead' if dead else metres}")
@@ -198,12 +198,12 @@ class Operator:
         return Whereabouts(*pose, *motion, world.distance_m(), world.truth(), self._board.clock())
 
     def close(self) -> None:
-        """Leave the board."""
+        """Disconnect from the board."""
         self._client.close()
 
 
 def operator_functions(board: PinBoard) -> list[Callable[..., object]]:
-    """Return the functions of an operator as they run at a board."""
+    """Return the functions of an operator, bound to a board."""
     operator = Operator.__new__(Operator)
     operator._board = board  # pyright: ignore[reportPrivateUsage]
     bodies = (getattr(one, "__wrapped__", None) for one in vars(Operator).values())

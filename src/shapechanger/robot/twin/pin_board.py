@@ -33,8 +33,8 @@ from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.rpc import BoardConnection
 from shapechanger.robot.twin.wiring import TwinWiring
 
-# Servos do not count longer times for which a busy machine kept the board waiting: their watchdogs
-# would take its silence for the guard's and let go.
+# Longest step of the servos' time: after a longer delay of the board by a busy machine, their
+# watchdogs would release them although the guard is not silent.
 _MAX_SERVO_STEP_NS: Final = 40_000_000
 
 _Sensor = TypeVar("_Sensor", bound=SimulatedSensor)
@@ -51,10 +51,10 @@ class _Claim:
 
 
 class PinBoard:
-    """Everything that a robot's processes and its operator reach.
+    """Pins, chips, servos and world, for a robot's processes and its operator.
 
     Args:
-        wiring: What is attached; it gives undriven pins their level.
+        wiring: The attached parts; it determines the level of undriven pins.
         ledger: File for the changes of outputs, unbuffered; None to keep none.
         seed: Seed of the phase of software PWM.
         clock: Returns the time, ns.
@@ -88,7 +88,7 @@ class PinBoard:
         plan = wiring.plan
         kinds = ((one, SENSORS[one.driver].simulate) for one in plan.sensors)
         self._sensors = [simulate(one, world) for one, simulate in kinds if simulate is not None]
-        self._due: list[Edge] = []  # Edges that follow from outputs.
+        self._due: list[Edge] = []  # Future edges that outputs have caused.
         self._inputs = {pin: level for one in self._sensors for pin, level in one.levels.items()}
         if plan.stop_pin is not None:
             self._inputs[plan.stop_pin] = 1  # A button to ground, with a pull-up.
@@ -113,7 +113,7 @@ class PinBoard:
             self._update_channels(at, chip)
 
     def record(self, kind: str, t: int | None = None, **fields: Any) -> None:
-        """Write a line of the ledger, of the time `t`, or of now."""
+        """Write a line of the ledger, with the time `t`, or the present time."""
         if self._ledger is not None:
             line = {"t": self.clock() if t is None else t, "kind": kind, **fields}
             self._ledger.write(json.dumps(line, allow_nan=False).encode() + b"\n")
@@ -184,7 +184,7 @@ class PinBoard:
         pull: str,
         level: int,
     ) -> int:
-        """Claim a pin, and return its level: for an input its sensor's, pull's or resistors'."""
+        """Claim a pin, and return its level, which sensors, pulls and resistors set for inputs."""
         claim = self._claims.setdefault(pin, _Claim())
         if claim.owner is not None and claim.owner is not caller:
             raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
@@ -231,11 +231,11 @@ class PinBoard:
             self.record("i2c", **at, channel=channel, us=us, hz=hz, pid=caller.pid)
 
     def read_servos(self, device: str, ids: list[int], at: int, size: int) -> dict[int, ServoReply]:
-        """Read bytes of servos, and return their replies by id."""
+        """Read bytes of servos, and return their replies, keyed by id."""
         return self.require_rig(device).read(ids, at, size)
 
     def write_servos(self, device: str, data: dict[int, bytes], at: int) -> dict[int, ServoReply]:
-        """Write bytes of servos, and return their replies by id."""
+        """Write bytes of servos, and return their replies, keyed by id."""
         return self.require_rig(device).write(data, at)
 
     def free(self, caller: BoardConnection, died: bool) -> None:

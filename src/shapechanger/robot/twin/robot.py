@@ -1,4 +1,4 @@
-"""A robot that is served by processes on this machine."""
+"""Serve a robot by processes on this machine."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
 _POLL_S: Final = 0.02
-_LOG: Final = 2000  # Of the end of a log, characters.
+_LOG: Final = 2000  # Length of the end of a log in error notes, characters.
 
 
 class RunningRobot:
@@ -84,7 +84,7 @@ class RunningRobot:
         return KnownRobot("robot", address, key, self.await_restart()["fingerprint"] or "insecure")
 
     def client(self, **options: Any) -> RobotClient:
-        """Connect to it; the options are `RobotClient.connect`'s."""
+        """Connect to it, with the options of `RobotClient.connect`."""
         return RobotClient.connect(self.known, **options)
 
     def operator(self) -> Operator:
@@ -131,7 +131,7 @@ class RunningRobot:
         return json.loads(path.read_text())
 
     def forget_ready(self) -> None:
-        """Remove the daemon's ready file, before something that restarts the daemon."""
+        """Remove the daemon's ready file, before an action that restarts the daemon."""
         (self.folder / _READY).unlink(missing_ok=True)
 
     def close(self) -> None:

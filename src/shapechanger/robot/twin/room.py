@@ -1,7 +1,7 @@
 """A rectangular room that needs no simulator, for robots without a world, and their motion in it.
 
-It proves a robot's programs: things move, turn, hit walls and are seen. Its constants are typical
-of toys of 20 to 30 cm; none was measured.
+It is enough to test a robot's programs: vehicles move, turn, hit walls and see them. Its constants
+are typical of toys of 20 to 30 cm; they were not measured.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _WALLS: Final = np.array(((220, 70, 60), (70, 150, 220), (235, 190, 60), (90, 18
 class _Drive(NamedTuple):
     """Motion of a kind of vehicle."""
 
-    ahead: Mapping[str, float]  # Speed that each part gives at a value of 1, m/s.
-    turn: Mapping[str, float] = {}  # Rate of turn that it gives, rad/s, counter-clockwise.
+    ahead: Mapping[str, float]  # Speed for a value of 1, m/s, keyed by part.
+    turn: Mapping[str, float] = {}  # Rate of turn for a value of 1, rad/s, counter-clockwise.
     rudder: str = ""  # Part that steers; "" if only the sides do.
     curvature: float = 0.0  # Turn to the right for each metre at full rudder, rad/m.
     lag_s: float = 0.15  # Time in which the motion covers 63 % of a difference.
@@ -83,7 +83,7 @@ class DrivingWorld(World):
     Args:
         parts: Parts that the robot's outputs move, such as "wheels".
         size: Width and height of the frames in pixels.
-        seed: Seed of where the stripes on the walls begin, and of the first start.
+        seed: Seed of the stripes on the walls, and of the first start.
         pitch_deg: Angle of the camera's axis below the horizon, degrees; None for level.
         fovy_deg: Vertical field of view of the camera, degrees; None for 90 degrees across.
 
@@ -159,7 +159,7 @@ class DrivingWorld(World):
         light = 0.25 + 0.75 * np.exp(-distance / _FADE)
         light *= np.where(((along + self._first_stripe) // _STRIPE) % 2 == 0, 1.0, 0.72)
         colours = (_WALLS[wall] * light[:, np.newaxis]).astype(np.uint8)
-        # Below the camera where the line of sight meets the wall, m.
+        # Height below the camera at which the line of sight meets the wall, m.
         below = (self._slopes * distance)[..., np.newaxis]
         picture = np.where(below < _CAMERA_HEIGHT, colours, _FLOOR)
         return np.where(below < _CAMERA_HEIGHT - _WALL_HEIGHT, _CEILING, picture)
@@ -167,7 +167,7 @@ class DrivingWorld(World):
     def _aim(self, size: tuple[int, int], pitch: float, fovy_deg: float | None) -> None:
         """Set the bearing of each column, rad, and the downward slope of each pixel's line.
 
-        All lines of a column have the bearing of its middle one, also in a pitched camera.
+        All lines of a column have the bearing of its middle, even in a pitched camera.
         """
         width, height = size
         across = width if fovy_deg is None else height

@@ -27,8 +27,8 @@ MAX_MESSAGE: Final = 64 * 1024
 Role = Literal["hardware", "operator", "clock"]
 """A robot's process, a person next to the robot, or a connection that only sleeps."""
 
-_GONE: Final = "The twin's board is gone."
-_HELD_UP_S: Final = 0.01  # Between two calls while the board does not reply.
+_GONE: Final = "The twin's board has ended."
+_HELD_UP_S: Final = 0.01  # Time between two calls while the board does not reply.
 _PATIENCE_S: Final = 10.0  # A board that does not reply for longer is broken.
 _MAX_EDGES: Final = 500  # Kept for a client that does not wait for them, before they are merged.
 
@@ -85,12 +85,12 @@ class Awake(NamedTuple):
     edges: list[Edge]
 
 
-# The keys of a chip have their pins as integers of a class of their own, `Pin`.
+# Keys of chips have pins of the class `Pin`, a subclass of int.
 encode: Callable[[object], bytes] = msgspec.msgpack.Encoder(enc_hook=int).encode
 
 
 def encode_call(function: str, *arguments: object, id: int | None = None) -> bytes:
-    """Return an encoded `Call` of this moment."""
+    """Return an encoded `Call` with the present time."""
     return encode(Call(function, msgspec.Raw(encode(arguments)), id, time.monotonic_ns()))
 
 
@@ -162,7 +162,7 @@ class BoardClient:
         return self._replies.pop(call_id).decode(kind)
 
     def wait(self, until_ns: int = 0, at_most_s: float = 0.0) -> bool:
-        """Wait until the board reports edges, or grants twin time until the next wait.
+        """Wait until the board reports edges, or advances twin time to the next tick.
 
         Args:
             until_ns: Time of the next grant, if no tick is earlier, ns.
@@ -192,7 +192,7 @@ class BoardClient:
                 watcher(edge.level, edge.t)
 
     def close(self) -> None:
-        """Leave the board in order."""
+        """Disconnect from the board in an orderly way."""
         if not self.closed:
             with suppress(RobotError), self._socket:  # The board may have ended first.
                 self.post("leave")
@@ -229,16 +229,16 @@ class BoardConnection:
         self.socket = connected
         self.role: Role = "clock"
         self.pid = 0  # Process at the other end.
-        self.call_id: int | None = None  # Of the call that is executed, if it waits for a reply.
+        self.call_id: int | None = None  # Id of the executed call, if it expects a reply.
         self.t = 0  # Time of that call, ns.
-        self.waits: int | None = None  # Id of its "wait" without a reply; None if it works.
+        self.waits: int | None = None  # Id of its "wait" without a reply; None while it runs.
         self.executes = False  # Whether its calls are being executed.
-        self.has_left = False  # Whether it ends in order.
+        self.has_left = False  # Whether it has announced its end.
         self._edges: list[Edge] = []
 
     @property
     def closed(self) -> bool:
-        """True once the client is gone."""
+        """True once the client has disconnected."""
         return self.socket.fileno() < 0
 
     def receive(self) -> bytes | None:
@@ -253,11 +253,11 @@ class BoardConnection:
     def reply(self, call_id: int | None, result: object = None, error: str | int = "") -> None:
         """Send the end of a call, whose result msgspec can encode, if the client waits for it."""
         if call_id is not None:
-            with suppress(OSError):  # The client is gone, which `receive` reports.
+            with suppress(OSError):  # If the client has disconnected, `receive` reports it.
                 self.socket.send(encode(Reply(call_id, msgspec.Raw(encode(result)), error)))
 
     def add_edge(self, edge: Edge) -> None:
-        """Keep an edge of the client's inputs, in order of time, until the client is awake.
+        """Queue an edge of the client's inputs, in order of time, until the client waits.
 
         A client that does not wait for them loses edges, as in the kernel: beyond 500, only the
         last edge of each input is kept.
@@ -267,7 +267,7 @@ class BoardConnection:
             self._edges = sorted({edge.pin: edge for edge in self._edges}.values())
 
     def wake(self, now_ns: int, *, always: bool) -> None:
-        """End the client's "wait" if there are edges, or always."""
+        """End the client's "wait" if there are edges, or in any case if `always`."""
         if self.waits is not None and (self._edges or always):
             waits, edges = self.waits, self._edges
             self.waits, self._edges = None, []

@@ -8,9 +8,9 @@ Lines have a time `t` in nanoseconds and a kind:
 pin     pin, duty, hz, pid       an output: its level (hz 0), or the duty of its software PWM
         released: true           the pin is no longer driven: its resistors set its level
 pulse   pin, us, hz, pid         servo pulses; 0 us for none
-i2c     bus, address, register, data, pid      what was written to a chip
-        bus, address, channel, us, hz          the effect of that on a PWM channel
-gone    pid                      a process died; the levels that its pins keep follow
+i2c     bus, address, register, data, pid      bytes written to a chip
+        bus, address, channel, us, hz          the resulting pulses of a PWM channel
+gone    pid                      a process died; the next lines are the levels of its pins
 input   pin, level               an edge of a sensor
 place   seed                     the operator placed the vehicle at a start
 put_back                         the operator put the vehicle back after a collision
@@ -35,7 +35,7 @@ from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One line of the ledger, as the module describes it; None where its kind has no such field.
+    """One line of the ledger, see the module; None for fields that its kind does not have.
 
     `pid` is the process that made the change, `pin` a BCM number, `duty` a share of the time from 0
     to 1, `hz` a frequency in Hz, and `us` the width of pulses in microseconds.

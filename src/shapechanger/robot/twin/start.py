@@ -1,4 +1,4 @@
-"""Start a board in its own process, at its place, or find one that runs."""
+"""Start a board in a separate process, or find a running one."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Place:
     Attributes:
         opener: Function that opens the world, as "module:function"; "" for the plain room, which
             needs no simulator. It is called as `open_world`, without the place.
-        arguments: Keyword arguments of the opener, as JSON holds them.
+        arguments: Keyword arguments of the opener, as JSON values.
     """
 
     opener: str = ""
@@ -114,7 +114,7 @@ class BoardAt:
         return "shapechanger.robot.twin.hardware:connect", self.socket_path
 
     def camera_plan(self, plan: CameraPlan) -> CameraPlan:
-        """Return the camera of a profile, reading the images of this board.
+        """Return a camera plan for a profile that reads the images of this board.
 
         Raises:
             RobotError: If the board has no camera.
@@ -172,7 +172,7 @@ def start_board(
     """Start a board and wait until it listens.
 
     Args:
-        wiring: The robot as it is really wired.
+        wiring: Plan with the simulated wiring.
         clock: The machine's clock ("real"), or one that only clients advance ("twin").
         folder: Existing folder for its socket, ledger and pipe, without such files.
         camera: Front camera; None without one.

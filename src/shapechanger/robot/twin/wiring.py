@@ -1,7 +1,7 @@
-"""Wiring of a twin: from the levels of pins and pulses to the value of each output.
+"""Wiring of a twin: compute the value of each output from the levels of pins and pulses.
 
-Each output's chip inverts its driver. The wiring follows the plan of the real one, which by default
-is the served plan: with two pins swapped only in the served profile, the wrong motor turns.
+The chip of each output inverts its driver. The plan of the wiring is the served plan by default,
+and may differ: if two pins are swapped only in the served profile, the wrong motor turns.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class TwinWiring:
         return int(pin in self._high)
 
     def has_resistor(self, pin: int) -> bool:
-        """Return whether a resistor outside decides the level of an undriven pin."""
+        """Return whether an external resistor sets the level of an undriven pin."""
         return pin in self._high or pin in self._low
 
     def power_ends_ns(self, levels: Levels) -> int | None:
@@ -79,7 +79,7 @@ class TwinWiring:
         }
 
     def _state(self, plan: OutputPlan) -> Callable[[Levels], WiredOutput]:
-        """Return what reads the state of an output, apart from the motors' power."""
+        """Return a function that reads the state of an output, ignoring the motors' power."""
         mixed = sum(one.rest * plan.mix.get(one.name, 0.0) for one in self.plan.actions)
         rest = max(-1.0, min(1.0, plan.offset + mixed))
         return OUTPUTS[plan.driver].wire(plan, rest, self._duty)

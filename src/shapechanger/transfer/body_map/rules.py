@@ -1,6 +1,6 @@
 """The four rules of a body map, its entries, and their arithmetic.
 
-No rule adds an offset to what it copies, so two rules in a row are one rule again.
+No rule adds an offset to a copied value, so a composition of two rules is again a rule.
 
 >>> compose_rules(Copy("shin", 2.0), Copy("shank", -1.5))
 Copy(feature='shank', scale=-3.0)

@@ -44,7 +44,7 @@ class LearnerSettings:
     The tag is the name of the learner's kind, and `type` in files.
 
     Attributes:
-        takes: What the learner takes.
+        takes: Abilities and requirements of the learner.
         learner: Its class, as `module:class`.
         packages: Packages that its numbers depend on, in addition to the packages of every study.
         steps: Default env steps of a training.
@@ -130,7 +130,7 @@ class Learner(Generic[_Settings]):
         settings: Its settings.
         threads: Threads that step the envs, None for one per core; the result is the same. One by
             default: a study runs as many trainings at a time as there are cores.
-        tensorboard: Folder of TensorBoard's logs; None for none.
+        tensorboard: Folder of TensorBoard's logs; None for no logs.
 
     Args:
         name: See the attribute.

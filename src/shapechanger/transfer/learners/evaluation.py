@@ -43,7 +43,7 @@ class Evaluation(msgspec.Struct, frozen=True):
         terms: Mean sum over an episode of each reward term that the env reports.
         success: Share of the episodes whose last `info["is_success"]` is true; None if the env does
             not report success.
-        measures: Mean of each measure that the env declares besides the return, keyed by name.
+        measures: Mean of each measure of the env except the return, keyed by name.
         standing: Share of the steps whose `info["standing"]` is true; None if the env does not
             report it; only vehicles do.
     """

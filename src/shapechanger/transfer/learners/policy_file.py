@@ -202,7 +202,7 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
     if "device" in settings.takes:
-        settings = settings.for_one_env()  # As in its training.
+        settings = settings.for_one_env()  # Same settings as in its training.
     envs = DummyVecEnv([lambda: SpacesOnly(*spaces)] * settings.n_envs)
     # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
     states = random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002

@@ -1,4 +1,4 @@
-"""Shipped settings of learners, which `presets.toml` holds, and settings that a user names."""
+"""Resolve settings of learners: shipped presets, and files or classes of a user."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.settings import ImportedSettings
 
 _Kind = TypeVar("_Kind", bound=msgspec.Struct)
-# Keys of a preset that are no settings.
+# Keys of a preset that are not settings.
 _ABOUT: Final = ("kind", "like", "tuned_on", "in_many_bodies")
 
 
@@ -54,7 +54,7 @@ LEARNERS: Final[Mapping[str, LearnerSettings]] = _Presets()
 
 
 def in_many_bodies(name: str) -> str:
-    """Return the preset that learns in many bodies as another one does in one."""
+    """Return the preset for many bodies that corresponds to a preset for one body."""
     return _tables().get(name, {}).get("in_many_bodies", name)
 
 
@@ -88,8 +88,8 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
         learner: Name of shipped settings; a TOML file; the name of a kind of learner that another
             package adds; or `module:name`, a class of models that is compatible with
             Stable-Baselines3, or a function that builds one.
-        changed: New values keyed by name, as TOML or JSON hold them. With `module:name`, those that
-            are no settings of ours are arguments of the class or function.
+        changed: New values, keyed by name, of the types of TOML and JSON. With `module:name`,
+            unknown names are arguments of the class or function.
 
     Raises:
         UnknownName: If there is no such learner, or it has no such setting.
@@ -122,7 +122,7 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, LearnerS
     start = given.pop("preset", None) or given.pop("algorithm", None)
     if not isinstance(start, str) or start.endswith(".toml"):
         raise StudyError(
-            f"{path} must name what it starts from: `preset` is one of {', '.join(LEARNERS)}, or "
+            f"{path} must name a starting point: `preset` is one of {', '.join(LEARNERS)}, or "
             "`algorithm` is a class or function as module:name."
         )
     try:

@@ -37,7 +37,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
 
     # Name of the setting that is the steps of each env between two updates.
     _steps_per_update: ClassVar[str]
-    # Settings besides the shared ones that are no arguments of the class.
+    # Settings that are neither shared nor arguments of the class.
     _ours: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -56,7 +56,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def model_arguments(self) -> dict[str, Any]:
-        """Arguments of the class besides policy, env and seed."""
+        """Arguments of the class except policy, env and seed."""
         left_out = {*Sb3Settings.__struct_fields__, *self._ours}
         own = {n: getattr(self, n) for n in self.__struct_fields__ if n not in left_out}
         return {"policy_kwargs": self._policy_arguments(), **own}
@@ -246,7 +246,7 @@ class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
 
     @property
     def model_arguments(self) -> dict[str, Any]:
-        """Arguments of the class or function besides policy, env and seed."""
+        """Arguments of the class or function except policy, env and seed."""
         return self.arguments
 
     def for_one_env(self) -> Self:

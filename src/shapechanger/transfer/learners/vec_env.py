@@ -50,7 +50,7 @@ class ThreadVecEnv(DummyVecEnv):
         cast("Any", VecEnv).__init__(
             self, num_envs, self._envs.single_observation_space, self._envs.single_action_space
         )
-        # As DummyVecEnv, which replaces what the base class assembled.
+        # Like DummyVecEnv, which replaces the result of the base class.
         self.metadata = self.envs[0].metadata
 
     def reset(self) -> NDArray[Any]:
@@ -82,7 +82,7 @@ class ThreadVecEnv(DummyVecEnv):
 
 
 class ScaledActions(VecEnvWrapper):
-    """Envs that take actions from -1 to 1, whatever the units of their actuators."""
+    """Envs that take actions from -1 to 1, for any units of their actuators."""
 
     def __init__(self, envs: VecEnv, scale: ActionScale) -> None:
         space = learners_space(cast("Any", envs).action_space)

@@ -1,1 +1,1 @@
-"""One policy for the bodies of a family, whatever the number of their limbs."""
+"""One policy for the bodies of a family with any number of limbs."""

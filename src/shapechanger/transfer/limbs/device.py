@@ -84,7 +84,7 @@ class LimbModel(MLPModel):
         self.obs_groups, self.obs_normalization = [GROUP], False
         self.obs_normalizer = nn.Identity()
         self.mlp: Any = copy.deepcopy(net)
-        # One deviation for all limbs, however many there are.
+        # One deviation for any number of limbs.
         self.distribution: Any = GaussianDistribution(1, std_type="log") if acts else None
         self._as_rows = policy.rows
 

@@ -59,7 +59,7 @@ class LimbNetwork(nn.Module):
         limbs = rows[:, 1:]
         description = limbs[..., :DESCRIBED]
         code = self.encode(limbs)
-        # Rows without a limb weigh nothing.
+        # Rows without a limb have the weight 0.
         weight = self.weigh(description) + (limbs[..., :1] - 1.0) * 1e4
         summed = (torch.softmax(weight, dim=1) * code).sum(dim=1)
         core = self.core(torch.cat([self.trunk(rows[:, 0]), summed], dim=1))

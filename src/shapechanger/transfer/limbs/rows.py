@@ -1,6 +1,6 @@
-"""Observations and actions of any body as rows: one of the trunk, and one of each limb.
+"""Convert observations and actions of any body to rows: one for the trunk, one for each limb.
 
-A row holds what its part senses and the numbers that describe it, in columns that are the same for
+A row holds observations of its part and the numbers that describe it, in columns that are equal for
 all bodies of a family. So one network fits every body of the family.
 """
 
@@ -42,13 +42,13 @@ class Columns(msgspec.Struct, frozen=True):
 
     @property
     def width(self) -> int:
-        """Numbers of a row; the shorter of the trunk's row and a limb's ends with zeros."""
+        """Numbers of a row; the shorter kind of row, of trunk or limbs, is padded with zeros."""
         return DESCRIBED + max(len(self.trunk), len(self.limb))
 
 
 @dataclass(frozen=True)
 class LimbRows:
-    """Map between a body's own observations and actions, and rows.
+    """Map between the observations and actions of a body and its rows.
 
     Rows are `(observations * scale + offset) @ selection + constant`, flattened.
 
@@ -103,7 +103,7 @@ class LimbRows:
 
     @property
     def room(self) -> int:
-        """Limbs that there are rows for."""
+        """Number of limbs with rows."""
         return len(self.constant) // self.columns.width - 1
 
     def with_room(self, room: int) -> LimbRows:
@@ -196,7 +196,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
 
 
 def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
-    """Refuse a body whose rows mean something else than those that a policy has learned from."""
+    """Refuse a body with rows of another meaning than the rows that a policy has learned from."""
     learned, own = _meanings(trained), _meanings(present)
     if learned != own:
         strange = [name for name in own if name not in learned] or list(own)
@@ -235,7 +235,7 @@ def _column(
 ) -> tuple[int, str]:
     """Return the row of a feature, and the name of its column.
 
-    What the parts of one limb sense, such as contact, is added up.
+    Measurements of the parts of one limb, such as contact, are added up.
     """
     element = feature.element
     if element is None or element.kind == "task":

@@ -1,4 +1,4 @@
-"""Transfer methods: what the arms of a study do with the source.
+"""Transfer methods: how the arms of a study use the source.
 
 A method is a small class with a name, in one file. Naming one imports only that one. Others than
 those that come with Shapechanger are found in three ways: by `register` in a module that is already

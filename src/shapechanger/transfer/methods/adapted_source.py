@@ -42,15 +42,15 @@ class AdaptedSource(Method):
 class Randomised(AdaptedSource):
     """Learn in a source whose body is drawn again for each episode.
 
-    A target that knows the plausible range of its body, as a finger does, gives it. Otherwise, in a
-    family of bodies, each body lies on the way from the source to the target, both ends included.
+    A target may state the plausible range of its body, such as a finger. Otherwise, in a family of
+    bodies, each body lies between the source and the target, both included.
     """
 
     name = "randomised"
     paper = "X. B. Peng and others, Sim-to-Real Transfer with Dynamics Randomization, ICRA 2018"
 
     def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
-        """Require two bodies of one family and space, or a target that knows its own range."""
+        """Require two bodies of one family and space, or a target that states its range."""
         del settings
         same_family = source.family and source.family == target.family
         if target.adapts_source or (same_family and source.same_layouts(target)):

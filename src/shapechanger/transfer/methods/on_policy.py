@@ -66,7 +66,7 @@ _UNTIL: Final = 0.5
 
 
 class Kickstart(Method):
-    """Learn the target with a new policy that is drawn towards what the source policy would do.
+    """Learn the target with a new policy that is distilled from the source policy.
 
     After each update of PPO, one pass over the same observations minimises the divergence from the
     source policy's actions through the body map. Its weight falls linearly to 0 over the first half

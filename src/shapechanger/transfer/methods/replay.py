@@ -169,7 +169,7 @@ class _Prefill(BaseCallback):
 
 
 class DomainClassifiers(nn.Module):
-    """Two classifiers that tell source from target, by (s, a, s') and by (s, a)."""
+    """Two classifiers that distinguish source from target, by (s, a, s') and by (s, a)."""
 
     def __init__(self, n_observations: int, n_actions: int, learning_rate: float = 3e-4) -> None:
         super().__init__()  # pyright: ignore[reportUnknownMemberType]

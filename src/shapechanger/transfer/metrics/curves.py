@@ -1,7 +1,7 @@
 """Learning curves and scores.
 
 A curve is linear between two evaluations. Every measure uses that, so areas, crossings and values
-between evaluations are consistent. A score of 0 takes no skill, and 1 is the target's reference.
+between evaluations are consistent. A score of 0 means no skill, and 1 is the target's reference.
 """
 
 from __future__ import annotations
@@ -178,16 +178,16 @@ class Reference(msgspec.Struct, frozen=True):
 
     score = (J - zero) / (one - zero)
 
-    The formula follows D4RL (arXiv 2004.07219). Zero is the score without skill: an ant that
-    stands still earns 1,000, so the random policy alone would be too low a floor. Both ends belong
-    to the target, because an expert on the source says nothing about another body. The reference is
+    The formula follows D4RL (arXiv 2004.07219). Zero is the score without skill: an ant that stands
+    still earns 1,000, so the random policy alone would be too low a floor. Both ends belong to the
+    target, because an expert on the source is not comparable on another body. The reference is
     taken as given: intervals of scores do not include its uncertainty.
 
     Attributes:
         zero: Value without skill.
         one: Value of the target's reference, or at the end of the best arm if it has no reference.
-        zero_of: What earned zero, such as "random actions".
-        one_of: What earned one: the reference, or the name of an arm.
+        zero_of: Name of the policy with the value zero, such as "random actions".
+        one_of: Name of the reference or the arm with the value one.
         shipped: Whether one is the value of a reference that ships.
 
     Raises:
@@ -230,7 +230,7 @@ class Reference(msgspec.Struct, frozen=True):
 
     @property
     def defined(self) -> bool:
-        """Return whether scores exist: an arm ended above what takes no skill, beyond rounding."""
+        """Return whether scores exist: an arm must end above the policies without skill."""
         size = max(1.0, abs(self.zero), abs(self.one))
         return self.one - self.zero > _SAME * size
 

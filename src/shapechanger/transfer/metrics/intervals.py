@@ -104,11 +104,11 @@ def estimate_ratio(
     all t_b instead of Student's (B. Efron and R. J. Tibshirani, "An Introduction to the
     Bootstrap", 1993, section 12.5).
 
-    A resample may have no t_b: because it drew equal seeds only, so that its error is zero, or a
-    mean of scratch below `least`. Dropping it would make the interval narrower, and so would a
-    floor under the error that is chosen too high. It counts as infinite in both tails instead. Once
-    such resamples fill a tail there is no interval, and the note states it; with two seeds in each
-    arm a quarter of the resamples is like that.
+    A resample has no t_b if it drew equal seeds only, so that its error is zero, or if its mean of
+    scratch is below `least`. Dropping such resamples would make the interval too narrow, and so
+    would a lower bound on the error that is chosen too high. They count as infinite in both tails
+    instead. If they fill a tail, there is no interval, and the note states it; with two seeds in
+    each arm, a quarter of the resamples has no t_b.
 
     Args:
         arm: One number for each seed, shape (n_arm,).
@@ -116,8 +116,8 @@ def estimate_ratio(
         least: Smallest mean of scratch that the ratio may be taken over, > 0.
         too_small: Why the ratio is undefined below that; the note of the estimate.
         rng: Draws the resamples.
-        n_resamples: How many resamples to draw: at least one for each tail, thousands for an
-            interval that holds still.
+        n_resamples: Number of resamples: at least one for each tail, thousands for an interval that
+            hardly depends on `rng`.
 
     Raises:
         StudyError: If there are too few resamples.
@@ -152,7 +152,7 @@ def _ratio(
     """Ratio of means along the last axis, and its standard error.
 
     error² = (s_arm² / n_arm + ratio² · s_scratch² / n_scratch) / mean_scratch², the delta method
-    for two independent means. It takes two seeds in each arm.
+    for two independent means. Each arm needs at least two seeds.
     """
     below = scratch.mean(axis=-1)
     ratio = arm.mean(axis=-1) / below
@@ -170,7 +170,7 @@ def _why_no_interval(arm: NDArray[np.float64], scratch: NDArray[np.float64]) -> 
     if min(arm.size, scratch.size) < 2:
         return "No interval: it takes at least two seeds in each arm."
     if not (_spread(arm) | _spread(scratch)):
-        return "No interval: all seeds equal in each of the two arms, so nothing shows spread."
+        return "No interval: all seeds of each arm are equal, so their spread is unknown."
     return ""
 
 

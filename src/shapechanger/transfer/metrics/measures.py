@@ -112,7 +112,7 @@ def auc_ratio(
     """Ratio of the areas under the curves of arm and scratch, a pure number; 1 if they are equal.
 
     ∫ p_arm / ∫ p_scratch, the transfer ratio of Taylor & Stone's list. It depends on constants
-    added to the reward, so it is meaningful for scores only, where 0 takes no skill.
+    added to the reward, so it is meaningful for scores only, where 0 means no skill.
     Undefined unless scratch's area is above zero.
 
     Args:
@@ -306,7 +306,7 @@ def _reach_times(steps: NDArray[np.float64], horizon: float) -> ReachTimes:
 # A grid, because a single threshold could be chosen in hindsight. In units of score.
 DEFAULT_THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
 
-_NO_SCORES: Final = "Undefined: no arm ended above what takes no skill, so there is no score."
+_NO_SCORES: Final = "Undefined: no arm ended above the policies without skill, so no score exists."
 
 
 class Measures(msgspec.Struct, frozen=True):

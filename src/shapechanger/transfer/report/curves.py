@@ -85,12 +85,12 @@ def _line_style(study: Study, kind: str) -> _LineStyle:
 def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
     """Plot the learning curves of a study, once for each way of counting.
 
-    A thin line is one seed, a thick one the mean over seeds, a band its 95 % t-interval over seeds;
-    of fewer than three seeds each evaluation is a point, because an interval of two says nothing. A
-    horizontal level is a policy that is not trained on the target. Both ways of counting share the
+    A thin line is one seed, a thick line the mean over seeds, and a band its 95 % t-interval. With
+    fewer than three seeds, points replace the band, because an interval of two seeds is too wide to
+    be useful. A horizontal line is a policy that is not trained on the target. All charts share the
     limits of the y axis.
     """
-    # Here, because `charts` says which extra is missing.
+    # Imported here, because `charts` reports the extra that is missing.
     from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator
 
     def tick(value: float, place: int | None) -> str:

@@ -140,7 +140,7 @@ def _short_name(env: EnvRef) -> str:
 
 
 def argument_text(value: object) -> str:
-    """Format an argument of an env; the JSON of edits in words, such as `stretch pole x3`."""
+    """Format an argument of an env; JSON of edits becomes text such as `stretch pole x3`."""
     try:
         edits = msgspec.json.decode(str(value), type=list[dict[str, Any]])
     except msgspec.DecodeError:

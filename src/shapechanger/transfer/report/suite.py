@@ -115,7 +115,7 @@ def _verdict(studies: Mapping[str, Study]) -> str:
 def gain_over_scratch(study: Study) -> Estimate:
     """Advantage of the headline arm over scratch, averaged over the budget, in the measure's unit.
 
-    The gain of an arm that is not trained on the target is its advantage at the start.
+    For an arm that is not trained on the target, it is the advantage at the start.
     """
     arm = study.curves(study.headline_arm)
     if arm.n_evals > 1:
@@ -124,7 +124,7 @@ def gain_over_scratch(study: Study) -> Estimate:
 
 
 def _looks(studies: Mapping[str, Study], declared: int) -> str:
-    """State whether the numbers of seeds are those that were declared."""
+    """State whether all studies have the declared number of seeds."""
     now = {study.plan.seeds for study in studies.values()}
     grown = sorted({study.looks for study in studies.values() if len(study.looks) > 1})
     text = f"The suite declares {declared} seeds"
@@ -183,7 +183,7 @@ def _colour(share: float) -> str:
 
 
 def _methods(studies: Mapping[str, Study]) -> list[tuple[str, ...]]:
-    """For each target, and for all together: every arm's scores and its chance to beat scratch."""
+    """Rows for each target and for all together: each arm's scores and chance to beat scratch."""
     by_target: dict[str, list[Study]] = {}
     for study in studies.values():
         by_target.setdefault(_name(study.plan.task.target), []).append(study)
@@ -242,10 +242,10 @@ def _method_rows(
 
 
 def _pooled_text(estimate: Estimate, groups: Sequence[NDArray[np.float64]]) -> str:
-    """Format an estimate, without an interval where resampling the runs cannot give one.
+    """Format an estimate, without an interval if resampling the runs cannot give one.
 
-    That is so with fewer than three runs in each study, and where all resamples are equal, as where
-    every run beats every run of scratch.
+    Resampling gives no interval with fewer than three runs in each study, or if all resamples are
+    equal, for example because every run beats every run of scratch.
     """
     few = max(group.size for group in groups) < _LEAST_RUNS
     if few or estimate.low == estimate.high:

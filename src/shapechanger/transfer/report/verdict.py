@@ -254,14 +254,14 @@ _TRANSFER: Final = {"up": "helped", "down": "hurt", "unclear": "made no clear di
 _NO_INTERVAL: Final = "cannot be judged without an interval"
 # Below this many seeds an interval is so wide that only large effects show.
 _FEW_SEEDS: Final = 5
-# A rise of scratch by less than this share of its end shows nothing.
+# A rise of scratch by less than this share of its end is not meaningful.
 _FLAT: Final = 0.1
 
 
 def direction(estimate: Estimate) -> Direction:
     """Direction of a difference: up or down if its interval excludes 0, otherwise unclear.
 
-    An estimate without an interval is unclear, whatever its value.
+    An estimate without an interval is always unclear.
     """
     if estimate.low is not None and estimate.low > 0.0:
         return "up"

@@ -19,7 +19,7 @@ from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap, Copy, Learn
 
 EPSILON: Final = 1e-8
-"""Default of Stable-Baselines3's `VecNormalize`: what is added to a variance."""
+"""Constant that Stable-Baselines3's `VecNormalize` adds to a variance by default."""
 CLIP: Final = 10.0
 """Default of `VecNormalize`: the largest magnitude of a normalised number."""
 
@@ -145,7 +145,7 @@ class PolicyOutputs(NamedTuple):
 
 
 def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
-    """Outputs of a policy whose actions are not squashed, as PPO's.
+    """Outputs of a policy without squashed actions, such as PPO.
 
     The map is in the units of the layouts, a_t = N a_s + d, and the outputs are in the units of the
     models, a = middle + half y.
@@ -164,7 +164,7 @@ def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
 
 
 def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
-    """Outputs of a policy whose actions are squashed by tanh to the bounds of the space, as SAC's.
+    """Outputs of a policy with actions squashed by tanh to the bounds of the space, such as SAC.
 
     With u = tanh(mean) in [-1, 1] the action is middle + half u. Since tanh is odd, a sign can move
     inside, but no other scale.

@@ -138,7 +138,7 @@ def transplant(
     device: torch.device | str | None = None,
     **settings: Any,
 ) -> Model:
-    """Return a model that does in the target what the source model does through the map.
+    """Return a model for the target that acts like the source model through the map.
 
     The actor, PPO's value network, the critics of SAC and TQC and their targets, log standard
     deviations and the entropy coefficient are moved; optimisers, buffers and step counts are new.

@@ -152,7 +152,7 @@ _PROPELLER: Final = Propeller(
 _TWIN: Final = replace(_PROPELLER, diameter=0.028, wake=0.9)
 _PROPELLERS: Final = {"propeller": _PROPELLER, "left propeller": _TWIN, "right propeller": _TWIN}
 
-# The motor with a gear of 2.5:1 instead of its own 4.4:1, as sold for model boats.
+# The motor with a gear of 2.5:1, as sold for model boats, instead of 4.4:1.
 _MOTOR: Final = HOBBY_MOTOR.geared(2.5 / 4.4)
 
 _RUDDER: Final = Fin(x=-0.27, height=0.045, chord=0.035)

@@ -124,7 +124,7 @@ TRUCK: Final = VehicleModel(
     name="truck",
     drives=(frozenset({"wheels", "steering"}),),
     optional_parts=frozenset({"gear", "bed"}),
-    length_m=0.84,  # From the nose to the hitch, and the trailer behind it.
+    length_m=0.84,  # From the nose to the hitch, plus the trailer behind it.
     width_m=0.20,
     nose_m=0.25,
     camera=CameraMount(x=0.235, y=0.0, z=0.125, pitch_rad=math.radians(4.0)),

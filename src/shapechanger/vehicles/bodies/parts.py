@@ -84,7 +84,7 @@ class CameraJitter:
 
 
 def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
-    """Add an error to the pose of a camera; a refused error changes nothing."""
+    """Add an error to the pose of a camera; a refused error has no effect."""
     place = model.camera(camera)
     position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
     turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad

@@ -106,7 +106,7 @@ class _Renderer:
 
 
 class OnboardCamera(_Renderer):
-    """Renders the view of a camera in a model, without what is only seen from outside.
+    """Renders the view of a camera in a model, without geoms that are for outside views only.
 
     Args:
         size: Width and height in pixels.

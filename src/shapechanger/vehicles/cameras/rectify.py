@@ -76,7 +76,7 @@ class Rectifier:
         size: Width and height of its images, pixels.
 
     Raises:
-        WorldError: If the camera does not see what the virtual camera sees.
+        WorldError: If the camera does not cover the view of the virtual camera.
     """
 
     def __init__(self, geometry: CameraGeometry, size: tuple[int, int]) -> None:
@@ -138,7 +138,7 @@ class CanonicalView:
 
         Raises:
             DemosError: If the camera is unknown, or the episodes are of several bodies.
-            WorldError: If there is no such camera, or it does not see what the virtual camera sees.
+            WorldError: If there is no such camera, or it does not cover the virtual camera's view.
         """
         self._bodies.add(header.body)
         if len(self._bodies) > 1:
@@ -221,7 +221,7 @@ def measure_camera(
 
     Raises:
         MissingExtra: If OpenCV is not installed.
-        WorldError: If there is no such board in the image, or it does not tell the geometry.
+        WorldError: If there is no such board in the image, or it does not determine the geometry.
     """
     try:
         import cv2
@@ -262,7 +262,8 @@ def measure_camera(
             cv2.calibrateCameraExtended([board], [points], size, lens, np.zeros(5), flags=flags)
         )
     error, lens, _, turns, _, lens_sd, pose_sd, _ = min(fits, key=lambda fit: fit[0])
-    # Corners are read to a tenth of a pixel at best in each direction, however well a model fits.
+    # Corners are detected to a tenth of a pixel at best in each direction, even if a model fits
+    # well.
     scale = max(1.0, math.sqrt(2.0) * _CORNER_SD_PX / error)
     focal = float(lens[1, 1])
     fovy = math.degrees(2.0 * math.atan(0.5 * height / focal))

@@ -16,7 +16,7 @@ TRAINING: Final = range(0, 1_000_000)
 """Seeds of the courses for training."""
 
 HELD_OUT: Final = range(1_000_000, 2_000_000)
-"""Seeds of the courses for evaluation; nothing is trained on them."""
+"""Seeds of the courses for evaluation, which are never used for training."""
 
 HOME: Final[Mapping[str, str]] = MappingProxyType(
     {"boat": "harbour", "car": "corridor", "tank": "corridor", "truck": "yard"}

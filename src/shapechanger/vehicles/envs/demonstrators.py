@@ -128,7 +128,7 @@ _BEARING_SWAY: Final = 0.18
 
 
 def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
-    """Return an expert whose actions are waypoints: the bearing of the free way, and the speed."""
+    """Return an expert with waypoints as actions: the bearing of the free way, and the speed."""
 
     def begin() -> Driver:
         expert = CourseExpert(world.course, world.vehicle.name, path=world.path())

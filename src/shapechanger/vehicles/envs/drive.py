@@ -42,7 +42,7 @@ Steering = Literal["proportional", "bang"]
 """Steering angles: any, or only full left, straight and full right, as in 2017."""
 
 _LEVELS: Final[dict[str, Literal["any", "three"]]] = {"proportional": "any", "bang": "three"}
-_MAX_PIXELS: Final = 1920  # As in a profile.
+_MAX_PIXELS: Final = 1920  # Limit of a profile.
 
 
 class SimulatedRobot(msgspec.Struct, frozen=True):
@@ -291,7 +291,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         return ExpertDriver(self.world)
 
     def demonstrator(self, seed: int) -> Demonstrator:
-        """Return an expert that knows the whole course and recovers from its own mistakes.
+        """Return an expert with access to the whole course that recovers from its own mistakes.
 
         Args:
             seed: Seed of the mistakes.

@@ -21,7 +21,7 @@ BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
 """Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
 
 FARTHEST_M: Final = 6.0
-"""Distance that it sees where nothing is nearer, m."""
+"""Distance that a ray measures without an obstacle, m."""
 
 _BEARINGS: Final = np.radians(BEARINGS_DEG)
 
@@ -84,7 +84,7 @@ class MeanOutputs:
 
 
 def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
-    """Return what a teacher sees, shape (11,).
+    """Return the observation of a teacher, shape (11,).
 
     Distances from the middle of the front bumper at `BEARINGS_DEG`, m, up to `FARTHEST_M`; speed
     along the heading, m/s; rate of turn, rad/s, counter-clockwise.

@@ -1,4 +1,4 @@
-"""A vehicle that moves within a robot's limits and senses what the robot would.
+"""A vehicle with the limits and sensors of a robot, but without its programs.
 
 Caps, slew and reflexes are the guard's own functions (`shapechanger.contract.limits`), at its
 rate. Sensors measure as the drivers in `shapechanger.robot.drivers` do from the chips of a twin,
@@ -172,12 +172,12 @@ def _stepped(value: float, step: float) -> float:
 
 
 _CLIPPED: Final = "Clipped by the robot's caps."
-_OSCILLATOR_MHZ: Final = 25.0  # Of a PCA9685.
-_COUNTS: Final = 4096  # Of its period.
+_OSCILLATOR_MHZ: Final = 25.0  # Oscillator of a PCA9685.
+_COUNTS: Final = 4096  # Counts of its period.
 
 
 class SensedVehicle:
-    """A vehicle that moves within a robot's limits and senses what the robot would, from rest.
+    """A vehicle with the limits and sensors of a robot, which starts at rest.
 
     It is the robot without pins, chips, link and emergency stops: a robot's twin simulates
     those, and drives to the same place.
@@ -190,7 +190,7 @@ class SensedVehicle:
         now_ns: Time since the start, ns.
         applied: Value of each action.
         reason: Why the vehicle does not follow its command; empty if it does.
-        quantities: Readings keyed by name, and what follows from them.
+        quantities: Readings and derived quantities, keyed by name.
         sources: Name of the sensor behind each, or "estimated".
     """
 
@@ -263,7 +263,7 @@ class SensedVehicle:
                 quantities[quantity], self._measured_by[quantity] = value, name
 
     def _conclude(self, quantities: dict[str, float]) -> None:
-        """Add what follows from the readings: stalls, an estimated speed, and collisions."""
+        """Add derived quantities: stalls, an estimated speed, and collisions."""
         reflexes, sources = self._reflexes, dict(self._measured_by)
         if reflexes.stall.watches:
             quantities["stall"] = float(reflexes.stall.way != 0)
@@ -296,7 +296,7 @@ class SensedVehicle:
 
 
 def _stepper(output: OutputPlan) -> Callable[[float], float]:
-    """Return what rounds a value to the duties or pulse widths that an output has."""
+    """Return a function that rounds a value to the duties or pulse widths of an output."""
     settings = output.settings
     if output.driver in ("hbridge", "phase_enable"):
         duty = Duty(settings["start"], settings["full"])

@@ -63,7 +63,7 @@ def certify_vehicles(
         source: The env in which a policy is trained.
         target: The env that it is transferred to.
         seed: Seed of the resets.
-        allow_empty: Whether to certify a shift that changes nothing.
+        allow_empty: Whether to certify a shift without differences.
 
     Raises:
         MorphologyError: If one of them is not a vehicle.

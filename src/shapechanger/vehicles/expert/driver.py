@@ -147,8 +147,8 @@ _SLOW: Final = 0.25
 _TURNING: Final = 0.15
 _BACK_AT_MOST_S: Final = 4.0
 _BACK_THROTTLE: Final = -0.6
-_SPEED_GAIN: Final = 1.5  # Of the throttle on the speed error, both relative to their maxima.
-_REACTION_S: Final = 0.15  # From an action to its effect, over which the pose is predicted.
+_SPEED_GAIN: Final = 1.5  # Gain from speed error to throttle, both relative to their maxima.
+_REACTION_S: Final = 0.15  # Delay from an action to its effect, over which the pose is predicted.
 # Angle to the target, rad, above which a vehicle must turn before it can go on, and clearance ahead
 # of the nose, m, that is too small for that.
 _ASIDE: Final = 0.7
@@ -171,7 +171,7 @@ class _Recovery:
     ) -> None:
         """Update the timers from steering and throttle and their effect, m/s and rad/s.
 
-        `blocked` says whether an obstacle ahead prevents a necessary turn.
+        `blocked` states whether an obstacle ahead prevents a necessary turn.
         """
         share = abs(speed) / self._traits.body.top_speed_mps
         driven = abs(action[1]) > _ASKED

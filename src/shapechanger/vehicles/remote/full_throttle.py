@@ -25,7 +25,7 @@ _LATE_S: Final = 0.5
 
 
 class FullThrottle:
-    """A policy that sees nothing and knows one command."""
+    """A policy without inputs that always returns full throttle."""
 
     def __init__(self, actions: Layout, state: Layout) -> None:
         self.net = CloneNetwork(

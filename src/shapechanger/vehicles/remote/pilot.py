@@ -1,7 +1,8 @@
 """A policy that drives a robot, from a workstation or in a process on board.
 
-`python -m shapechanger.vehicles.remote.pilot` is the process on board. It reads one line of JSON,
-its task, and writes lines of JSON: what it does, and why it ends. The end of its input ends it.
+`python -m shapechanger.vehicles.remote.pilot` is the process on board. It reads its task as one
+line of JSON, and writes its state and the reason of its end as lines of JSON. It ends when its
+standard input is closed.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
-_WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
+_WAITS_ON_BOARD: Final = "It waits until no client has control and you arm the robot for it."
 
 
 def require_fit(card: PolicyCard, robot: RobotCard, *, measures: bool) -> None:
@@ -118,7 +119,7 @@ class PolicyDriver:
         name: Displayed name.
         robot: Address and credentials of the robot.
         on_note: Called with its state whenever that changes.
-        waits: What to say while it waits; "" for what a person at a terminal can do.
+        waits: Note to display while it waits; "" for instructions at a terminal.
 
     Attributes:
         note: Its state, for display.
@@ -205,7 +206,7 @@ class PolicyDriver:
             action = self._policy.predict(*self._perceived(observation))
             if not np.isfinite(action).all():
                 # The robot would refuse it, too, and stop.
-                raise PolicyError(f"The policy gave {action.tolist()}, which is no command.")
+                raise PolicyError(f"The policy gave {action.tolist()}, which is not finite.")
             observation, _, terminated, truncated, info = env.step(action)
             yields = "intervene_action" in info
             self._say("you drive, and the policy watches" if yields else "it drives")
@@ -230,12 +231,12 @@ class PolicyDriver:
 
 def main() -> int:
     """Run a policy on board, and return the exit status."""
-    # Standard output is for the daemon alone: whatever prints must not break a line.
+    # Standard output is for the daemon alone: redirect prints of other code to standard error.
     out = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
     def tell(**said: str) -> None:
-        with contextlib.suppress(OSError):  # The daemon is gone, and so is the robot.
+        with contextlib.suppress(OSError):  # The daemon has ended, and with it the connection.
             out.write(json.dumps({name: text[:400] for name, text in said.items()}) + "\n")
 
     task = json.loads(sys.stdin.readline())
@@ -250,7 +251,7 @@ def main() -> int:
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )
 
-        def end_with_input() -> None:  # Which the daemon closes, or which ends with it.
+        def end_with_input() -> None:  # The daemon, or its end, closes the input.
             while sys.stdin.readline():
                 pass
             driver.end()
@@ -260,7 +261,7 @@ def main() -> int:
     except ShapechangerError as error:
         tell(failed=str(error))
         return 1
-    except Exception as error:  # Of a policy, which may be anything.
+    except Exception as error:  # A policy may raise any exception.
         tell(failed=f"{type(error).__name__}: {error}")
         raise
     return 0

@@ -24,30 +24,30 @@ down, then the servos let go. "silent": nothing is sent any more, so that the se
 stop them, or without any the power switch.
 """
 
-# One of them is read in each cycle, so a trip is detected within four.
+# One of these registers is read in each cycle, so a fault is detected within four cycles.
 _AUDITED: Final = ("mark", "torque_enable", "goal", "hardware_error")
 
 
 class ServoBus:
     """A bus of servos that pull tendons, which the guard drives through its outputs.
 
-    Without further cycles the servos' own watchdogs stop them. Servos of a family without any get
-    their power from a switch that the guard feeds while it runs, so they are only set up when the
-    robot is armed. If one of them cannot be released, `flush` and `let_go` raise errors, so that
-    the guard stops to feed the switch, until that has cut the power.
+    Without further cycles, the servos' own watchdogs stop them. Servos of a family without a
+    watchdog get their power from a switch that the guard triggers while it runs, so they are only
+    set up when the robot is armed. If one of them cannot be released, `flush` and `let_go` raise
+    errors, so that the guard stops triggering the switch, until the power is cut.
 
-    In one packet each servo waits for the one before it, so a silent one may silence those behind
-    it. The first one missing in a cycle becomes a suspect, and the others are read once more
-    without it. Suspects are read alone, one per cycle. So a cycle waits for at most two timeouts,
-    whatever is missing.
+    In one packet, each servo waits for the answer of the previous one, so a silent servo may
+    silence all later ones. The first servo that is missing in a cycle becomes a suspect, and the
+    others are read once more without it. Suspects are read alone, one per cycle. So a cycle waits
+    for at most two timeouts.
 
     Args:
         settings: The bus and its servos; `add` adds others until it is opened.
-        hardware: Where its port is.
+        hardware: The hardware that has its port.
 
     Attributes:
-        servos: Servos by id.
-        users: Names of the outputs that have it open; the last one closes it.
+        servos: Servos, keyed by id.
+        users: Names of the outputs that have it open; closing the last one closes the bus.
         mode: Mode of the bus.
         is_ready: Whether `set_up` has succeeded.
     """
@@ -60,7 +60,7 @@ class ServoBus:
         self.is_ready = False
         self._hardware = hardware
         self._opened = ExitStack()
-        self._suspects: list[int] = []  # Did not answer when they were last read.
+        self._suspects: list[int] = []  # Servos that did not answer when they were last read.
         self._stopped_ns = 0
         self._silent_since_ns: int | None = None
         self._cycles = 0
@@ -87,7 +87,7 @@ class ServoBus:
     def begin(self) -> None:
         """Open the bus once all of its outputs are open, and set up servos that have power.
 
-        Nothing moves.
+        The servos do not move.
 
         Raises:
             RobotError: If a servo does not respond, or is not the expected one.
@@ -99,10 +99,10 @@ class ServoBus:
                 one.set_zero(knows_turns=True)
 
     def ready(self, alive: Callable[[], object] = lambda: None) -> None:
-        """Clear all faults before the robot is armed, without moving anything.
+        """Clear all faults before the robot is armed, without any motion.
 
         Args:
-            alive: Feeds the enable line and the supervisor; called at least every 50 ms.
+            alive: Triggers the enable line and the supervisor; called at least every 50 ms.
 
         Raises:
             RobotError: If a fault persists.
@@ -121,7 +121,7 @@ class ServoBus:
             )
 
     def flush(self, *, grip: bool) -> None:
-        """Send what the servos are requested to pull.
+        """Send the requested tensions and lengths.
 
         Args:
             grip: Whether released servos are energised again.
@@ -131,7 +131,7 @@ class ServoBus:
         """
         self._require_release()
         if self.reason:
-            return  # The bus is stopping, which its cycles complete.
+            return  # The following cycles complete the stop.
         if self.mode == "off" and grip:
             self.hold()
         if self.mode == "held":
@@ -162,7 +162,7 @@ class ServoBus:
         """Check and prepare all servos, without torque, and clear all faults.
 
         Raises:
-            RobotError: If a servo does not answer, or is not as its settings say.
+            RobotError: If a servo does not answer, or does not match its settings.
         """
         self.is_ready = False
         if self.mode != "silent":  # A servo may still pull, until all have been set up.
@@ -192,7 +192,7 @@ class ServoBus:
         self.mode, self._gone, self.is_ready = "off", "", True
 
     def hold(self) -> None:
-        """Enable the torque of all servos, which pull nothing until the first goal.
+        """Enable the torque of all servos, with zero tension until the first goal.
 
         Raises:
             RobotError: If there is a fault, or a servo refuses; then all have let go.
@@ -209,10 +209,10 @@ class ServoBus:
         self.mode = "held"
 
     def cycle(self, now_ns: int) -> dict[str, dict[str, float]]:
-        """Read the state of all servos, and go on with a stop.
+        """Read the state of all servos, and continue a stop in progress.
 
         Returns:
-            Readings by tendon, see `TendonServo.see`, without servos that did not answer.
+            Readings keyed by tendon, see `TendonServo.see`, without servos that did not answer.
         """
         if self.mode == "silent" or not self.is_ready:
             return {}
@@ -244,8 +244,8 @@ class ServoBus:
     def release(self) -> None:
         """Disable the torque of all servos at once.
 
-        If a servo does not confirm it, even when asked twice, the bus falls silent, so that the
-        watchdog of that servo stops it, or the power switch. `set_up` ends the silence.
+        If a servo does not confirm it twice, the bus falls silent, so that the watchdog of that
+        servo or the power switch stops it. `set_up` ends the silence.
         """
         holding = set(self.servos)
         with self._loss_noted():
@@ -269,7 +269,7 @@ class ServoBus:
         self.is_ready = False
 
     def _require_release(self) -> None:
-        """Raise RobotError while a servo pulls that only the power switch can stop."""
+        """Raise RobotError while only the power switch can stop a servo that pulls."""
         if self.mode != "silent" or self._family.has_watchdog:
             return
         now_ns = self._hardware.clock.now_ns()
@@ -280,7 +280,7 @@ class ServoBus:
 
     @contextmanager
     def _loss_noted(self) -> Generator[None]:
-        """Note an error of the port as the fault of the bus."""
+        """Record an error of the port as the fault of the bus."""
         try:
             yield
         except RobotError as error:
@@ -292,7 +292,7 @@ class ServoBus:
         self._write("torque_enable", dict.fromkeys(self.servos, 0))
 
     def _send(self, tensions: Mapping[int, float]) -> None:
-        """Send tensions, N, by id, and the positions of servos with control of the length."""
+        """Send tensions, N, keyed by id, and the positions of servos with control of the length."""
         for id_, one in self.servos.items():
             one.goal = one.goal_of(tensions[id_])
         by_length = {i: one for i, one in self.servos.items() if one.settings.control == "length"}
@@ -327,13 +327,13 @@ class ServoBus:
         return heard
 
     def _audit(self, heard: dict[int, ServoReply]) -> None:
-        """Read a register that shows obedience, and drop servos that may have restarted."""
-        # A servo that was away may have lost power, and with it the meaning of its position.
+        """Read a register that reveals faults, and drop servos that may have restarted."""
+        # A servo that did not answer may have lost power, and so the zero of its position.
         back = [one for one in heard if self.servos[one].missed]
         for one in set(back) - self._audit_register("mark", back):
             del heard[one]
         alerting = [one for one, reply in heard.items() if reply.error & self._family.alert]
-        # An alert cannot wait for its turn.
+        # An alert is read at once instead of in turn.
         turn = _AUDITED[self._cycles % len(_AUDITED)]
         self._audit_register("hardware_error" if alerting else turn, alerting or heard)
 

@@ -1,7 +1,7 @@
 """Drivers of the tendons of a servo bus: outputs and their sensor.
 
-The sensor runs the one cycle of each tick, which reads all servos. The outputs only request their
-tensions, which are sent in one packet when all of them are requested.
+The sensor runs one cycle of the bus per tick, which reads all servos. The outputs only request
+their tensions, which are sent in one packet once all of them are requested.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ _OPEN: Final = WeakValueDictionary[tuple[Hardware, str], ServoBus]()
 class TendonOutput:
     """A tendon as an output; see `OutputDriver`.
 
-    0 is its pretension in every control, so that all stops end the same, and 1 its largest tension.
+    0 is its pretension in both kinds of control, so that all stops end the same, and 1 its largest
+    tension.
     With control "length" values above 0 go from its longest to its shortest length.
 
     Attributes:
@@ -68,7 +69,7 @@ class TendonOutput:
         self.device.let_go()
 
     def close(self) -> None:
-        """Close the bus with the last of its outputs."""
+        """Close the output; closing the last one closes the bus."""
         self.device.users.discard(self._servo.settings.name)
         if not self.device.users:
             self.device.close()
@@ -99,7 +100,7 @@ class TendonSensor:
         return {f"{name}/{key}": x for name, found in seen.items() for key, x in found.items()}
 
     def close(self) -> None:
-        """Do nothing: the bus belongs to the outputs."""
+        """Do nothing, because the outputs close the bus."""
 
 
 def _features(sensor: SensorPlan) -> list[Feature]:
@@ -124,8 +125,8 @@ BUS_SERVO: Final = OutputChip(
     # On a bus, no level of a pin determines its state.
     wire=lambda plan, rest, duty: lambda levels: WiredOutput(None, True),
     differs="its bus has a fault and released it",
-    # By its own watchdog when the bus is silent, or without power by the enable pin; talking to it
-    # would only keep it energised.
+    # Its own watchdog stops it when the bus is silent, or the enable pin cuts its power; writing to
+    # it would only keep it energised.
     stops_itself=True,
 )
 """A servo on a bus that winds a tendon."""

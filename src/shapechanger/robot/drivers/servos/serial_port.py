@@ -16,12 +16,12 @@ from shapechanger.robot.hardware import ServoReply
 with translate_errors(ImportError, to=lambda _: MissingExtra("dynamixel-sdk", "finger")):
     from dynamixel_sdk import PacketHandler, PortHandler
 
-# Bytes that may still be read after the timeout of an answer: they arrived while the process did
-# not run. More is endless noise, which the SDK would read endlessly.
+# Bytes that may still be read after the timeout of an answer, because they arrived while the
+# process did not run. More bytes are noise, which the SDK would read indefinitely.
 _MAX_LATE_BYTES: Final = 1024
 # Damaged packets to skip while waiting for valid ones.
 _MAX_DAMAGED: Final = 8
-_STATUS_BYTES: Final = 11  # Of a status packet without data, at most.
+_STATUS_BYTES: Final = 11  # Largest status packet without data.
 
 _BROADCAST: Final = 0xFE
 _WRITE: Final = 0x03
@@ -36,9 +36,8 @@ _RX_TIMEOUT: Final = -3001
 class SerialServoPort(PortHandler):
     """The SDK's port, which sends instructions and receives replies; see `ServoPort`.
 
-    Its timeout is as short as the bus allows. The SDK alone waits 34 ms for each missing answer, by
-    a clock that changes with the date, and keeps the processor busy meanwhile. A stop cannot wait
-    for that.
+    Its timeout is as short as the bus allows. The SDK itself busy-waits 34 ms for each missing
+    answer, by the wall clock, which is too long for a stop.
 
     Args:
         settings: The bus, whose family determines the packets.
@@ -125,7 +124,7 @@ class SerialServoPort(PortHandler):
         """Send an instruction and return the replies of `ids`, each with `length` bytes of data."""
         device = self._settings.device
         size = self._number(len(parameters) + 1 + self._length_size)
-        # The SDK fills in header and checksum, which is as long as the length.
+        # The SDK fills in the header and the checksum, which has as many bytes as the length.
         packet = [0] * self._id_at + [servo_id, *size, instruction, *parameters]
         self.is_using = False  # The SDK leaves it set after an exception.
         with translate_errors(
@@ -133,7 +132,7 @@ class SerialServoPort(PortHandler):
         ):
             self.has_stray |= self.getBytesAvailable() > 0
             if self._sdk.txPacket(self, packet + [0] * self._length_size) != _SUCCESS:
-                raise RobotError(f"The bus at {device} does not take what is written to it.")
+                raise RobotError(f"The bus at {device} does not accept the data written to it.")
             if not ids:
                 return {}
             self.setPacketTimeout((_STATUS_BYTES + length) * len(ids))
@@ -146,7 +145,7 @@ class SerialServoPort(PortHandler):
         for _ in range(len(ids) + _MAX_DAMAGED):
             try:
                 packet, result = self._sdk.rxPacket(self, *self._receive_options)
-            except IndexError:  # The SDK trusts the length in a packet.
+            except IndexError:  # The SDK does not check the length in a packet.
                 continue
             if result == _RX_TIMEOUT:
                 break

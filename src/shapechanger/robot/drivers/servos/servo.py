@@ -21,7 +21,7 @@ from shapechanger.robot.hardware import ServoReply
 
 
 class ServoPort(Protocol):
-    """Port of a servo bus, serial or of a twin. It raises RobotError if the bus is gone.
+    """Port of a servo bus, serial or simulated; methods raise RobotError if the bus is lost.
 
     Attributes:
         has_stray: Whether a late answer was found before a request; the reader resets it.
@@ -30,7 +30,7 @@ class ServoPort(Protocol):
     has_stray: bool
 
     def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
-        """Read bytes of several servos; return the replies by id, without silent servos."""
+        """Read bytes of several servos; return the replies, keyed by id, without silent servos."""
         ...
 
     def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
@@ -53,7 +53,7 @@ _REFUSALS: Final = {
     6: "the value is beyond a limit",
     7: "the register cannot be written now",
 }
-# Counts ahead of its position to which a servo with control of the length is sent to pull.
+# Counts ahead of its position at which to set the goal of a servo that pulls in position mode.
 _AHEAD: Final = 1024
 # Missed cycles in a row that make a fault.
 _MOST_MISSED: Final = 5
@@ -61,9 +61,9 @@ _MOST_MISSED: Final = 5
 _BELIEVED_CYCLES: Final = 3
 # K below the model's temperature limit at which a servo is too hot.
 _MARGIN_C: Final = 5.0
-# One wrong goal was lost on the way and is replaced by the next.
+# A single wrong goal may have been lost, and is replaced by the next one.
 _MAX_WRONG_GOALS: Final = 2
-# Length from the zero, m, to which the finger cannot let a tendon shorten. Chosen: the longest
+# Length from the zero, m, that a tendon cannot reach in an intact finger. Chosen: the longest
 # excursion of a finger's tendon is 42 mm.
 _SHORTEST_M: Final = -0.06
 # Share of the speed without load, and time at it, with which a tendon counts as lost.
@@ -74,11 +74,11 @@ _SLACK_NS: Final = 100_000_000
 class TendonServo:
     """One servo of a bus with its tendon.
 
-    There are two signs of a tendon that has snapped or come off. One that is wound in further than
-    the finger allows is lost for certain, at any tension, but this needs a zero. A servo that winds
-    in nearly as fast as without load shows it earlier, but only if its current overcomes the gears
-    by far. A tendon that snaps while its servo stands still at the pretension is detected with the
-    next pull.
+    There are two signs of a tendon that has snapped or come off. A tendon that is wound in further
+    than the finger allows is certainly lost, at any tension, but this needs a zero. A servo that
+    winds in nearly as fast as without load is an earlier sign, but only if its current clearly
+    exceeds the friction of the gears. A tendon that snaps while its servo stands still at the
+    pretension is detected at the next pull.
 
     Args:
         settings: The servo.
@@ -86,10 +86,10 @@ class TendonServo:
 
     Attributes:
         settings: The servo.
-        port: Port of the bus, once that is open.
+        port: Port of the bus, once it is open.
         zero: Position at the zero of its tendon, in counts; None without a zero.
         position: Position, as last read, in counts.
-        goal: Goal, as last sent, in counts; see `ServoFamily.goal`.
+        goal: The last sent goal, in counts; see `ServoFamily.goal`.
         tension: Requested tension, N.
         length: Requested length beyond the zero, m; None to pull with the tension.
         stopped_at_n: Tension from which a stop ramps down, N.
@@ -135,7 +135,7 @@ class TendonServo:
     def goal_of(self, tension: float) -> int:
         """Return the goal for a tension, N, in counts, rounded towards slack and at most the limit.
 
-        It has the sign that winds in, but for control of the length, where it is a limit.
+        Its sign winds the tendon in; for control of the length it is an unsigned limit.
         """
         servo = self.settings
         # Clip first: the quotient of a huge number could overflow to infinity.
@@ -162,11 +162,11 @@ class TendonServo:
         if self.fault:
             return 0.0  # Lets go at once, while the others ramp down.
         start = self.stopped_at_n
-        end = min(self.settings.pretension_n, start)  # A tendon that was not pulled stays so.
+        end = min(self.settings.pretension_n, start)  # A slack tendon is not pulled.
         return end + left * (start - end)
 
     def find(self, name: str) -> int | None:
-        """Read a register; None if the servo does not answer, even when asked again."""
+        """Read a register; None if the servo does not answer, even after a retry."""
         one = self._family[name]
         ask = partial(self.port.read, [self.settings.id], one.address, one.size)
         data = self._ask(ask, f"read its {one.name}")
@@ -225,31 +225,31 @@ class TendonServo:
             found, one = self.read(name), family[name]
             if (wanted := found & one.kept_bits | value) != found:
                 self.write(name, wanted)
-                if self.read(name) != wanted:  # Not every family refuses.
+                if self.read(name) != wanted:  # Some families ignore a write without refusing it.
                     raise RobotError(f"{servo.label} does not keep {wanted} as {one.name}.")
         if "lock" in values:
             self.write("lock", 1)
         self._set_mark()
 
     def hold(self) -> None:
-        """Enable the torque, with a goal that pulls nothing."""
+        """Enable the torque, with a goal of zero tension."""
         self.goal = 0
         self.write("mark", 0)
         self._set_mark()
-        if self.settings.control == "length":  # An old goal must not turn it.
+        if self.settings.control == "length":  # Otherwise an old goal might turn the servo.
             self.position = self.read("position")
             self.write("goal_position", self.position)
         self.write("torque_enable", 1)
 
     def _set_mark(self) -> None:
-        """Set the goal to 0, and what shows a restart, which starts a watchdog."""
-        # A change of mode sets the goal to the limit.
+        """Set the goal to 0, and set `mark`, which detects a restart and starts a watchdog."""
+        # A change of mode sets the goal to its limit.
         self.write("goal", 0)
         steps = self._bus.watchdog_ms // WATCHDOG_STEP_MS
         self.write("mark", steps if self._family.has_watchdog else 254)
 
     def set_zero(self, *, knows_turns: bool) -> None:
-        """Set the zero of the settings, moved by whole turns if the servo forgot its turns."""
+        """Set the zero from the settings, shifted by whole turns if the servo lost its turns."""
         away = 0 if knows_turns else self.read("position") - self.settings.zero
         self.zero = self.settings.zero + round(away / COUNTS_PER_TURN) * COUNTS_PER_TURN
 
@@ -262,11 +262,11 @@ class TendonServo:
             self._fail(f"{how}, {self.missed} cycles in a row")
 
     def see(self, data: bytes, now_ns: int, *, pulls: bool) -> dict[str, float]:
-        """Evaluate the block of present values of a servo that pulls or has no torque.
+        """Evaluate the block of present values of a servo, with or without torque.
 
         Returns:
-            "length" beyond the zero, m, if it has one; "speed", m/s, positive while the tendon gets
-            longer; and "tension", N, without the gears' friction and at least 0.
+            "length" beyond the zero, m, if it has a zero; "speed", m/s, positive while the tendon
+            gets longer; and "tension", N, without the gears' friction and at least 0.
         """
         self.missed, self._was_late = 0, False
         servo, model, family = self.settings, self._model, self._family
@@ -308,7 +308,7 @@ class TendonServo:
     def _see_tendon(self, length: float, lengthening: float, now_ns: int) -> None:
         """Detect a lost tendon by its length, m, and the rate of change of the length, m/s."""
         if length < _SHORTEST_M:
-            wound = f"it is wound in by {-1e3 * length:.0f} mm, further than the finger lets it"
+            wound = f"it is wound in by {-1e3 * length:.0f} mm, further than the finger allows"
             self._fail(f"has lost its tendon: {wound}")
         no_load = self._model.no_load_rad_per_s * self.settings.spool_radius_m
         if -lengthening < _SLACK_SHARE * no_load:
@@ -320,7 +320,7 @@ class TendonServo:
             self._fail(f"has lost its tendon: {speed}")
 
     def _lasts(self, sign: str, is_wrong: bool, count: int) -> bool:
-        """Return whether a sign of a fault was seen so often in a row."""
+        """Return whether a sign of a fault was seen in enough consecutive cycles."""
         self._wrong[sign] = self._wrong[sign] + 1 if is_wrong else 0
         return self._wrong[sign] >= count
 

@@ -24,7 +24,7 @@ WATCHDOG_STEP_MS: Final = 20
 TRIPPED: Final = 0xFF
 """Value of a bus watchdog after it has stopped the servo."""
 ROUNDING: Final = 1e-9
-"""Added to a quotient before rounding down: 3 may come out as 2.9999999999."""
+"""Added to a quotient before rounding down, because 3 may be computed as 2.9999999999."""
 _RAD_PER_S_PER_RPM: Final = 2.0 * math.pi / 60.0
 
 Control = Literal["tension", "length"]
@@ -45,7 +45,7 @@ class Register(msgspec.Struct, frozen=True):
         initial: Value at delivery, and after power-on if it is not in the EEPROM.
         takes: Ranges of the values that it takes; empty if it is read-only.
         value: Value that it must have; None for any.
-        kept_bits: Bits that are kept as they are then.
+        kept_bits: Bits that are not changed when `value` is set.
     """
 
     name: str
@@ -81,15 +81,15 @@ class ServoFamily(msgspec.Struct, frozen=True):
             bytes.
         most_id: Highest id.
         baud_rates: Baud rates of servos and SDK.
-        has_watchdog: Whether a servo stops by itself when its bus is silent. Without, a power
-            switch must stop it, and without power it forgets its turns.
+        has_watchdog: Whether a servo stops by itself when its bus is silent. If false, a power
+            switch must stop it, and without power it loses its count of turns.
         alert: Bits of a reply's error that say that the hardware error status is not 0.
         refused: Bits of a reply's error with the reason of a refusal.
-        errors: Bits of the hardware error status, in words.
+        errors: Descriptions of the bits of the hardware error status.
         speed_rpm: Unit of the speed, turns per minute.
         modes: Value of `mode` for each control that it has.
         eeprom_end: First address behind the EEPROM.
-        registers: Registers by what they are for; others have a `value`.
+        registers: Registers keyed by purpose; further ones only have a `value` to set.
 
             - `model_number`, `firmware`: Number of the model and version of the firmware.
             - `mode`: Operating mode.
@@ -136,7 +136,7 @@ class ServoFamily(msgspec.Struct, frozen=True):
 
 
 class ServoModel(msgspec.Struct, frozen=True, array_like=True):
-    """Model of a servo, a row of `servos.toml`; motor and gears are as at the output.
+    """Model of a servo, a row of `servos.toml`; values of motor and gears refer to the output.
 
     Attributes:
         name: Name of the model.
@@ -191,7 +191,7 @@ class ServoModel(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def ampere_per_goal(self) -> float:
-        """Unit of its goal, A; where that is a share of the stall torque, for a motor at rest."""
+        """Unit of its goal, A; for a goal in shares of the stall torque, of a motor at rest."""
         is_current = "tension" in self.family.modes
         return self.ampere_per_count if is_current else self.stall_a / self.most_counts
 
@@ -220,11 +220,12 @@ def stops_itself(output: OutputPlan) -> bool:
 class ServoSettings(Keys, frozen=True, kw_only=True):
     """A servo and its tendon.
 
-    A tension follows from the current without friction. The gears take some newtons of it when the
-    spool winds in, and add as much when the tendon pulls it out; see `ServoModel.friction_nm`.
+    A tension is computed from the current, without friction. The friction of the gears reduces it
+    by some newtons while the spool winds in, and increases it while the tendon pulls it out; see
+    `ServoModel.friction_nm`.
 
     Attributes:
-        name: Name of the tendon, such as "FDP"; that of its output.
+        name: Name of the tendon and of its output, such as "FDP".
         id: Id on the bus.
         model: Name of its model; see `MODELS`.
         spool_radius_m: Radius at which the tendon leaves the spool, half its thickness included, m.
@@ -252,7 +253,7 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
     zero: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] = 0
 
     def __post_init__(self) -> None:
-        """Refuse what the model cannot do."""
+        """Refuse settings that the model does not support."""
         family = self.known.family
         if self.id > family.most_id:
             raise KeyMistake("id", f"must be 0 to {family.most_id}, not {self.id}")
@@ -266,13 +267,13 @@ class ServoSettings(Keys, frozen=True, kw_only=True):
         if not family.has_watchdog and max(-self.shortest_m, self.longest_m) >= half:
             far = "longest_m" if self.longest_m >= half else "shortest_m"
             text = f"must be within {half:.4f} m of the zero, half a turn of the spool"
-            raise KeyMistake(far, f"{text}, because the servo forgets its turns with its power")
+            raise KeyMistake(far, f"{text}, because the servo loses its turns without power")
         least, most = self.newton_per_goal, self.known.most_counts * self.newton_per_goal
         end = f"{most:.0f} N with this spool"
         for key in ("most_tension_n", "pretension_n", "homing_n"):
             if not least <= (value := getattr(self, key)) <= most:
                 raise KeyMistake(key, f"must be {least:.2g} to {end}, not {value:g} N")
-            most = self.most_tension_n  # Of the others.
+            most = self.most_tension_n  # Limit of the other tensions.
             end = f"{most:g} N"
 
     def claims(self) -> Iterator[Claim]:
@@ -342,7 +343,7 @@ class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
     cut_ms: int = 200
 
     def __post_init__(self) -> None:
-        """Refuse what the servos cannot do together."""
+        """Refuse settings that the servos cannot have together."""
         names = {one.known.family.name: None for one in self.servos}
         if len(names) > 1:
             raise KeyMistake("device", f"cannot have {' and '.join(names)} servos together")

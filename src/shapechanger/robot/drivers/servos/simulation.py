@@ -1,21 +1,22 @@
 """Servos of a twin on one bus: motors, registers, safety functions, control, and their load.
 
-Sources as of `servos.toml`, whose registers they have. Assumed for want of a source, to be tried on
+The registers and their sources are in `servos.toml`. Assumptions without a source, to be tested on
 a rig:
 
-- A bus watchdog that trips in current mode takes the current away; in the manual the servo "will
+- A bus watchdog that trips in current mode sets the current to 0; in the manual the servo "will
   stop". Torque enable stays 1.
-- Any valid instruction on the bus feeds the watchdog, whichever servo it is for.
-- The gaps between registers cannot be read, nor parts of registers, but for those in the block of
-  present values. (Real servos may answer 0 for the gaps, so a driver must not rely on an error.)
+- Any valid instruction on the bus resets the watchdogs of all servos.
+- Gaps between registers and parts of registers cannot be read, except in the block of present
+  values. (Real servos may answer 0 for the gaps, so a driver must not rely on an error.)
 - Without power the count of turns is lost: the position starts again within one turn.
-- It needs 0.3 s to start.
+- A servo needs 0.3 s to start.
 - In a sync read, servos behind a silent one stay silent, the worst case.
-- With control of the length the current is proportional to the error of the position, with that of
-  a stall at 1/32 turn, and within the goal. That is 32 times 0.166 per rad in `bam`'s STS3215.
+- With control of the length, the current is proportional to the error of the position, reaches the
+  stall current at 1/32 turn, and is limited by the goal. `bam`'s STS3215 has 32 times 0.166 per
+  rad.
 - The goal of a Feetech servo limits the voltage, and with it the torque of a motor at rest.
-- A Feetech servo does not tell which instructions it refuses, and refuses to write to its EEPROM
-  while that is locked. An overload takes its torque away until it has lost its power.
+- A Feetech servo does not report which instructions it refuses, and refuses to write to its EEPROM
+  while that is locked. After an overload it has no torque until its power is cycled.
 """
 
 from __future__ import annotations
@@ -36,12 +37,12 @@ from shapechanger.robot.drivers.servos.settings import (
 from shapechanger.robot.hardware import ServoReply
 
 CABLE_N_PER_M: Final = 20e3
-"""Stiffness of cable and frame, N/m. Chosen: a good millimetre for 25 N. The end of the load needs
-a mass of more than 0.01 kg to follow such a spring in steps of 1 ms."""
+"""Stiffness of cable and frame, N/m. Chosen: a little over 1 mm for 25 N. The end of the load needs
+a mass of more than 0.01 kg for a stable simulation in steps of 1 ms."""
 
 _COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 
-# Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
+# Heat, chosen without a source: a servo that stalls with half its current gets about 55
 # degrees warmer, with a time constant of two minutes.
 _ROOM_C: Final = 25.0
 _KELVIN_PER_WATT: Final = 30.0
@@ -68,8 +69,8 @@ class SimulatedMotor:
         self._lever_m = settings.lever_m
         no_load = model.no_load_rad_per_s
         lost = (model.friction_nm + model.viscous * no_load) / model.stall_nm
-        self._electric_rad_per_s = no_load / (1.0 - lost)  # No current: friction takes some speed.
-        # In the middle of a count, as it stands while the finger is straight.
+        self._electric_rad_per_s = no_load / (1.0 - lost)  # Speed without current and friction.
+        # In the middle of the count at which the finger is straight.
         self._taut = self.angle = (settings.zero + 0.5) / _COUNTS_PER_RAD
         self.speed = self.current = self.tension = 0.0
         self.temperature = _ROOM_C
@@ -83,7 +84,7 @@ class SimulatedMotor:
     def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
         """Turn for one short step, while the far end of the tendon is `travel_m` towards it."""
         model, lever = self._model, self._lever_m
-        # The faster it turns, the less current the voltage can still drive.
+        # The voltage drives less current at higher speed.
         least, most = min(self.current_at(-volts), 0.0), max(self.current_at(volts), 0.0)
         self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, least), most)
         # Friction and cable use the speed at the end of the step, so that a stiff cable does not
@@ -114,9 +115,9 @@ class SimulatedMotor:
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
 """Faults of a servo.
 
-"mute": it obeys without answering. "deaf": it receives nothing. "hot", "overload": it shuts itself
-off. "snapped": its tendon is torn for good. "power": its power fails for a moment. "" repairs
-"mute", "deaf" and "hot".
+"mute": it obeys without answering. "deaf": it receives no instructions. "hot", "overload": it shuts
+itself off. "snapped": its tendon is permanently torn. "power": its power fails for a moment. ""
+repairs "mute", "deaf" and "hot".
 """
 
 _HOT_C: Final = 75.0
@@ -148,7 +149,7 @@ class SimulatedServo:
     Attributes:
         family: Family of the servo.
         values: Values of its registers.
-        mute, deaf: Whether it obeys without answering, and whether it receives nothing.
+        mute, deaf: Whether it obeys without answering, and whether it receives no instructions.
         motor: Its motor.
         volts: Voltage of its supply; 0 without power.
         pulls_a: Goal current in effect, A, with the sign of its registers; of a length its limit.
@@ -216,7 +217,7 @@ class SimulatedServo:
         return self._reply(refusal)
 
     def _refusal(self, name: str, data: bytes) -> int:
-        """Return the reason for which a register does not take data; 0 if it does."""
+        """Return the code of the refusal of data for a register; 0 if it is accepted."""
         family, values = self.family, self.values
         if not name or not (takes := family[name].takes):
             return _ACCESS
@@ -228,7 +229,7 @@ class SimulatedServo:
         value = family[name].decode(data)
         if name == "most":
             takes = ((0, self._model.most_counts),)
-        # A tripped watchdog refuses goals, and an error torque until a reboot.
+        # A tripped watchdog refuses goals; an error refuses torque until a reboot.
         tripped = name == "goal" and family.has_watchdog and values["mark"] == TRIPPED
         failed = values["hardware_error"] & self._model.shutdown
         blocked = tripped or (name == "torque_enable" and value and failed)
@@ -244,7 +245,7 @@ class SimulatedServo:
         self._cache()
 
     def set_power(self, *, on: bool) -> None:
-        """Switch its supply, from where it starts afresh."""
+        """Switch its supply; with power, the servo restarts."""
         self.lose_power()
         self.volts = self._model.volts if on else 0.0
 
@@ -289,7 +290,7 @@ class SimulatedServo:
         return self.motor.current_at(self.volts * wanted / self._model.stall_a)
 
     def _cache(self) -> None:
-        """Cache what each step needs of the registers."""
+        """Cache the registers that each step needs."""
         values, family = self.values, self.family
         steps = values["mark"] if family.has_watchdog else 0
         counts = self.has_torque and 0 < steps < TRIPPED
@@ -307,7 +308,7 @@ _STEP_NS: Final = 1_000_000
 
 @runtime_checkable
 class TendonWorld(Protocol):
-    """A world that tendons pull at, as their load, such as a finger."""
+    """A world that is the load of tendons, such as a finger."""
 
     @property
     def cable_stiffness(self) -> float:
@@ -319,7 +320,7 @@ class TendonWorld(Protocol):
         ...
 
     def travels(self) -> Sequence[float]:
-        """Return how far the end of each tendon is towards its spool since the beginning, m."""
+        """Return how far the end of each tendon has moved towards its spool since the start, m."""
         ...
 
     def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
@@ -330,11 +331,11 @@ class TendonWorld(Protocol):
 # Without such a world, each tendon pulls a massless spring with a damper between two stops.
 _SPRING_N_PER_M: Final = 300.0
 _DAMPER_NS_PER_M: Final = 60.0
-_NEAREST_M: Final = 0.02  # How far an end can be pulled; it cannot go the other way.
+_NEAREST_M: Final = 0.02  # Largest travel of an end towards its spool; 0 is the other stop.
 
 
 def pull_spring(travel_m: float, tension_n: float, dt_s: float) -> float:
-    """Return how far the end of a tendon is after it has pulled its spring for a step, m."""
+    """Return the travel of a tendon's end after it has pulled its spring for a step, m."""
     rest = tension_n / _SPRING_N_PER_M
     keep = math.exp(-dt_s * _SPRING_N_PER_M / _DAMPER_NS_PER_M)
     return min(max(rest + keep * (travel_m - rest), 0.0), _NEAREST_M)
@@ -349,7 +350,7 @@ class Rig:
 
     Attributes:
         device: Device of the bus.
-        servos: Servos by id.
+        servos: Servos, keyed by id.
         now_ns: Time of the bus.
         has_power: Whether the servos have power.
     """
@@ -380,14 +381,14 @@ class Rig:
         return {name: servo.motor.tension for name, servo in self._names.items()}
 
     def settle(self) -> None:
-        """Turn all spools until their tendons are just taut, wherever the load was moved."""
+        """Turn all spools until their tendons are just taut at the present place of the load."""
         if self._world is not None:
             self._travels = self._world.travels()
         for servo, travel in zip(self.servos.values(), self._travels, strict=True):
             servo.motor.settle(travel)
 
     def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
-        """Let servos answer what they are asked for; see `ServoPort.read`."""
+        """Read registers of servos; see `ServoPort.read`."""
         awake, replies = self._awake(), dict[int, ServoReply]()
         for one in ids:
             if one not in awake or awake[one].mute:
@@ -396,7 +397,7 @@ class Rig:
         return replies
 
     def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
-        """Let servos obey; see `ServoPort.write`."""
+        """Write registers of servos; see `ServoPort.write`."""
         awake = self._awake()
         replies = {one: awake[one].write(at, data[one]) for one in data if one in awake}
         return {one: reply for one, reply in replies.items() if not awake[one].mute}
@@ -447,5 +448,5 @@ class Rig:
                 raise UnknownName("fault of a servo", fault, get_args(ServoFault))
 
     def _awake(self) -> dict[int, SimulatedServo]:
-        """Return the servos that hear an instruction, by id."""
+        """Return the servos that receive an instruction, keyed by id."""
         return {one: servo for one, servo in self.servos.items() if servo.hears()}

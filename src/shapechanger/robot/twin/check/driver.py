@@ -31,11 +31,11 @@ FAILURES: Final = {
     "is late": signal.SIGUSR2,
     "gives NaN": signal.SIGALRM,
 }
-"""Signal at which a policy fails, keyed by how it fails."""
+"""Signal that makes a policy fail, keyed by the kind of failure."""
 
 
 class Driver(subprocess.Popen[bytes]):
-    """The driving process, which a `with` kills at its end.
+    """The driving process; the end of a `with` block kills it.
 
     Args:
         robot: The robot.

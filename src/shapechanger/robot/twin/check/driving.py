@@ -1,4 +1,4 @@
-"""Checks that drive a robot by hand: it moves when told, and stops by every means."""
+"""Checks that drive a robot by hand: it follows commands, and stops for every reason."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.robot import RunningRobot
 
-# Time from the last command to rest, beyond the deadline.
+# Time from the last command to rest, in addition to the deadline.
 _SLACK_MS: Final = 50.0
 _DRIVES_S: Final = 1.0
 _PUSH_S: Final = 0.3
@@ -29,7 +29,7 @@ _STANDS_MPS: Final = 0.02
 def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Finding]:
     """Check a robot with its wheels off the ground, driven by a person.
 
-    Each check begins with the state that the one before left.
+    Each check begins in the state after the previous one.
 
     Args:
         robot: The running robot.
@@ -83,7 +83,7 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
         sentence = f"Commands before arming: {seen.stop_reason}"
         yield Finding("boots disarmed", *judged(stands(seen), sentence))
         if not any(propels):
-            yield Finding("drives", "unknown", "Nothing of this robot propels.")
+            yield Finding("drives", "unknown", "This robot has no propulsion.")
             return
 
         client.arm()
@@ -92,10 +92,10 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
         if at_rest(seen):
             yield Finding("drives", "bad", f"It did not drive: {seen.stop_reason}")
         elif speed is None:
-            sentence = "Outputs moved; nothing measures whether wheels did."
+            sentence = "Outputs moved; without an encoder, it is unknown whether the wheels did."
             yield Finding("drives", "unknown", sentence)
         else:
-            sentence = f"The encoder says {speed:+.2f} m/s for forward."
+            sentence = f"The encoder measures {speed:+.2f} m/s for forward."
             yield Finding("drives", *judged(speed > 0.0, sentence))
 
         # The time without a command is measured on the robot's clock.

@@ -1,4 +1,4 @@
-"""Faults of which a robot must stop: how each happens, and by when the robot is at rest."""
+"""Faults after which a robot must stop: how to cause each, and the promised time to rest."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MOST_BYTES: Final = 65536
 
 
 class BadNetwork:
-    """Forwards TCP connections from a free port of 127.0.0.1 to another one, badly, until `close`.
+    """TCP proxy with faults, from a free port of 127.0.0.1 to another one, until `close`.
 
     Args:
         port: Port of 127.0.0.1 to forward to.
@@ -47,8 +47,8 @@ class BadNetwork:
         self.slice_bytes = _MOST_BYTES
         self.silent = False
         self._robot_port = port
-        self._ends: list[asyncio.StreamWriter] = []  # The driver's and the robot's in turn.
-        self._ended: set[asyncio.StreamWriter] = set()  # To which data are discarded.
+        self._ends: list[asyncio.StreamWriter] = []  # Alternately the driver's and the robot's.
+        self._ended: set[asyncio.StreamWriter] = set()  # Data to these writers are discarded.
         listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = listener.getsockname()[1]
         self._closed = asyncio.Event()
@@ -59,10 +59,10 @@ class BadNetwork:
         self._thread.start()
 
     def reset(self) -> None:
-        """Reset all connections, as a router does after a restart."""
+        """Reset all connections, like a router after a restart."""
         ends = [end for end in self._ends if not end.is_closing()]
-        # All linger for 0 s before one closes, which closes the other end of its connection, so
-        # that each sends a reset instead of an orderly end.
+        # Set SO_LINGER of all ends to 0 s before closing any, so that each sends a reset instead of
+        # an orderly end.
         option = (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         for end in ends:
             end.get_extra_info("socket").setsockopt(*option)
@@ -91,7 +91,7 @@ class BadNetwork:
         try:
             answers, robot = await asyncio.open_connection("127.0.0.1", self._robot_port)
         except OSError:
-            driver.close()  # As if the robot refused the connection.
+            driver.close()  # The same effect as if the robot refused the connection.
             return
         self._ends += driver, robot
         with suppress(asyncio.CancelledError):
@@ -122,7 +122,7 @@ class Scene:
         robot: The robot.
         driver: The driving process.
         network: The network between them.
-        opened: What to undo after the trial.
+        opened: Resources to close after the trial.
         board: The board of the robot's twin; None on pins.
     """
 
@@ -134,7 +134,7 @@ class Scene:
 
 
 Make = Callable[[Scene], int | None]
-"""Lets a fault happen, and returns its time: monotonic, ns; None for the time of the call."""
+"""Causes a fault, and returns its time: monotonic, ns; None for the time of the call."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,14 +143,14 @@ class Fault:
 
     Attributes:
         name: Description.
-        make: Lets it happen.
+        make: Causes it.
         within_ms: Promised time to rest after `after`, ms.
-        after: How the robot can notice it: at once, by its deadline, or by the age of a frame.
-        then: The robot afterwards: it continues, its processes restart, or it is gone.
+        after: How the robot can detect it: at once, by its deadline, or by the age of a frame.
+        then: The robot afterwards: it continues, its processes restart, or it has ended.
         needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot". The
             board makes the faults of the first three, and its ledger dates them.
         harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
-        silences: Whether later commands of the driver do not count.
+        silences: Whether later commands of the driver are ignored.
         guards_late: Whether the guard itself fails, which adds its own promised time.
         by_policy: Whether a policy drives, as on board, and a person armed the robot for it.
         on_pins: Whether it is also tried on the pins of a bench with LEDs.
@@ -179,12 +179,12 @@ _AT_ONCE_MS: Final = 5.0
 
 
 def _at_once(act: Callable[[], object]) -> int:
-    """Let an instantaneous fault happen and return its time, which is unknown if it took long."""
+    """Cause an instantaneous fault and return its time, which is unknown if it took long."""
     at_ns = time.monotonic_ns()
     act()
     took_ms = (time.monotonic_ns() - at_ns) / 1e6
     if took_ms > _AT_ONCE_MS:
-        raise NotTried(f"It took {took_ms:.0f} ms to let the fault happen.")
+        raise NotTried(f"It took {took_ms:.0f} ms to cause the fault.")
     return at_ns
 
 
@@ -309,7 +309,7 @@ FAULTS: Final = {
         _guard("guard killed", _to_program("guard", signal.SIGKILL)),
         _guard("guard stopped", _to_program("guard", signal.SIGSTOP), after="deadline"),
         _gone("supervisor killed", lambda s: _at_once(s.robot.supervisor.kill), 100.0),
-        # Only hardware remains: the one-shot of the enable line, 100 ms, and its tolerance.
+        # Only hardware remains then: the one-shot of the enable line, 100 ms, and its tolerance.
         _gone("guard and supervisor killed", _kill_both, 120.0, needs="one-shot", guards_late=True),
     )
 }

@@ -1,4 +1,4 @@
-"""Trials of faults: drive, let a fault happen, judge by the pins; and the levels of a check."""
+"""Trials of faults: drive, cause a fault, evaluate the pins; and the levels of a check."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _PWM_S: Final = 0.04
 
 
 class Watcher:
-    """Measures the outputs, independently of the robot's programs; this one measures nothing."""
+    """Measures the outputs independently of the robot's programs; the base class cannot measure."""
 
     def sees(self, lamp: BenchLamp) -> bool | None:
         """Return whether an LED is lit; None if that is not measured."""
@@ -58,7 +58,7 @@ class Watcher:
 
 
 class _BoardWatcher(Watcher):
-    """Reads the levels of a twin, whose ledger has the times."""
+    """Reads the levels of a twin; times come from its ledger."""
 
     def __init__(self, board: BoardAt, wiring: TwinWiring) -> None:
         self._wiring = wiring
@@ -104,7 +104,7 @@ class _ProbeWatcher(Watcher):
         self._hardware.close()
 
     def _changed(self, at_s: float, level: int) -> None:
-        del at_s, level  # The clock of lgpio is not stated.
+        del at_s, level  # The clock of lgpio is undocumented.
         self._last_ns = time.monotonic_ns()
 
 
@@ -156,7 +156,7 @@ class Bench:
 
     @cached_property
     def robot(self) -> RunningRobot:
-        """The robot, served now if it is not."""
+        """The robot; it is served on first use."""
         folder = self.board.folder if self.twin else None
         served = run_robot(self.profile, twin=self.twin, folder=folder, arguments=self.arguments)
         return self._stack.enter_context(served)
@@ -189,29 +189,29 @@ class Bench:
             return make_safe(self.profile, hardware)
 
     def lacks(self, need: str) -> str:
-        """Return why a fault is not tried; "" if the robot has what it needs."""
+        """Return why a fault is not tried; "" if the robot has the required part."""
         profile = self.profile
         has = {
             "camera": profile.camera is not None,
             "bumper": any(sensor.measures == "bump" for sensor in profile.sensors),
             "button": profile.stop_pin is not None,
-            # Pins without it are tried, too: whoever has fitted none learns what then happens.
+            # Tried on pins even without the part, because it shows the effect of its absence.
             "one-shot": profile.enable_pin is not None or not self.twin,
             "throttle": any(one.name == "throttle" and one.propels for one in profile.actions),
         }
         return "" if has.get(need, True) else f"This robot has no {need}."
 
 
-# A supervisor gives up after five restarts within a minute, which would count as a kept promise.
+# A supervisor gives up after five restarts within a minute, which would count as a success.
 _MOST_RESTARTS: Final = 4
 # A busy machine can make a robot restart, or pause while a fault is made.
 _ATTEMPTS: Final = 10
-# Times a trial is tried in which the robot was not moving before the fault.
+# Number of attempts at a trial in which the robot was not moving before the fault.
 _TRIES: Final = 3
 _COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
 _STARTS_S: Final = 30.0
-# Time after the promise for which everything must stay at rest.
+# Time after the promised time for which all outputs must stay at rest.
 _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
 # Tolerance beyond the deadline of a command.
@@ -223,12 +223,12 @@ class TrialResult:
     """Result of one trial.
 
     Attributes:
-        stopped_ms: Time from the fault to permanent rest, ms; infinite for never, NaN if nothing
-            measures it.
+        stopped_ms: Time from the fault to permanent rest, ms; infinite for never, NaN if it is not
+            measured.
         limit_ms: The promised time, ms.
         drove: Whether it was driving at the fault; the trial is void otherwise.
         unauthorised: Times of propulsion without a fresh command; empty without a ledger.
-        answer: Whether a person saw it drive and stop; None if nobody was asked, or answered.
+        answer: Whether a person saw it drive and stop; None without an answer.
     """
 
     stopped_ms: float
@@ -323,7 +323,7 @@ def _try(bench: Bench, fault: Fault) -> TrialResult:
             return _judged(bench, fault, began_ns, at_ns, driver.sent)
         stopped_ms = watcher.rest_ms(at_ns)
         answer = None
-        if math.isnan(stopped_ms):  # Asked before anything else puts the LEDs out.
+        if math.isnan(stopped_ms):  # Ask now, before the LEDs go out for another reason.
             question = "Did a motor's LED light up, and are all of them out now"
             answer = bench.ask(f"{question} ({fault.name})?")
         return TrialResult(stopped_ms, limit_ms, drove, answer=answer)
@@ -357,14 +357,14 @@ def _judged(
     """Judge a trial on a twin by its ledger."""
     profile, ledger = bench.profile, read_ledger(bench.board.ledger_path)
     if fault.needs in {"camera", "bumper", "button"}:
-        # It begins with its line of the ledger, which of a switch is its edge. Until then the
-        # request waits for this process and the board, neither of which is part of a robot.
+        # The fault begins with its line in the ledger, or with the edge of a switch. The time until
+        # then is not the robot's.
         switches = [one.settings["pins"] for one in profile.sensors if one.driver == "switch"]
         pins = [profile.stop_pin, *(pin for pins in switches for pin in pins)]
         begins = {("fault", None)} if fault.needs == "camera" else {("input", pin) for pin in pins}
         made = (one.t for one in ledger if one.t >= at_ns and (one.kind, one.pin) in begins)
         at_ns = next(made, at_ns)
-    # A fault of the guard itself has its own promised time.
+    # A fault of the guard itself has a separate promised time.
     slack_ms = fault.within_ms if fault.guards_late else _LATE_MS
     obeyed_ns = (profile.limits.deadline_ms + slack_ms) * 1e6
     last_ns = at_ns + _LATE_MS * 1e6 if fault.silences else math.inf
@@ -424,7 +424,7 @@ def require_level(level: CheckLevel, bench: Bench) -> None:
         lamps_of(bench.profile)
     if level == "faults" and bench.lacks("throttle"):
         name = bench.profile.name
-        raise RobotError(f"Nothing of {name} propels, so there is nothing to stop.")
+        raise RobotError(f"{name} has no propulsion, so there is nothing to stop.")
 
 
 def check_robot(
@@ -437,7 +437,7 @@ def check_robot(
     Args:
         level: The level.
         bench: The robot, and where it is.
-        standing: The robot for the checks that move nothing.
+        standing: The robot for the checks without motion.
         cap: Largest throttle of the checks that drive, 0 to 1.
         trials: Trials of each fault.
     """
