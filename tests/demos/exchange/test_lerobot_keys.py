@@ -278,3 +278,15 @@ def test_one_damaged_file_of_several(tmp_path: Path) -> None:
     assert pairs_of(folder)[0] == BOTH
     with pytest.raises(DemosError, match=r"video cannot be read.*file-001"):
         context.require_whole(folder)
+
+
+@pytest.mark.parametrize("named", [0, 7])
+def test_rows_are_found_in_a_file_that_is_not_named(tmp_path: Path, named: int) -> None:
+    """LeRobot's converter to version 3 wrote wrong numbers of files to `meta/episodes`."""
+    folder = write_set(tmp_path / "set", places=place(1, **{"data/file_index": named}))
+    table = pq.read_table(folder / DATA)
+    pq.write_table(table.slice(0, 8), folder / DATA)
+    pq.write_table(table.slice(8), (folder / DATA).with_name("file-001.parquet"))
+    pairs, context = pairs_of(folder)
+    assert pairs == [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
+    assert not context.left_out

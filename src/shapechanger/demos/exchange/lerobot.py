@@ -12,6 +12,7 @@ What contradicts is left out: one of them is wrong, and nothing says which.
 
 from __future__ import annotations
 
+import glob
 import math
 import re
 from collections import defaultdict
@@ -248,6 +249,20 @@ class _Dataset:
                 self._context.leave_out("episode", f"that {EPISODES} does not have", f"{number:g}")
         return self._groups[path]
 
+    def _data_file(self, entry: _Entry) -> Path:
+        """Return the file with the rows of an episode.
+
+        LeRobot's converter to version 3 wrote wrong numbers of files (its issue 2401), so the rows
+        are searched in all files if the one that `meta/episodes` names does not have them.
+        """
+        name = self._named(self._info.data_path, entry.data_chunk, entry.data_file)
+        every = glob.glob(_PLACE.sub("*", glob.escape(self._info.data_path)), root_dir=self._folder)
+        for at in sorted(every, key=lambda at: (at != name, at)):
+            path = files.inside(self._folder, at, INFO)
+            if self._groups_of(path)[entry.episode_index]:
+                return path
+        return files.inside(self._folder, name, f"{self._folder / EPISODES} with {INFO}")
+
     def _named(self, template: str, chunk: int, file: int) -> str:
         """Fill in a template of `info.json`, without Python's own formats."""
         about = {"chunk_index": str(chunk), "file_index": str(file)}
@@ -312,8 +327,7 @@ class _Dataset:
         steps = enumerate(pictures)
         done, read = 0, b""
         stored = [self._stored] if self._stored else []
-        name = self._named(self._info.data_path, entry.data_chunk, entry.data_file)
-        path = files.inside(self._folder, name, f"{self._folder / EPISODES} with {INFO}")
+        path = self._data_file(entry)
         for _, batch in _batches(path, [*sizes, *stored], self._groups_of(path)[number]):
             columns = {key: _vectors(batch, key, size, path) for key, size in sizes.items()}
             ours = np.flatnonzero(columns[_KEYS[0]] == number)
