@@ -21,7 +21,7 @@ _STEPS = 20
 @pytest.mark.parametrize(
     ("env_id", "arguments", "most_calls", "most_files"),
     [
-        ("Ant", {}, 6, 2),
+        ("Ant", {}, 8, 2),
         ("Car", {"image": False, "state": True}, 151, 12),
         ("CarRanges", {}, 60, 11),
         ("Finger", {}, 48, 7),

@@ -151,7 +151,7 @@ def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
     with pytest.raises(DemosError, match=r"lacks steering/applied, speed, yaw_rate: give --resp"):
         as_waypoints(data)
     assert as_waypoints(data, SteeringResponse(1.9, 0.0)).kept.sum() == 50
-    with pytest.raises(DemosError, match="has no speed, on which the waypoints of"):
+    with pytest.raises(DemosError, match="has no speed, on which the waypoint depends"):
         as_waypoints(data, SteeringResponse(0.8, 3.1))
     only_speed = Layout((Feature("speed", "m/s"),))
     data = _loaded(_record(tmp_path / "other", state=only_speed))

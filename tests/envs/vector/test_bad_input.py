@@ -13,7 +13,13 @@ from gymnasium.vector import AutoresetMode
 
 import shapechanger
 from shapechanger.envs.vector import ThreadVectorEnv
-from shapechanger.errors import BadAction, SpaceMismatch, UnknownName, VectorEnvError
+from shapechanger.errors import (
+    BadAction,
+    EnvArgumentError,
+    SpaceMismatch,
+    UnknownName,
+    VectorEnvError,
+)
 from shapechanger.morphology import JointRange, Remove
 
 
@@ -82,7 +88,11 @@ def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str) -> Non
         ("Ant", {"backend": "warp", "threads": 2}, "takes no threads"),
         ("Ant", {"backend": "warp", "copy": False}, "always copies observations"),
         ("Ant", {"backend": "warp", "njmax": 0}, "needs at least one njmax, got 0"),
-        ("Ant", {"backend": "warp", "render_mode": "rgb_array"}, "no render_mode: nothing is"),
+        (
+            "Ant",
+            {"backend": "warp", "render_mode": "rgb_array"},
+            "no render_mode: a device cannot render",
+        ),
         (
             "Ant",
             {"backend": "warp", "towards": "BigAnt"},
@@ -92,11 +102,13 @@ def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str) -> Non
         ("Ant", {"pool": ["Ant"]}, "backend='threads' takes no pool: use backend='warp'"),
         ("Ant", {"device": "cpu"}, "takes no device: use backend='warp'"),
         ("Ant", {"njmax": 3}, "backend='threads' takes no njmax"),
+        ("Ant", {"reset_noise_scal": 0.1}, "Did you mean 'reset_noise_scale'"),
+        ("Ant", {"reset_noise_scale": "much"}, "reset_noise_scale must be a number, got 'much'"),
     ],
 )
 def test_bad_arguments_are_refused(env_id: str, arguments: dict[str, Any], sentence: str) -> None:
     """Unknown names, and what a backend does not have."""
-    with pytest.raises((VectorEnvError, UnknownName), match=sentence):
+    with pytest.raises((VectorEnvError, UnknownName, EnvArgumentError), match=sentence):
         shapechanger.make_vec(env_id, 2, **arguments)
 
 

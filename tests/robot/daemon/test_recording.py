@@ -229,7 +229,7 @@ async def test_one_question_about_recordings_at_a_time(robot: Running, tmp_path:
             await program.send(Fetch(episode=name))
         await program.send(Browse())
         refused = await program.expect(Refused)
-        assert "one question" in refused.reason
+        assert "one request" in refused.reason
         await program.send(Ping(token=1))
         await program.expect(Pong)
         pieces = [m for m in program.received if isinstance(m, Piece)]

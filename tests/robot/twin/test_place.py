@@ -72,4 +72,4 @@ def test_a_board_that_fails_to_start_prints_the_reason(
 ) -> None:
     with pytest.raises(RobotError, match="did not start"):
         start_board(CAR, "twin", tmp_path, place=course_place("corridor", "tank"))
-    assert "A tank has no 'steering' or 'wheels'" in capfd.readouterr().err
+    assert "a tank is driven by 'left track' and 'right track'" in capfd.readouterr().err

@@ -72,7 +72,7 @@ def test_undefined_measures_have_a_reason() -> None:
     not_learnt = make_study(scratch=flat, fine_tune=flat, zero_shot=flat[:, :1])
     rows = by_name(not_learnt, "fine-tune")
     assert rows["Jumpstart"].unit == "value"
-    assert "there is no score" in rows["Time to threshold 0.5: steps saved"].note
+    assert "no score exists" in rows["Time to threshold 0.5: steps saved"].note
 
 
 def test_notes_name_their_way_of_counting() -> None:
