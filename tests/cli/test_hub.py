@@ -164,7 +164,7 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     push = ("policies", "push", POLICY, "ada/new")
     assert "no model ada/none on the Hub, or it is private" in refused(run(*pull))
     assert "hf auth login" in refused(run(*pull, token=""))
-    assert "wants to know who asks" in refused(run(*push, token=""))
+    assert "requires a login" in refused(run(*push, token=""))
     assert "forbids this for ada/new" in refused(run(*push, token=READER))
     # A token that no header can carry must not be part of the error.
     answer = run(*push, token="hf_söcret")
