@@ -1,41 +1,6 @@
 """Exceptions. Each message is one sentence with the names that exist, or the way out.
 
-```
-ShapechangerError
-├── UnknownName (ValueError)        unknown name, with the nearest spelling
-├── LayoutError (ValueError)        inconsistent layout
-├── MorphologyError (ValueError)    edit that does not fit the model
-│   ├── BrokenModel                 edited model that does not compile
-│   └── EmptyShift                  source and target behave identically
-├── SpaceMismatch (ValueError)      incompatible spaces
-├── BadAction (ValueError)          action that an env cannot take
-├── EnvArgumentError (ValueError)   argument of an env with the wrong type
-├── VectorEnvError (ValueError)     vector env that cannot be made as requested
-├── FingerError (ValueError)        finger that cannot be built or moved as requested
-├── WorldError (ValueError)         world that cannot be laid out as requested
-├── TaskError (ValueError)          task of the user's own that cannot be used
-├── PathError (ValueError)          fingertip path that cannot be made as requested
-├── MapError (ValueError)           body map that cannot be built, inverted or composed
-├── TransplantError (ValueError)    policy whose weights cannot be transplanted
-├── PolicyError (ValueError)        file that is no policy, or a policy that does not fit
-├── StudyError (ValueError)         study that cannot start
-│   ├── FailedRuns                  runs that failed, while all others ended
-│   ├── ForeignStudy                output folder of something else
-│   └── CorruptStudy                unreadable file of a study
-├── DemosError (ValueError)         demonstrations that cannot be recorded, read or learned from
-│   └── BrokenEpisode               incomplete episode, with the command that repairs it
-├── LinkError (ConnectionError)     robot that cannot be reached or breaks the protocol
-│   ├── RobotRefused                the robot refuses, with its reason
-│   └── StaleObservation            newest observation too old to act on
-├── HubError (ConnectionError)       repository on the Hub that cannot be reached or is refused
-├── RobotError (RuntimeError)       error on the robot, such as a device that does not respond
-│   └── ProfileError (ValueError)   invalid profile, with the line
-├── OutputError (OSError)           file or folder that cannot be written
-├── RenderError (RuntimeError)      rendering not possible here
-└── MissingExtra (ImportError)      optional dependency, with the command that installs it
-```
-
-Each class also inherits from the builtin in brackets.
+Each class also inherits from the builtin error that it is a kind of.
 """
 
 from __future__ import annotations
