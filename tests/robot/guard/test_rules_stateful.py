@@ -65,7 +65,9 @@ class _World(RuleBasedStateMachine):
         self.until_ns = 0
         self.frame_ns: int | None = None
         self.sensing = Sensing()
-        self.forward_free_ns = 0
+        self.forward_free_ns = self.sensed_ns = 0
+        self.low_since_ns: int | None = None
+        self.is_empty = False
         self.actions = tuple(action.rest for action in plan.actions)
         self.ticked_ns = self.now_ns
 
@@ -104,16 +106,10 @@ class _World(RuleBasedStateMachine):
         until_ns = min(issued_ns, self.now_ns) + min(_DEADLINE_NS, ttl_ms * MS)
         is_newer = (session, seq) > self.newest
         self.newest = max(self.newest, (session, seq))
-        accepted = (
-            self.armed
-            and is_newer
-            and issued_ns <= self.now_ns + 50 * MS
-            and self.now_ns < until_ns
-            and len(values) == 2
-        )
+        is_due = is_newer and issued_ns <= self.now_ns + 50 * MS and self.now_ns < until_ns
+        accepted = self.armed and is_due and len(values) == 2
         assert accepted == (not refusal)
-        is_due = issued_ns <= self.now_ns + 50 * MS and self.now_ns < until_ns
-        if is_newer and is_due and len(values) != 2:
+        if is_due and len(values) != 2:
             self.acting = None  # An invalid newer command ends the previous one.
         if accepted:
             self.acting, self.until_ns = (session, seq), until_ns
@@ -144,6 +140,7 @@ class _World(RuleBasedStateMachine):
         assert (age_ns < 1_000 * MS and knows) == (not refusal)
         if not refusal:
             self.armed, self.emergency, self.acting = True, False, None
+            self.is_empty = self.is_low()
 
     @rule(kind=st.sampled_from(["disarm", "emergency", "end"]))
     def stop(self, kind: str) -> None:
@@ -167,23 +164,18 @@ class _World(RuleBasedStateMachine):
         is_slow=st.booleans(),
     )
     def sense(
-        self,
-        bump: bool,
-        distance: float,
-        speed: float,
-        volts: float,
-        fails: str,
-        is_slow: bool,
+        self, bump: bool, distance: float, speed: float, volts: float, fails: str, is_slow: bool
     ) -> None:
         """Report any sensor readings."""
-        quantities = {
-            "bump": float(bump),
-            "distance": distance,
-            "speed": speed,
-            "battery": volts,
-        }
+        quantities = {"bump": float(bump), "distance": distance, "speed": speed, "battery": volts}
         names = {"bumper": "bump", "wheel": "speed", "meter": "battery", "eye": "distance"}
         quantities.pop(names.get(fails, ""), None)
+        if quantities.get("battery", 7.0) >= 6.0:
+            self.low_since_ns = None
+        elif self.low_since_ns is None:
+            self.low_since_ns = self.now_ns
+        self.sensed_ns = self.now_ns
+        self.is_empty = self.is_empty or self.is_low()
         self.sensing = Sensing(
             quantities,
             dict.fromkeys(quantities, "one"),
@@ -200,10 +192,18 @@ class _World(RuleBasedStateMachine):
 
     @rule()
     def wait_for_the_rules(self) -> None:
-        """Advance to the wake time of the rules, as the guard's loop does."""
+        """Advance to the wake time of the rules, which is no later than any change."""
         wake_ns = self.rules.next_wake_ns(self.now_ns)
-        assert self.now_ns < wake_ns <= self.now_ns + _TICK_NS
+        changes = [self.now_ns + _TICK_NS, self.forward_free_ns]
+        changes += [self.until_ns] * (self.acting is not None)
+        if self.stale_ns and self.frame_ns is not None:
+            changes.append(self.frame_ns + self.stale_ns)
+        assert self.now_ns < wake_ns <= min(at_ns for at_ns in changes if at_ns > self.now_ns)
         self.now_ns = wake_ns
+
+    def is_low(self) -> bool:
+        """Return True if the battery was low for half a second when it was measured last."""
+        return self.low_since_ns is not None and self.sensed_ns - self.low_since_ns >= 500 * MS
 
     @invariant()
     def holds(self) -> None:
@@ -225,8 +225,8 @@ class _World(RuleBasedStateMachine):
         )
         may_act = self.armed and not self.emergency and is_fresh and not is_blind
         protects_no_longer = self.sensing.failures.keys() & {"bumper", "meter", "eye"}
-        if not may_act or protects_no_longer or self.sensing.slow:
-            assert decision.seq is None
+        may_act = may_act and not (protects_no_longer or self.sensing.slow or self.is_empty)
+        assert (decision.seq is not None) == may_act
         if decision.seq is None:
             assert throttle == 0.0
             assert decision.stop_reason
