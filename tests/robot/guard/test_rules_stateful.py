@@ -22,9 +22,8 @@ _DEADLINE_NS = 100 * MS
 _levels = st.sampled_from(["any", "three"])
 _slews = st.sampled_from([1.0, 5.0, float("inf")])
 _values = st.one_of(st.floats(-1.5, 1.5), st.sampled_from([0.0, 1.0, -1.0, 1e300, -5]))
-_ages = st.one_of(
-    st.integers(-60 * MS, 200 * MS), st.sampled_from([0, _DEADLINE_NS, _DEADLINE_NS - 1, 60 * MS])
-)
+_ages = st.sampled_from([0, -50 * MS, -50 * MS - 1, 60 * MS, _DEADLINE_NS, _DEADLINE_NS - 1])
+_ages |= st.integers(-60 * MS, 200 * MS)
 _steps = st.one_of(
     st.integers(1, 30 * MS), st.sampled_from([1, _TICK_NS, _DEADLINE_NS, 20 * _DEADLINE_NS])
 )
@@ -39,8 +38,11 @@ class _World(RuleBasedStateMachine):
         slew_down=_slews,
         stop=st.sampled_from(["hold", "release"]),
         stale_ms=st.sampled_from([0, 60, 150]),
+        drives=st.booleans(),
     )
-    def start(self, levels: str, slew: float, slew_down: float, stop: str, stale_ms: int) -> None:
+    def start(
+        self, levels: str, slew: float, slew_down: float, stop: str, stale_ms: int, drives: bool
+    ) -> None:
         """Set up a car with or without a camera whose limit differs from the deadline."""
         self.stale_ns = stale_ms * MS
         limits = LimitPlan(
@@ -70,15 +72,17 @@ class _World(RuleBasedStateMachine):
         self.is_empty = False
         self.actions = tuple(action.rest for action in plan.actions)
         self.ticked_ns = self.now_ns
+        if drives:
+            self.drive([0.3, 0.4])
 
     @rule(
         session=st.integers(0, 3),
         seq=st.integers(0, 40),
         age_ns=_ages,
-        ttl_ms=st.sampled_from([0, 1, 50, 100, 10_000]),
+        ttl_ms=st.sampled_from([0, 1, 50, 100, 10_000, 10_000]),
         values=st.lists(_values, min_size=1, max_size=3),
         frame_age_ns=st.none() | _ages,
-        follows=st.booleans(),
+        ahead=st.sampled_from([1, 1, 0, None]),
         is_good=st.booleans(),
     )
     def command(
@@ -89,14 +93,14 @@ class _World(RuleBasedStateMachine):
         ttl_ms: int,
         values: list[float],
         frame_age_ns: int | None,
-        follows: bool,
+        ahead: int | None,
         is_good: bool,
     ) -> None:
-        """Offer any command; half have the next number, half are valid except for their age."""
-        if follows:
-            session, seq = max(self.newest[0], 0), self.newest[1] + 1
+        """Offer any command; half are the next one, and half have enough values and a frame."""
+        if ahead is not None:
+            session, seq = max(self.newest[0], 0), self.newest[1] + ahead
         if is_good:
-            ttl_ms, frame_age_ns, values = 1_000, 0, (values * 2)[:2]
+            frame_age_ns, values = 0, (values * 2)[:2]
         issued_ns = self.now_ns - age_ns
         frame_ns = None if frame_age_ns is None else self.now_ns - frame_age_ns
         order = Order("command", session, seq, issued_ns, ttl_ms, frame_ns, tuple(values))
@@ -118,7 +122,7 @@ class _World(RuleBasedStateMachine):
     def drive(self, values: list[float]) -> None:
         """Arm and send a valid command, so that there is motion to stop."""
         self.arm(0, 0, person=True)
-        self.command(0, 0, 0, 1_000, values, 0, follows=True, is_good=True)
+        self.command(0, 0, 0, 1_000, values, 0, ahead=1, is_good=True)
 
     @rule(steps=st.integers(2, 30))
     def run_ticks(self, steps: int) -> None:
