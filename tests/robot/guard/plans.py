@@ -2,31 +2,12 @@
 
 from dataclasses import replace
 
-from shapechanger.contract.plan import (
-    ActionPlan,
-    GuardPlan,
-    LimitPlan,
-    OutputPlan,
-    SensorPlan,
-    StopPlan,
-)
+from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, SensorPlan, StopPlan
 from shapechanger.robot.guard.channel import Order
+from tests.robot.twin.robots import hbridge
 
 MS = 1_000_000
 """Nanoseconds of a millisecond."""
-
-
-def motor(name: str, forward: int, backward: int, mix: dict[str, float], part: str) -> OutputPlan:
-    """A motor on two pins of an H-bridge."""
-    settings = {
-        "forward": forward,
-        "backward": backward,
-        "enable": -1,
-        "pwm_hz": 50,
-        "start": 0.0,
-        "full": 1.0,
-    }
-    return OutputPlan(name, "hbridge", part, mix, 0.0, settings)
 
 
 def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardPlan:
@@ -38,8 +19,8 @@ def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardP
             ActionPlan("throttle", -0.4, 0.6, slew_per_s=2.0, propels=True),
         ),
         outputs=(
-            motor("steer", 17, 4, {"steering": 1.0}, "steering"),
-            motor("drive", 22, 27, {"throttle": 1.0}, "wheels"),
+            hbridge("steer", "steering", (17, 4), {"steering": 1.0}),
+            hbridge("drive", "wheels", (22, 27), {"throttle": 1.0}),
         ),
         sensors=(
             SensorPlan("bumper", "switch", "bump"),

@@ -7,17 +7,20 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from shapechanger.contract.plan import GuardPlan
+from shapechanger.robot.guard import start
 from shapechanger.robot.guard.running import ServePlan, plan_fd
 from tests.robot.guard.plans import quick_car
 from tests.robot.guard.recording import Record
-from tests.robot.guard.waiting import until
+from tests.robot.twin import robots
 
 _START = Path(__file__).with_name("start_recorded.py")
 _PINS = {"GPIO17", "GPIO4", "GPIO22", "GPIO27"}
+
+until = partial(robots.until, seconds=20.0)
 
 
 class Robot:
@@ -46,12 +49,7 @@ class Robot:
         return [line["t"] for line in self.record.lines() if "command" in line]
 
     def rested_ns(self, after_ns: int, pid: int | None = None) -> int:
-        """Wait until every pin went to rest after a time, and return when the last one did.
-
-        Args:
-            after_ns: The time.
-            pid: Process that must have set the pins; None for any.
-        """
+        """Wait until each pin went to rest after a time, set by process `pid`; return the last."""
         found: dict[str, int] = {}
 
         def look() -> bool:
@@ -68,9 +66,6 @@ class Robot:
         until(look)
         return max(found.values())
 
-    def notes(self, key: str) -> list[Any]:
-        return [line[key] for line in self.record.lines() if key in line]
-
 
 @contextlib.contextmanager
 def running(folder: Path, plan: GuardPlan | None = None, **daemon: object) -> Iterator[Robot]:
@@ -84,7 +79,8 @@ def running(folder: Path, plan: GuardPlan | None = None, **daemon: object) -> It
             hardware=("tests.robot.guard.recording:connect", str(record.path)),
         )
     )
-    command = [sys.executable, "-I", str(_START), "supervise", "--plan-fd", str(fd)]
+    program = [sys.executable, "-I", str(_START), str(start.__file__)]
+    command = [*program, "supervise", "--plan-fd", str(fd)]
     with open(folder / "log", "wb") as log:
         process = subprocess.Popen(command, pass_fds=[fd], stderr=log)
     os.close(fd)

@@ -4,26 +4,22 @@ The time limits are ten times those promised, because the test machine may be bu
 measures the real times.
 """
 
-import contextlib
 import logging
 import os
 import re
 import signal
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
-from shapechanger.contract.plan import GuardPlan, LimitPlan
 from shapechanger.robot.guard import supervisor
 from shapechanger.robot.guard.running import ServePlan
 from shapechanger.robot.guard.supervisor import Restarts, Supervisor
-from shapechanger.robot.hardware import Hardware
 from tests.robot.guard.plans import MS, quick_car
-from tests.robot.guard.running import running
-from tests.robot.guard.waiting import until
+from tests.robot.guard.running import running, until
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="Robots run Linux."),
@@ -55,6 +51,9 @@ def test_sigterm_stops_the_robot(tmp_path: Path) -> None:
         assert robot.process.wait(20) == 0
         assert robot.record.is_at_rest()
         assert all(map(_is_gone, robot.pids("hardware") + robot.pids("daemon")))
+    said = [line for line in _log(tmp_path).splitlines() if line.startswith("guard: ")]
+    assert said[0] == "guard: guards test car with 2 outputs."
+    assert said[-1] == "guard: ends: ended by SIGTERM."
 
 
 def test_the_daemon_can_end_the_robot(tmp_path: Path) -> None:
@@ -63,48 +62,31 @@ def test_the_daemon_can_end_the_robot(tmp_path: Path) -> None:
         assert robot.record.is_at_rest()
 
 
-def test_killed_daemon(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("victim", "number", "most_ms"),
+    [
+        ("daemon", signal.SIGKILL, 200),
+        ("daemon", signal.SIGSTOP, 450),
+        ("hardware", signal.SIGKILL, 1_000),
+        ("hardware", signal.SIGSTOP, 3_500),
+    ],
+)
+def test_a_killed_or_stopped_process(
+    tmp_path: Path, victim: str, number: signal.Signals, most_ms: int
+) -> None:
+    """The guard rests the pins, or the supervisor for it; the restart does not clear the stop."""
     with running(tmp_path) as robot:
         robot.drive()
-        guard = robot.pids("hardware")[0]
-        killed_ns = robot.kill("daemon", signal.SIGKILL)
-        assert robot.rested_ns(killed_ns, guard) - killed_ns < 200 * MS
+        guard, gone = robot.pids("hardware")[0], robot.pids(victim)[0]
+        at_ns = robot.kill(victim, number)
+        rests = guard if victim == "daemon" else robot.process.pid
+        assert robot.rested_ns(at_ns, rests) - at_ns < most_ms * MS
         until(lambda: len(robot.pids("daemon")) == len(robot.pids("hardware")) == 2)
-        assert _is_gone(guard)
+        assert all(map(_is_gone, (guard, gone)))
         assert robot.record.is_at_rest()
-        # The restart must not clear a stop.
         text = "guard: Emergency stop: the robot's processes failed and started afresh."
         until(lambda: text in _log(tmp_path))
-
-
-def test_silent_daemon(tmp_path: Path) -> None:
-    with running(tmp_path, commands=20) as robot:
-        until(lambda: len(robot.commands()) == 20)
-        last_ns = robot.commands()[-1]
-        rested_ns = robot.rested_ns(last_ns)
-        assert 240 * MS < rested_ns - last_ns < 450 * MS
-
-
-def test_stopped_daemon(tmp_path: Path) -> None:
-    with running(tmp_path) as robot:
-        robot.drive()
-        stopped_ns = robot.kill("daemon", signal.SIGSTOP)
-        assert robot.rested_ns(stopped_ns) - stopped_ns < 450 * MS
-        until(lambda: len(robot.pids("daemon")) == 2)
-        assert _is_gone(robot.pids("daemon")[0])
-        assert "the daemon was silent, and was killed" in _log(tmp_path)
-
-
-@pytest.mark.parametrize(("number", "most_ms"), [(signal.SIGKILL, 1_000), (signal.SIGSTOP, 3_500)])
-def test_killed_or_stopped_guard(tmp_path: Path, number: signal.Signals, most_ms: int) -> None:
-    with running(tmp_path) as robot:
-        robot.drive()
-        guard = robot.pids("hardware")[0]
-        gone_ns = robot.kill("hardware", number)
-        assert robot.rested_ns(gone_ns, robot.process.pid) - gone_ns < most_ms * MS
-        assert _is_gone(guard)
-        until(lambda: len(robot.pids("hardware")) == 2)
-        assert robot.record.is_at_rest()
+    assert ("was silent, and was killed" in _log(tmp_path)) == (number is signal.SIGSTOP)
 
 
 def test_killed_supervisor(tmp_path: Path) -> None:
@@ -116,6 +98,14 @@ def test_killed_supervisor(tmp_path: Path) -> None:
         assert robot.rested_ns(killed_ns, guard) - killed_ns < 1_000 * MS
         until(lambda: all(map(_is_gone, (guard, *robot.pids("daemon")))))
         assert robot.record.is_at_rest()
+
+
+def test_silent_daemon(tmp_path: Path) -> None:
+    with running(tmp_path, commands=20) as robot:
+        until(lambda: len(robot.commands()) == 20)
+        last_ns = robot.commands()[-1]
+        rested_ns = robot.rested_ns(last_ns)
+        assert 240 * MS < rested_ns - last_ns < 450 * MS
 
 
 def test_a_resumed_supervisor_restarts_nothing(tmp_path: Path) -> None:
@@ -179,124 +169,84 @@ def test_a_stuck_output_at_the_start_ends_the_supervisor(tmp_path: Path) -> None
     assert re.search("gives up: .* has ended, and not all outputs are at rest.", _log(tmp_path))
 
 
-class _Stuck:
-    """A guard stuck in the kernel: SIGKILL takes effect only after some polls."""
+def _child(name: str, polls: int) -> Mock:
+    """A child that was killed, and is gone after some polls: it is stuck in the kernel."""
+    child = Mock(killed=True, has_beaten=True, code=None)
+    child.name = name
 
-    name = "guard"
-    has_beaten = True
+    def has_ended() -> bool:
+        if child.has_ended.call_count >= polls:
+            child.code = -9
+        return child.code is not None
 
-    def __init__(self, looks: int) -> None:
-        self.killed = True
-        self.looks = looks
-        self.code: int | None = None
-
-    def is_gone(self, now_ns: int) -> bool:
-        return self.has_ended()
-
-    def has_ended(self) -> bool:
-        self.looks -= 1
-        if self.looks <= 0:
-            self.code = -9
-        return self.looks <= 0
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-    def __getattr__(self, name: str) -> object:
-        raise AssertionError(f"{name} was used although the guard was already killed")
+    child.has_ended.side_effect = has_ended
+    return child
 
 
-class _Daemon(_Stuck):
-    """A daemon that exits when terminated."""
-
-    name = "daemon"
-
-    def terminate(self) -> None:
-        self.code = 0
-
-    def end(self, at_most_s: float, reap_s: float) -> None:
-        self.code = 0
+@pytest.fixture
+def safe(monkeypatch: pytest.MonkeyPatch) -> Mock:
+    """`make_safe`, which succeeds without hardware, with shorter times."""
+    safe = Mock(return_value=[])
+    monkeypatch.setattr(supervisor, "make_safe", safe)
+    monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
+    monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.05)
+    return safe
 
 
-@contextlib.contextmanager
-def _supervisor(end_reason: str, **daemon: object) -> Iterator[Supervisor]:
-    """A supervisor without processes."""
-    log = logging.getLogger("test")
-    one = Supervisor(ServePlan(quick_car(), daemon), -1, log)
+def _stopped(guard: Mock, end_reason: str = "", **daemon: object) -> bool:
+    """Stop the children of a supervisor, and return whether the outputs are at rest."""
+    one = Supervisor(ServePlan(quick_car(), daemon), -1, logging.getLogger("test"))
     one._end_reason = end_reason
     with one._woken, one._waker:
-        yield one
+        one._stop(guard, _child("daemon", 9))
+    assert not guard.kill.called
+    assert not guard.end.called
+    return one._is_safe
 
 
 @pytest.mark.parametrize("end_reason", ["", "ended by SIGTERM"])
-def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
-    monkeypatch: pytest.MonkeyPatch, end_reason: str
-) -> None:
-    attempts: list[int | None] = []
-    guard = _Stuck(looks=4)
+def test_a_guard_stuck_in_the_kernel_is_not_waited_for(safe: Mock, end_reason: str) -> None:
+    """The outputs are put to rest until it has ended, and they obeyed after that."""
+    guard, codes = _child("guard", 4), list[int | None]()
 
-    def safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
-        attempts.append(guard.code)
-        return ["Output drive: GPIO22 is busy"] if len(attempts) == 1 else []
+    def make_safe(*_: object) -> list[str]:
+        codes.append(guard.code)
+        return ["Output drive: GPIO22 is busy"] if len(codes) == 1 else []
 
-    monkeypatch.setattr(supervisor, "make_safe", safe)
-    monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
-    with _supervisor(end_reason) as one:
-        one._stop(guard, _Daemon(looks=9))
-    assert attempts == [None, None, None, -9]
-    assert one._is_safe
+    safe.side_effect = make_safe
+    assert _stopped(guard, end_reason)
+    assert codes == [None, None, None, -9]
 
 
-def test_a_guard_that_never_exits_is_given_up(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
-    monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
-    monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.01)
-    with _supervisor("ended by SIGTERM") as one:
-        one._stop(_Stuck(looks=10**9), _Daemon(looks=9))
-    assert not one._is_safe
+@pytest.mark.usefixtures("safe")
+def test_a_guard_that_never_exits_is_given_up() -> None:
+    assert not _stopped(_child("guard", 10**9), "ended by SIGTERM")
 
 
-@pytest.mark.parametrize("ready_file", ["ready.json", "folder"])
+@pytest.mark.usefixtures("safe")
+@pytest.mark.parametrize("name", ["ready.json", "folder"])
 def test_the_ready_file_goes_with_its_daemon(
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-    tmp_path: Path,
-    ready_file: str,
+    caplog: pytest.LogCaptureFixture, tmp_path: Path, name: str
 ) -> None:
     (tmp_path / "ready.json").write_text("{}")
     (tmp_path / "folder").mkdir()
-    monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
-    with _supervisor("", ready_file=str(tmp_path / ready_file)) as one:
-        one._stop(_Stuck(looks=0), _Daemon(looks=9))
-    assert one._is_safe
-    assert (tmp_path / "ready.json").exists() == (ready_file == "folder")
-    assert ("cannot be removed" in caplog.text) == (ready_file == "folder")
+    assert _stopped(_child("guard", 0), ready_file=str(tmp_path / name))
+    assert (tmp_path / "ready.json").exists() == (name == "folder")
+    assert ("cannot be removed" in caplog.text) == (name == "folder")
 
 
 def test_an_unknown_driver_ends_the_supervisor(tmp_path: Path) -> None:
-    plan = quick_car(LimitPlan())
+    plan = quick_car()
     plan = replace(plan, outputs=(replace(plan.outputs[0], driver="magic"),), sensors=())
     with running(tmp_path, plan) as robot:
         assert robot.process.wait(20) == 2
     assert "magic" in _log(tmp_path)
 
 
-def test_restarts_are_limited_per_period() -> None:
+def test_restarts_are_limited_per_period_and_back_off() -> None:
     restarts = Restarts(most=2, within_s=60.0)
-    second = 10**9
-    assert [restarts.may_restart(t * second) for t in (0, 30, 59, 60, 61, 90)] == [
-        True,
-        True,
-        False,
-        True,
-        False,
-        True,
-    ]
-
-
-def test_restarts_back_off() -> None:
+    times = (0, 30, 59, 60, 61, 90)
+    assert [t for t in times if restarts.may_restart(t * 10**9)] == [0, 30, 60, 90]
     restarts = Restarts()
     pauses = [restarts.pause_s for t in range(5) if restarts.may_restart(t)]
     assert pauses == pytest.approx([0.0, 0.2, 0.6, 1.4, 3.0])
