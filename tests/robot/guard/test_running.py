@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 
@@ -34,15 +35,12 @@ _PLAN = ServePlan(
 )
 
 
-def test_processes_may_be_silent_for_their_limits() -> None:
+def test_several_processes_can_read_the_plan_and_none_can_change_it() -> None:
     assert (_PLAN.guard_silence_ms, _PLAN.daemon_silence_ms) == (250, 2_000)
     patient = replace(_PLAN, patience_ms=5_000)
     assert (patient.guard_silence_ms, patient.daemon_silence_ms) == (5_000, 5_000)
-
-
-def test_several_processes_can_read_the_plan_and_none_can_change_it() -> None:
     fd = plan_fd(_PLAN)
-    try:
+    with os.fdopen(fd):
         assert os.get_inheritable(fd)
         assert read_plan_fd(fd) == _PLAN
         script = f"import os; os.write(1, os.pread({fd}, 1 << 20, 0))"
@@ -52,8 +50,6 @@ def test_several_processes_can_read_the_plan_and_none_can_change_it() -> None:
             with pytest.raises(PermissionError):
                 change()
         assert read_plan_fd(fd) == _PLAN
-    finally:
-        os.close(fd)
 
 
 @pytest.mark.parametrize("arguments", [["--a", "1"], ["--a", "1", "--c", "2"], ["--a"]])
@@ -89,20 +85,18 @@ def test_guard_and_supervisor_import_only_their_drivers() -> None:
     command = [sys.executable, "-I", "-c", _LISTS_MODULES, start.__file__]
     before = "import sys; print(*sys.modules)"
     bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()
-    first, all_loaded = subprocess.check_output(command, text=True).split("\n", 1)
+    first, loaded = subprocess.check_output(command, text=True).split("\n", 1)
     # Without a chip these suffice: each other module costs the guard memory.
     assert {name.rpartition(".")[2] for name in first.split()} == {"chip", "pins", "simulation"}
-    loaded = all_loaded.split()
     # gpiozero and msgspec prefer backports where another package has brought them.
     backport = {"importlib_metadata", "lazy_importer", "typing_extensions", "zipp"}
     theirs = {"gpiozero", "colorzero", "lgpio", "_lgpio", "smbus2", "msgspec", "start"} | backport
-    for module in set(loaded) - set(bare):
+    for module in set(loaded.split()) - set(bare):
         top = module.partition(".")[0]
         if top == "shapechanger":
-            ours = module.split(".")[1:2]
-            assert ours in ([], ["errors"], ["robot"], ["contract"]), module
-            inner = ["guard", "drivers", "hardware", "plan", "limits", "duty", "twin"]
-            assert module.split(".")[2:3] in ([], *([one] for one in inner)), module
+            ours, inner = [*module.split("."), "", ""][1:3]
+            assert ours in {"", "errors", "robot", "contract"}, module
+            assert inner in {"", "guard", "drivers", "hardware", "plan", "limits", "twin"}, module
         else:
             assert top in theirs or top in sys.stdlib_module_names, module
 
@@ -117,61 +111,35 @@ def pipe() -> Iterator[tuple[int, int]]:
     os.close(read)
 
 
-def _emit(lines: logging.Handler, text: str) -> None:
-    lines.handle(logging.LogRecord("robot", logging.INFO, "", 0, text, None, None))
-
-
-def test_a_full_pipe_drops_lines(
-    pipe: tuple[int, int],
-) -> None:
-    read, write = pipe
-    flags = fcntl.fcntl(write, fcntl.F_GETFL)
-    lines = _Lines(write)
-    for _ in range(100):
-        _emit(lines, "x" * 100)
-    seen = os.read(read, 1 << 16)
-    written = seen.count(b"\n")
-    assert 0 < written < 100
-    _emit(lines, "Again.")
-    assert (
-        os.read(read, 1 << 16) == f"Again. ({100 - written} lines before it were lost.)\n".encode()
-    )
-    assert fcntl.fcntl(write, fcntl.F_GETFL) == flags
-
-
-def test_a_line_is_cut_to_the_size_of_a_pipe(pipe: tuple[int, int]) -> None:
-    read, write = pipe
-    _emit(_Lines(write), "\ud800" * 10_000)
-    data = os.read(read, 1 << 16)
-    assert len(data) == 4096
-    assert data.startswith(b"\\ud800")
-    assert data.endswith(b"\n")
+def _emit(lines: logging.Handler, text: str, *args: object) -> None:
+    lines.handle(logging.LogRecord("robot", logging.INFO, "/x/rules.py", 7, text, args, None))
 
 
 class _Unprintable:
     """An argument whose text cannot be made."""
 
-    def __init__(self, error: Exception) -> None:
-        self._error = error
-
     def __str__(self) -> str:
-        raise self._error
+        raise RuntimeError
 
 
-@pytest.mark.parametrize(
-    ("text", "args", "error"),
-    [
-        ("%s", (_Unprintable(RuntimeError()),), "RuntimeError"),
-        ("%s %s", ("one",), "TypeError"),
-    ],
-)
-def test_a_line_that_cannot_be_formatted_is_replaced(
-    pipe: tuple[int, int], text: str, args: tuple[object, ...], error: str
-) -> None:
+def test_lines_are_dropped_cut_or_replaced_and_never_wait(pipe: tuple[int, int]) -> None:
+    """The next line says how many were lost, and the descriptor stays as it is."""
     read, write = pipe
-    record = logging.LogRecord("robot", logging.INFO, "/x/rules.py", 7, text, args, None)
-    _Lines(write).handle(record)
-    assert os.read(read, 1 << 16) == f"A line of rules.py:7 fails: {error}.\n".encode()
+    flags = fcntl.fcntl(write, fcntl.F_GETFL)
+    lines = _Lines(write)
+    for _ in range(100):
+        _emit(lines, "x" * 100)
+    written = os.read(read, 1 << 16).count(b"\n")
+    assert 0 < written < 100
+    _emit(lines, "Again.")
+    assert f"Again. ({100 - written} lines before it were lost.)\n".encode() == os.read(read, 4096)
+    assert fcntl.fcntl(write, fcntl.F_GETFL) == flags
+    _emit(lines, "\ud800" * 10_000)
+    data = os.read(read, 1 << 16)
+    assert (len(data), data[:6], data[-1:]) == (4096, b"\\ud800", b"\n")
+    for text, error in (("%s", "RuntimeError"), ("%s %s", "TypeError")):
+        _emit(lines, text, _Unprintable() if error == "RuntimeError" else "one")
+        assert os.read(read, 4096) == f"A line of rules.py:7 fails: {error}.\n".encode()
 
 
 @pytest.mark.parametrize("kind", ["no reader", "closed", "read-only", "full disk"])
@@ -191,18 +159,13 @@ def test_a_log_that_cannot_be_written_raises_nothing(kind: str) -> None:
         os.close(write)
 
 
-@pytest.mark.parametrize(("before", "after"), [(-10, [0]), (0, []), (10, [])])
-def test_a_child_runs_normally(
-    before: int, after: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    changes: list[int] = []
-    monkeypatch.setattr(os, "getpriority", lambda *_: before)
-    monkeypatch.setattr(os, "setpriority", lambda _kind, _pid, value: changes.append(value))
-    run_normally(1)
-    assert changes == after
-
-
-def test_a_child_that_has_ended() -> None:
+def test_a_child_runs_normally_unless_it_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     with subprocess.Popen([sys.executable, "-c", ""]) as child:
         child.wait()
     run_normally(child.pid)
+    set_priority = Mock()
+    monkeypatch.setattr(os, "setpriority", set_priority)
+    for niceness in (-10, 0, 10):
+        monkeypatch.setattr(os, "getpriority", lambda *_, niceness=niceness: niceness)
+        run_normally(1)
+    set_priority.assert_called_once_with(os.PRIO_PROCESS, 1, 0)

@@ -4,6 +4,7 @@ import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -17,9 +18,7 @@ from tests.robot.guard.plans import quick_car
 @pytest.mark.parametrize(
     ("name", "values", "counts"),
     [
-        ("bump", (1.0, 0.0), 1.0),
-        ("collision", (0.0, 1.0), 1.0),
-        ("stall", (1.0, 0.0), 1.0),
+        *((name, (1.0, 0.0), 1.0) for name in ("bump", "collision", "stall")),
         ("temperature", (40.0, 90.0), 90.0),
         ("distance", (0.1, 4.0), 0.1),
         ("battery", (5.0, 7.4), 5.0),
@@ -29,53 +28,40 @@ from tests.robot.guard.plans import quick_car
 def test_the_order_of_sensors_does_not_matter(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
+    """Of equal readings the first counts, and of quantities without a caution the last."""
     for pair in itertools.permutations(zip(values, ("one", "two"), strict=True)):
         sensing = Sensing()
-        for value, sensor in pair:
+        for value, sensor in (*pair, (counts, "three")):
             sensing.merge({name: value}, sensor)
-        assert sensing.quantities == {name: counts}
-        assert sensing.sources == {name: dict(zip(values, ("one", "two"), strict=True))[counts]}
-
-
-def test_the_last_reading_of_other_quantities_counts() -> None:
-    sensing = Sensing({"yaw_rate": 1.0}, {"yaw_rate": "one"})
+        assert sensing == Sensing({name: counts}, {name: dict(pair)[counts]})
+    sensing.merge({"yaw_rate": 1.0}, "one")
     sensing.merge({"yaw_rate": 0.5}, "two")
-    assert sensing == Sensing({"yaw_rate": 0.5}, {"yaw_rate": "two"})
-
-
-def test_of_equal_readings_the_first_sensor_is_the_source() -> None:
-    sensing = Sensing()
-    for sensor in ("one", "two"):
-        sensing.merge({"distance": 0.3}, sensor)
-    assert sensing.sources == {"distance": "one"}
+    assert (sensing.quantities["yaw_rate"], sensing.sources["yaw_rate"]) == (0.5, "two")
 
 
 def test_no_sensor_hides_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each gets time and direction; one that fails, is slow or returns NaN is named."""
-    now_ns, asked = 0, list[tuple[int, float]]()
+    now_ns, asked = 0, list[tuple[float, ...]]()
 
-    class Chip:
-        def __init__(self, answer: Any, takes_ms: int) -> None:
-            self.answer, self.takes_ms = answer, takes_ms
-
-        def read(self, at_ns: int, direction: float) -> dict[str, float]:
+    def chip(answer: Any, takes_ms: int = 0) -> Mock:
+        def read(*given: float) -> dict[str, float]:
             nonlocal now_ns
-            now_ns += self.takes_ms * 1_000_000
-            asked.append((at_ns, direction))
-            if isinstance(self.answer, Exception):
-                raise self.answer
-            return self.answer
+            now_ns += takes_ms * 1_000_000
+            asked.append(given)
+            if isinstance(answer, Exception):
+                raise answer
+            return answer
 
-        def close(self) -> None: ...
+        return Mock(**{"read.side_effect": read})
 
     chips = {
-        "dead": Chip(RobotError("It is dead."), 0),
-        "dead and slow": Chip(OSError("gone"), 21),
-        "broken": Chip({"distance": float("nan")}, 0),
-        "slow": Chip({"distance": 1.0}, 21),
-        "in time": Chip({"temperature": 40.0}, 20),
-        "no echo": Chip({}, 0),
-        "well": Chip({"distance": 0.5}, 0),
+        "dead": chip(RobotError("It is dead.")),
+        "dead and slow": chip(OSError("gone"), 21),
+        "broken": chip({"distance": float("nan")}),
+        "slow": chip({"distance": 1.0}, 21),
+        "in time": chip({"temperature": 40.0}, 20),
+        "no echo": chip({}),
+        "well": chip({"distance": 0.5}),
     }
     opened = {name: SimpleNamespace(open=lambda plan, _: chips[plan.name]) for name in chips}
     monkeypatch.setattr(module, "SENSORS", opened)
