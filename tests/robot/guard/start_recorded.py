@@ -27,7 +27,7 @@ def main(path: str, program: str, *arguments: str) -> None:
         "daemon": [*isolated, str(_HERE.with_name("stand_in.py"))],
     }
     # Use the real plan, but these commands.
-    supervisor.command_of = lambda name, _: commands[name]
+    vars(supervisor)["command_of"] = lambda name, _: commands[name]
     supervisor.main(arguments)
 
 

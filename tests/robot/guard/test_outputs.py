@@ -110,8 +110,8 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> Mock:
         driver.write.side_effect = lambda value, _: value
     chip = Mock(differs="it does not follow", stops_itself=False)
     chip.open = lambda output, _: getattr(calls, output.name)
-    chips = {"esc": chip, "servo": chip, "bus_servo": Mock(stops_itself=True, open=None)}
-    monkeypatch.setattr(outputs, "OUTPUTS", chips)
+    calls.chips = {"esc": chip, "servo": chip, "bus_servo": Mock(stops_itself=True, open=None)}
+    monkeypatch.setattr(outputs, "OUTPUTS", calls.chips)
     return calls
 
 
@@ -158,8 +158,7 @@ def test_each_failure_of_an_output_is_reported(calls: Mock) -> None:
 
 
 def test_an_output_that_cannot_be_opened_closes_those_before(calls: Mock) -> None:
-    broken = Mock(**{"open.side_effect": OSError("No power.")})
-    outputs.OUTPUTS["servo"] = broken
+    calls.chips["servo"] = Mock(**{"open.side_effect": OSError("No power.")})
     with pytest.raises(OSError, match="No power"):
         OutputBank(_CAR, Mock())
     assert calls.mock_calls == [call.drive.close()]
