@@ -1,12 +1,15 @@
 """Sessions under random messages in random order: only permitted clients move the robot."""
 
 import math
-from typing import Any
+from typing import Any, Literal
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
+    Bundle,
     RuleBasedStateMachine,
+    consumes,
     initialize,
     invariant,
     precondition,
@@ -41,212 +44,192 @@ from shapechanger.robot.link.messages import (
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
-MAX_AGE_NS = 400 * 1_000_000
-DEADLINE_NS = 250 * 1_000_000
-_places = st.integers(0, 3)
+MS = 1_000_000
+MAX_AGE_NS = 400 * MS
+DEADLINE_MS = 250
+_seqs, _backs = st.integers(0, 12), st.integers(-1, 3)
 _numbers = st.sampled_from((0.0, 0.5, -1.0, 3.0, math.nan, math.inf))
+_values = st.lists(_numbers, min_size=1, max_size=3).map(tuple)
+
+# What is in force: values, the name of the sender, and the last time, ns.
+Pending = tuple[tuple[float, ...], str, int]
+NOTHING: Pending = ((), "", -1)
 
 
-class ClientModel:
-    """State of one client in the reference model, which shares no code with the daemon."""
+class Connected:
+    """A client, with its state in the reference model, which shares no code with the daemon."""
 
-    def __init__(self, role: str) -> None:
+    def __init__(self, session: Session, role: Literal["person", "program"]) -> None:
+        self.session = session
         self.role = role
+        self.is_person = role == "person"
         self.sent: dict[int, int] = {}
-        self.newest_command = -1
-        self.newest_suggestion = -1
+        self.newest = {Command: -1, Suggest: -1}
+
+    def answers(self, back: int) -> int:
+        """Return the number of the last observation sent, or of one `back` before it."""
+        return max(0, max(self.sent, default=0) - back)
 
 
 class Robot(RuleBasedStateMachine):
     """Four clients that send anything at any time, and a reference model of the rules."""
+
+    clients = Bundle("clients")
 
     def __init__(self) -> None:
         super().__init__()
         self.clock = SteppedClock()
         self.orders: list[Order] = []
         self.allowed: list[tuple[int, tuple[float, ...]]] = []
-        self.sessions: dict[int, Session] = {}
-        self.models: dict[int, ClientModel] = {}
-        self.holder: int | None = None
-        self.numbers = 0
-        self.commanded_ns = 0
-        self.stops = 0
-        self.halts = 0
-        # Place, values and expiry (ns) of the newest suggestion.
-        self.suggestion: tuple[int, tuple[float, ...], int] | None = None
+        self.holder: Connected | None = None
+        self.here = self.numbers = self.stops = self.halts = 0
+        self.command_in_force = self.suggestion = NOTHING
+        self.armed = self.emergency = False
 
     @initialize(arming=st.sampled_from(("person", "anyone")))
     def serve(self, arming: Any) -> None:
-        self.anyone_arms, self.emergency = arming == "anyone", False
+        self.anyone_arms = arming == "anyone"
         self.hub = SessionHub(car_plan(arming=arming), self.clock, self.orders.append)
 
-    def connected(self) -> bool:
-        return bool(self.sessions)
-
-    @rule(place=_places, role=st.sampled_from(("person", "program")))
-    def connect(self, place: int, role: Any) -> None:
-        if place in self.sessions:
-            return
+    @precondition(lambda self: self.here < 4)
+    @rule(target=clients, role=st.sampled_from(("person", "program")))
+    def connect(self, role: Any) -> Connected:
+        self.here += 1
         self.numbers += 1
         session = Session(self.numbers, self.hub, Authenticator())
         session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
-        self.sessions[place], self.models[place] = session, ClientModel(role)
+        return Connected(session, role)
 
-    @rule(place=_places)
-    def leave(self, place: int) -> None:
-        """A client leaves; if it had control, the robot is disarmed."""
-        if place not in self.sessions:
-            return
-        self.hub.leave(self.sessions.pop(place).client)
-        self.forget_suggestion(place)
-        if self.holder == place:
-            self.holder = None
-            self.stops += 1
+    @rule(client=consumes(clients), garbage=st.none() | st.binary(max_size=20))
+    def leave(self, client: Connected, garbage: bytes | None) -> None:
+        """A client leaves, or sends invalid bytes; if it had control, the robot is disarmed."""
+        if garbage is not None:
+            before = len(self.orders)
+            with pytest.raises(LinkError):
+                client.session.receive(b"\xc1" + garbage)
+            assert len(self.orders) == before
+        self.hub.leave(client.session.client)
+        self.here -= 1
+        self.forget_suggestion(client)
+        self.lose_control(client)
 
-    @rule(place=_places)
-    def take(self, place: int) -> None:
+    @rule(client=clients)
+    def take(self, client: Connected) -> None:
         """A client asks for control."""
-        if not self.send(place, Take()):
-            return
-        held = None if self.holder is None else self.models[self.holder].role
-        if held is None or (held == "program" and self.models[place].role == "person"):
-            self.halts += held is not None
-            self.holder = place
-            self.forget_suggestion(place)
+        held = self.holder
+        self.send(client, Take())
+        if held is None or (client.is_person and not held.is_person) or held is client:
+            self.forget_suggestion(client)
+            if held not in (None, client):
+                self.halts += 1
+                self.command_in_force = NOTHING
+            self.holder = client
 
-    @rule(place=_places)
-    def release(self, place: int) -> None:
+    @rule(client=clients)
+    def release(self, client: Connected) -> None:
         """A client gives control back, whether or not it has it."""
-        if self.send(place, Release()) and self.holder == place:
-            self.holder = None
-            self.stops += 1
+        self.send(client, Release())
+        self.lose_control(client)
 
-    @rule(place=_places, emergency=st.integers(0, 2), back=st.integers(-1, 3))
-    def arm(self, place: int, emergency: int, back: int) -> None:
+    @rule(client=clients, emergency=st.integers(0, 2), back=_backs)
+    def arm(self, client: Connected, emergency: int, back: int) -> None:
         """A client that sees the robot can arm it if a client has control.
 
         It must be a person; or, if anyone may arm, a program in control without an emergency.
         """
-        if place not in self.sessions:
-            return
-        before, answers = len(self.orders), self.answers(place, back)
-        self.send(place, Arm(answers=answers, emergency=emergency))
-        person = self.models[place].role == "person"
-        program = self.anyone_arms and not self.emergency and self.holder == place
-        may = self.holder is not None and (person or program)
-        orders = [(order.kind, order.person, order.emergency) for order in self.orders[before:]]
-        arms = [("arm", person, emergency)] if may and self.is_fresh(place, answers) else []
-        assert orders == arms
+        answers = client.answers(back)
+        orders = self.send(client, Arm(answers=answers, emergency=emergency))
+        program = self.anyone_arms and not self.emergency and self.holder is client
+        may = self.holder is not None and (client.is_person or program)
+        arms = may and self.is_fresh(client, answers)
+        expected = [("arm", client.is_person, emergency)] if arms else []
+        assert [(order.kind, order.person, order.emergency) for order in orders] == expected
 
-    @rule(place=_places)
-    def stop(self, place: int) -> None:
-        before = len(self.orders)
-        if self.send(place, EmergencyStop(reason="because")):
-            assert [order.kind for order in self.orders[before:]] == ["emergency"]
+    @rule(client=clients)
+    def stop(self, client: Connected) -> None:
+        (order,) = self.send(client, EmergencyStop(reason="a\x1b[2Jcat"))
+        reason = f"{client.session.client.name}: a [2Jcat"
+        assert (order.kind, order.reason) == ("emergency", reason)
 
-    @rule(place=_places)
-    def disarm(self, place: int) -> None:
+    @rule(client=clients)
+    def disarm(self, client: Connected) -> None:
         """A person can disarm the robot, and so can the client in control."""
-        before = len(self.orders)
-        if self.send(place, Disarm()):
-            may = self.models[place].role == "person" or self.holder == place
-            assert [order.kind for order in self.orders[before:]] == (["disarm"] if may else [])
+        orders = self.send(client, Disarm())
+        may = client.is_person or self.holder is client
+        assert [order.kind for order in orders] == (["disarm"] if may else [])
 
-    @precondition(connected)
-    @rule(place=_places)
-    def observe(self, place: int) -> None:
-        if place in self.sessions:
-            observation = self.sessions[place].observe()
-            assert observation.mine == (self.holder == place)
-            self.models[place].sent[observation.seq] = self.clock.ns
+    @rule(client=clients)
+    def observe(self, client: Connected) -> None:
+        seen = client.session.observe()
+        assert seen.mine == (self.holder is client)
+        client.sent[seen.seq] = self.clock.ns
 
-    @precondition(connected)
     @rule(
-        place=_places,
-        seq=st.integers(0, 12),
-        back=st.integers(-1, 3),
-        values=st.lists(_numbers, min_size=1, max_size=3).map(tuple),
+        client=clients,
+        seq=_seqs,
+        back=_backs,
+        values=_values,
         scale=st.floats(0.0, 1.0),
+        ttl_ms=st.integers(1, 400),
     )
     def command(
-        self, place: int, seq: int, back: int, values: tuple[float, ...], scale: float
+        self,
+        client: Connected,
+        seq: int,
+        back: int,
+        values: tuple[float, ...],
+        scale: float,
+        ttl_ms: int,
     ) -> None:
         """A client sends a command: new, old, repeated, in answer to any number, or invalid."""
-        if place not in self.sessions:
-            return
-        model = self.models[place]
-        answers = self.answers(place, back)
-        message = Command(seq=seq, answers=answers, values=values, scale=scale)
-        if self.holder == place and seq > model.newest_command:
-            if len(values) != 2 or not all(map(math.isfinite, values)):
-                self.halts += 1
-            elif self.is_fresh(place, answers):
-                self.allowed.append((seq, tuple(scale * value for value in values)))
-                self.commanded_ns = self.clock.ns
-        model.newest_command = max(model.newest_command, seq)
-        assert self.send(place, message)
+        answers, is_new = client.answers(back), self.is_new(client, Command, seq)
+        message = Command(seq=seq, answers=answers, values=values, scale=scale, ttl_ms=ttl_ms)
+        orders = self.send(client, message)
+        if self.holder is not client or not is_new:
+            assert not orders
+        elif not self.is_good(values):
+            self.halts += 1
+            self.command_in_force = NOTHING
+        elif self.is_fresh(client, answers):
+            scaled = tuple(scale * value for value in values)
+            self.allowed.append((seq, scaled))
+            until_ns = self.clock.ns + min(ttl_ms, DEADLINE_MS) * MS
+            self.command_in_force = (scaled, "", until_ns)
+            assert orders[0].ttl_ms == ttl_ms
 
-    @precondition(connected)
-    @rule(
-        place=_places,
-        seq=st.integers(0, 12),
-        back=st.integers(-1, 3),
-        values=st.lists(_numbers, min_size=1, max_size=3).map(tuple),
-    )
-    def suggest(self, place: int, seq: int, back: int, values: tuple[float, ...]) -> None:
+    @rule(client=clients, seq=_seqs, back=_backs, values=_values)
+    def suggest(self, client: Connected, seq: int, back: int, values: tuple[float, ...]) -> None:
         """A suggestion counts if its sender does not have control, and moves nothing."""
-        if place not in self.sessions:
-            return
-        before, model, answers = len(self.orders), self.models[place], self.answers(place, back)
-        new = seq > model.newest_suggestion
-        model.newest_suggestion = max(model.newest_suggestion, seq)
-        good = len(values) == 2 and all(map(math.isfinite, values))
-        self.send(place, Suggest(seq=seq, answers=answers, values=values))
-        if self.holder != place and new and good and self.is_fresh(place, answers):
-            self.suggestion = place, values, self.clock.ns + DEADLINE_NS
-        assert len(self.orders) == before
+        answers, is_new = client.answers(back), self.is_new(client, Suggest, seq)
+        assert not self.send(client, Suggest(seq=seq, answers=answers, values=values))
+        counts = self.holder is not client and is_new and self.is_good(values)
+        if counts and self.is_fresh(client, answers):
+            name = client.session.client.name
+            self.suggestion = (values, name, self.clock.ns + DEADLINE_MS * MS)
 
     @rule(
-        place=_places,
+        client=clients,
         request=st.sampled_from(
             (
-                Record(on=True),
-                Record(on=False),
-                Mark(text="here"),
-                Undo(),
-                Browse(),
+                *(Record(on=True), Record(on=False), Mark(text="here"), Undo(), Browse()),
                 Fetch(episode="20260101T000000Z-0001"),
                 Judge(episode="20260101T000000Z-0001", first=0, last=3),
             )
         ),
     )
-    def ask_about_recordings(self, place: int, request: Any) -> None:
+    def ask_about_recordings(self, client: Connected, request: Any) -> None:
         """A robot without a folder refuses requests about recordings, and nothing moves."""
-        before = len(self.orders)
-        if self.send(place, request):
-            assert len(self.orders) == before
-            assert not self.hub.recorder.on
+        assert not self.send(client, request)
+        assert not self.hub.recorder.on
 
     @rule(milliseconds=st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
-        self.clock.ns += milliseconds * 1_000_000
-
-    @rule(garbage=st.binary(max_size=20), place=_places)
-    def garbage(self, garbage: bytes, place: int) -> None:
-        """A client that sends invalid bytes is disconnected."""
-        if place not in self.sessions:
-            return
-        before = len(self.orders)
-        try:
-            self.sessions[place].receive(b"\xc1" + garbage)
-        except LinkError:
-            assert len(self.orders) == before
-            self.leave(place)
+        self.clock.ns += milliseconds * MS
 
     @rule(emergency=st.booleans())
     def report(self, emergency: bool) -> None:
         """A state of the guard and a frame arrive."""
-        self.emergency = emergency
+        self.armed, self.emergency = True, emergency
         self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True, emergency=emergency))
         self.hub.on_frame(Frame(b"jpeg", self.clock.ns))
 
@@ -271,48 +254,48 @@ class Robot(RuleBasedStateMachine):
         assert sum(order.kind == "halt" for order in self.orders) == self.halts
 
     @invariant()
-    def the_lease_has_the_expected_holder(self) -> None:
-        held = self.hub.holder
-        place = next((p for p, s in self.sessions.items() if s.client == held), None)
-        assert place == self.holder
+    def the_expected_commands_are_shown(self) -> None:
+        """The holder, the command in force and the newest suggestion equal the model's."""
+        held = None if self.holder is None else self.holder.session.client
+        assert self.hub.holder is held
+        shown, now_ns = self.hub.observation(Client(0), 1, None), self.clock.ns
+        command, suggestion = (
+            pending if now_ns <= pending[2] else NOTHING
+            for pending in (self.command_in_force if self.armed else NOTHING, self.suggestion)
+        )
+        assert shown.commanded == command[0]
+        assert (shown.suggested, shown.suggested_by) == suggestion[:2]
 
-    @invariant()
-    def the_newest_suggestion_is_shown_until_it_expires(self) -> None:
-        """Values and sender equal the model's."""
-        shown, expected = self.hub.observation(Client(0), 1, None), self.suggestion
-        if expected is None or self.clock.ns > expected[2]:
-            assert (shown.suggested, shown.suggested_by) == ((), "")
-        else:
-            name = self.sessions[expected[0]].client.name
-            assert (shown.suggested, shown.suggested_by) == (expected[1], name)
+    def lose_control(self, client: Connected) -> None:
+        if self.holder is client:
+            self.holder, self.command_in_force = None, NOTHING
+            self.stops += 1
 
-    @invariant()
-    def no_command_is_in_force_without_a_holder(self) -> None:
-        commanded = self.hub.observation(Client(0), 1, None).commanded
-        if self.holder is None or self.clock.ns - self.commanded_ns > DEADLINE_NS:
-            assert commanded == ()
-        elif commanded:
-            assert commanded == self.allowed[-1][1]
+    def forget_suggestion(self, client: Connected) -> None:
+        if self.suggestion[1] == client.session.client.name:
+            self.suggestion = NOTHING
 
-    def forget_suggestion(self, place: int) -> None:
-        if self.suggestion is not None and self.suggestion[0] == place:
-            self.suggestion = None
+    @staticmethod
+    def is_new(client: Connected, kind: type[Command | Suggest], seq: int) -> bool:
+        """Note a number, and return True if it is the largest so far."""
+        newest = client.newest[kind]
+        client.newest[kind] = max(newest, seq)
+        return seq > newest
 
-    def answers(self, place: int, back: int) -> int:
-        """Return the number of the last observation sent there, or of one `back` before it."""
-        return max(0, max(self.models[place].sent, default=0) - back)
+    @staticmethod
+    def is_good(values: tuple[float, ...]) -> bool:
+        return len(values) == 2 and all(map(math.isfinite, values))
 
-    def is_fresh(self, place: int, answers: int) -> bool:
-        """Return True if the observation was sent there within the age limit."""
-        sent_ns = self.models[place].sent.get(answers)
+    def is_fresh(self, client: Connected, answers: int) -> bool:
+        """Return True if the observation was sent to the client within the age limit."""
+        sent_ns = client.sent.get(answers)
         return sent_ns is not None and self.clock.ns - sent_ns <= MAX_AGE_NS
 
-    def send(self, place: int, message: Any) -> bool:
-        """Send a message from a place. Return False if no client is there."""
-        if place not in self.sessions:
-            return False
-        self.sessions[place].receive(encode(message))
-        return True
+    def send(self, client: Connected, message: Any) -> list[Order]:
+        """Send a message from a client, and return the orders that it caused."""
+        before = len(self.orders)
+        client.session.receive(encode(message))
+        return self.orders[before:]
 
 
 TestRobot = Robot.TestCase

@@ -100,9 +100,9 @@ class _Bench:
         self.at(ms, lambda: [self.daemon.send(one) for one in data])
 
     def arms(self, ms: int = 1, emergency: int = 0, seq: int = 1) -> None:
-        """Schedule an arming and a command."""
-        now_ns = _T0 + ms * MS
-        self.send(ms, arm(now_ns, emergency), command(seq, now_ns))
+        """Schedule the arrival of an arming and a command, which were issued 1 ms before."""
+        issued_ns = _T0 + (ms - 1) * MS
+        self.send(ms, arm(issued_ns, emergency), command(seq, issued_ns))
 
     def read(self) -> list[GuardState]:
         """Read all states sent so far."""
@@ -166,12 +166,12 @@ def _sensor(*readings: dict[str, float] | Exception) -> Mock:
 def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
     bench = make()
     bench.arms()
-    bench.look(2, 250, 252)
+    bench.look(2, 249, 251)
     bench.run(260)
-    assert bench.duties == {2: 0.5, 250: 0.5, 252: 0.0}
-    stopped = next(s for s in bench.states if s.stop_reason == "No fresh command.")
-    assert stopped.at_ns == _T0 + 251 * MS
+    assert bench.duties == {2: 0.5, 249: 0.5, 251: 0.0}
     acting = next(s for s in bench.states if s.applied_seq == 1)
+    stopped = next(s for s in bench.states if s.at_ns > acting.at_ns and s.applied_seq is None)
+    assert (stopped.at_ns, stopped.stop_reason) == (_T0 + 250 * MS, "No fresh command.")
     assert acting.applied == (0.5, 0.5)
     assert acting.applied_ns == acting.at_ns == _T0 + 1 * MS
     # The drive is written before the steering.
@@ -453,9 +453,9 @@ def test_no_stop_waits_for_a_sensor(make: _Make) -> None:
     """The decision uses the time after the sensors were read."""
     bench, driven = _slow(make, lambda _: 15)
     bench.run(320)
-    assert all(duty == 0.0 for t, duty in driven if t >= _T0 + 251 * MS)
+    assert all(duty == 0.0 for t, duty in driven if t >= _T0 + 250 * MS)
     acting = [state for state in bench.states if state.applied_seq == 1]
-    assert max(state.at_ns for state in acting) < _T0 + 251 * MS
+    assert max(state.at_ns for state in acting) < _T0 + 250 * MS
     assert {state.stop_reason for state in acting} == {""}
 
 
