@@ -13,12 +13,17 @@ import msgspec
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame
 from shapechanger.robot.guard.channel import MAX_DATAGRAM, GuardState, Order, decode_order, encode
+from shapechanger.robot.guard.rules import Rules
 from shapechanger.robot.hardware import Clock
 from tests.robot.daemon.plans import guard_state
+from tests.robot.guard.plans import quick_car
 
 
 class FakeGuard:
-    """The guard's end of the socket, which applies orders and replies with its state."""
+    """The guard's end of the socket, which applies orders by the rules, and replies with its state.
+
+    It has neither sensors nor outputs, and ends no command at its deadline by itself.
+    """
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -28,6 +33,7 @@ class FakeGuard:
         self.state: GuardState = guard_state()
         self._now_ns = now_ns
         self._socket = ours
+        self._rules = Rules(quick_car(), now_ns())
 
     def attach(self) -> None:
         """Answer orders as they arrive, as on a real clock."""
@@ -50,9 +56,7 @@ class FakeGuard:
             if not data:
                 asyncio.get_running_loop().remove_reader(self._socket)
                 return
-            order = decode_order(data)
-            self.orders.append(order)
-            self._apply(order)
+            self._apply(decode_order(data))
         self.send()
 
     def send(self, **changes: Any) -> None:
@@ -64,30 +68,23 @@ class FakeGuard:
         return [order.kind for order in self.orders]
 
     def _apply(self, order: Order) -> None:
-        changes: dict[str, Any] = {}
-        rest = {"applied": (0.0, 0.0), "applied_seq": None}
-        may_arm = order.person or not self.state.emergency
-        if order.kind == "arm" and may_arm:
-            changes = {"armed": True, "emergency": False, "stop_reason": ""}
-        elif order.kind == "arm":
-            changes = {"refused": "Only a person ends an emergency stop."}
-        elif order.kind == "halt":
-            changes = rest
-        elif order.kind == "disarm":
-            changes = {"armed": False, "stop_reason": order.reason, **rest}
-        elif order.kind == "emergency":
-            count = self.state.emergencies + 1
-            changes = {"armed": False, "emergency": True, "emergencies": count, **rest}
-        elif order.kind == "command" and self.state.armed:
-            changes = {
-                "applied": order.values,
-                "applied_session": order.session,
-                "applied_seq": order.seq,
-                "applied_ns": self._now_ns(),
-            }
-        elif order.kind == "command":
-            changes = {"refused": "Not armed.", "refused_seq": order.seq}
-        self.state = msgspec.structs.replace(self.state, **changes)
+        self.orders.append(order)
+        rules, now_ns = self._rules, self._now_ns()
+        refused = rules.offer(order, now_ns)
+        decision = rules.tick(now_ns)
+        self.state = msgspec.structs.replace(
+            self.state,
+            armed=rules.armed,
+            emergency=rules.emergency,
+            emergencies=rules.emergencies,
+            stop_reason=decision.stop_reason,
+            applied=decision.actions,
+            applied_session=decision.session,
+            applied_seq=decision.seq,
+            applied_ns=None if decision.seq is None else now_ns,
+            refused=refused,
+            refused_seq=order.seq if refused and order.kind == "command" else None,
+        )
 
 
 class FakeCamera(Camera):
