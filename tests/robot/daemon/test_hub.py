@@ -1,10 +1,7 @@
-"""The hub: control, observations for one client, and expiry of commands and suggestions."""
+"""The hub: observations for one client; `test_session_stateful.py` has the rules of control."""
 
 import math
-from typing import Any
-
-from hypothesis import given
-from hypothesis import strategies as st
+from collections.abc import Callable
 
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client
@@ -14,16 +11,14 @@ from shapechanger.robot.link.messages import Command, Observation
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, guard_state
 
-ANN, BOB = Client(1, "Ann", "person"), Client(2, "Bob", "person")
-SAC, PPO = Client(3, "sac"), Client(4, "ppo")
-MS = 1_000_000
+ANN, SAC = Client(1, "Ann", "person"), Client(3, "sac")
 
 
-def new_hub(ns: int = 50, **plan: Any) -> tuple[SessionHub, SteppedClock]:
-    """Return the hub of a car, and its clock."""
+def new_hub(order: Callable[[Order], object] = lambda order: None) -> SessionHub:
+    """Return the hub of a car at 50 ns."""
     clock = SteppedClock()
-    clock.ns = ns
-    return SessionHub(car_plan(**plan), clock, lambda order: None), clock
+    clock.ns = 50
+    return SessionHub(car_plan(), clock, order)
 
 
 def observed(hub: SessionHub, frame_sent: int | None = 0) -> Observation:
@@ -34,7 +29,7 @@ def seen_at_50_ns(
     state: GuardState | None = None, *, frames: int = 3, frame_sent: int | None = 0
 ) -> Observation:
     """Build the observation of a robot with a state of 40 ns and a frame of 30 ns."""
-    hub = new_hub()[0]
+    hub = new_hub()
     for _ in range(frames):
         hub.on_frame(Frame(b"jpeg", 30))
     hub.on_state(guard_state(at_ns=40) if state is None else state)
@@ -50,7 +45,7 @@ def test_an_absent_quantity_is_nan() -> None:
 
 
 def test_without_a_state_of_the_guard_all_is_unknown() -> None:
-    seen = observed(new_hub()[0])
+    seen = observed(new_hub())
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
     assert not seen.armed
@@ -71,13 +66,12 @@ def test_without_a_camera_the_time_is_that_of_the_state() -> None:
 
 
 def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
-    hub, clock = new_hub()
+    hub = new_hub()
     hub.take(ANN)
-    clock.ns = 38
     hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5)))
     hub.on_state(guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39))
     own = observed(hub)
-    assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)
+    assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 50)
     hub.release(ANN, "she went")
     hub.take(SAC)
     other = observed(hub)
@@ -87,36 +81,9 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
 
 def test_an_order_carries_the_limits_of_its_command_and_the_time_of_the_frame() -> None:
     orders: list[Order] = []
-    hub = SessionHub(car_plan(), SteppedClock(), orders.append)
+    hub = new_hub(orders.append)
     hub.on_frame(Frame(b"jpeg", 30))
     hub.take(ANN)
     hub.command(ANN, Command(seq=1, answers=1, values=(-1.0, 0.5), scale=0.5, ttl_ms=80))
     (order,) = orders
     assert (order.values, order.ttl_ms, order.frame_ns) == ((-0.5, 0.25), 80, 30)
-
-
-@given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))
-def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: int) -> None:
-    hub, clock = new_hub(1, deadline_ms=250)
-    assert observed(hub).commanded == ()
-    hub.on_state(guard_state(armed=True))
-    hub.take(ANN)
-    hub.command(ANN, Command(seq=1, answers=1, values=(0.0, 0.5), ttl_ms=ttl_ms))
-    clock.ns += age_ms * MS
-    assert observed(hub).commanded == ((0.0, 0.5) if age_ms <= min(ttl_ms, 250) else ())
-    clock.ns = 1
-    hub.halt()
-    assert observed(hub).commanded == ()
-
-
-def test_the_newest_suggestion_counts_until_it_expires() -> None:
-    hub, clock = new_hub(1, deadline_ms=250)
-    assert observed(hub).suggested == ()
-    hub.suggest(ANN, (0.1, 0.0))
-    clock.ns += 10 * MS
-    hub.suggest(SAC, (0.2, 0.0))
-    clock.ns += 250 * MS
-    seen = observed(hub)
-    assert (seen.suggested_by, seen.suggested) == ("sac", (0.2, 0.0))
-    clock.ns += 1
-    assert observed(hub).suggested == ()

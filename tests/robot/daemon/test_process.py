@@ -84,19 +84,21 @@ def started(begun: Started) -> Started:
     return begun
 
 
-def test_it_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> None:
+def test_a_daemon_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> None:
+    """A closed log changes nothing."""
     assert started.heart.recv(16) == b"."
-    with socket.create_connection(("127.0.0.1", started.port), 20.0):
-        pass
+    assert started.process.stderr is not None
+    started.process.stderr.close()
+    for _ in range(20):
+        with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
+            client.sendall(b"GET /link HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert client.recv(4096).startswith(b"HTTP/1.1 400")
     started.process.send_signal(signal.SIGTERM)
     assert started.guard.recv(16) == b""
-    status, log = started.ended()
-    assert status == 0
-    assert "listens at 127.0.0.1" in log
-    assert "is not announced: only this machine reaches 127.0.0.1" in log
+    assert started.process.wait(20.0) == 0
 
 
-def test_the_lifeline_ends_when_it_is_killed(started: Started) -> None:
+def test_the_lifeline_ends_when_the_daemon_is_killed(started: Started) -> None:
     poll = select.poll()
     poll.register(started.life, select.POLLIN)
     assert poll.poll(50) == []
@@ -130,27 +132,11 @@ def test_no_client_connects_before_the_first_state(begun: Started) -> None:
     assert "The guard has ended." in log
 
 
-def test_the_daemon_exits_when_the_guard_is_lost(started: Started) -> None:
-    started.guard.close()
+@pytest.mark.parametrize("lost", ["guard", "supervisor"])
+def test_the_daemon_exits_when_another_process_is_lost(started: Started, lost: str) -> None:
+    (started.guard if lost == "guard" else started.heart).close()
     status, log = started.ended()
     assert status == 1
-    assert "The guard has ended." in log
-
-
-def test_the_daemon_exits_when_the_supervisor_is_lost(started: Started) -> None:
-    started.heart.close()
-    status, log = started.ended()
-    assert status == 1
-    assert "The supervisor has ended." in log
-
-
-def test_a_closed_log_does_not_end_the_daemon(started: Started) -> None:
-    assert started.process.stderr is not None
-    started.process.stderr.close()
-    for _ in range(20):
-        with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
-            request = b"GET /link HTTP/1.1\r\nHost: x\r\n\r\n"
-            client.sendall(request)
-            assert client.recv(4096).startswith(b"HTTP/1.1 400")
-    started.process.send_signal(signal.SIGTERM)
-    assert started.process.wait(20.0) == 0
+    assert f"The {lost} has ended." in log
+    assert "listens at 127.0.0.1" in log
+    assert "is not announced: only this machine reaches 127.0.0.1" in log

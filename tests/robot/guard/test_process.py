@@ -407,8 +407,11 @@ def test_a_controller_that_does_not_follow_yet_is_reported(
     bench = make()
     monkeypatch.setattr(bench.drivers["drive"], "write", lambda value, now_ns: 0.0)
     bench.arms()
+    bench.at(45, lambda: direction.append(bench.guard._rules.direction))
     bench.at(50, monkeypatch.undo)
+    direction: list[float] = []
     state = bench.run(70)
+    assert direction == [0.0]
     waiting = [s for s in bench.states if s.applied_seq == 1 and s.at_ns < _T0 + 50 * MS]
     assert {(s.applied, s.stop_reason) for s in waiting} == {
         ((0.5, 0.0), "Output drive: it does not follow.")
@@ -449,9 +452,10 @@ def _slow(make: _Make, takes_ms: Callable[[float], int]) -> tuple[_Bench, list[t
     return bench, driven
 
 
-def test_no_stop_waits_for_a_sensor(make: _Make) -> None:
+@pytest.mark.parametrize("takes_ms", [0, 15])
+def test_no_stop_waits_for_a_sensor(make: _Make, takes_ms: int) -> None:
     """The decision uses the time after the sensors were read."""
-    bench, driven = _slow(make, lambda _: 15)
+    bench, driven = _slow(make, lambda _: takes_ms)
     bench.run(320)
     assert all(duty == 0.0 for t, duty in driven if t >= _T0 + 250 * MS)
     acting = [state for state in bench.states if state.applied_seq == 1]
