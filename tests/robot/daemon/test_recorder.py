@@ -27,15 +27,9 @@ WITHIN_S = 20.0
 
 def step(number: int) -> tuple[Step, bytes]:
     """Return a step that encodes its number, and its frame."""
-    return (
-        Step(
-            action=(0.0, number / 1e6),
-            driver="person",
-            state=(0.0, 0.0, 0.0),
-            captured_ns=number * 50_000_000,
-        ),
-        picture(number % 5),
-    )
+    at_ns, state = number * 50_000_000, (0.0, 0.0, 0.0)
+    made = Step(action=(0.0, number / 1e6), driver="person", state=state, captured_ns=at_ns)
+    return made, picture(number % 5)
 
 
 class Recording:
@@ -75,11 +69,7 @@ class Recording:
 
     def refusals(self) -> list[str]:
         """Return the refusals to Ada so far."""
-        found: list[str] = []
-        while (message := self.ada.take()) is not None:
-            assert isinstance(message, Refused)
-            found.append(message.reason)
-        return found
+        return [m.reason for m in iter(self.ada.take, None) if isinstance(m, Refused)]
 
 
 def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
@@ -195,21 +185,14 @@ def test_the_next_observation_brings_the_applied_outputs() -> None:
 
 
 def test_the_later_of_two_decisions_counts() -> None:
+    """Without control or a next observation, nothing is known of the applied outputs."""
     built = Built()
-    sent = built.see(ADA, seen(1, 100))
-    built.decided(ADA, sent, (0.5, 0.0), 110)
-    built.decided(ADA, sent, (0.0, 0.0), 115)
-    built._complete()
-    ((step, _),) = built.written
-    assert (step.action, step.decided_ns, step.applied) == ((0.0, 0.0), 115, None)
-
-
-def test_a_client_without_control_does_not_complete_applied_outputs() -> None:
-    built = Built()
-    built.decided(NET, built.see(NET, seen(1, 100)), (0.5, 0.0), 110)
+    sent = built.see(NET, seen(1, 100))
+    built.decided(NET, sent, (0.5, 0.0), 110)
+    built.decided(NET, sent, (0.0, 0.0), 115)
     built.see(NET, seen(2, 120, mine=False))
     ((step, _),) = built.written
-    assert step.applied is None
+    assert (step.action, step.decided_ns, step.applied) == ((0.0, 0.0), 115, None)
 
 
 @given(
@@ -237,4 +220,4 @@ def test_times_increase_and_no_frame_repeats(events: list[tuple[bool, Client, in
     shown = b""
     for step, jpeg in built.written:
         shown = jpeg or shown
-        assert shown == b"jpeg %d" % step.captured_ns  # Its own, or the one before it.
+        assert shown == b"jpeg %d" % step.captured_ns  # Its own, or the one before.

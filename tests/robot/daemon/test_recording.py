@@ -30,6 +30,8 @@ from tests.robot.daemon.running import Client, Running, until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.plan(recordings="kept", arming="anyone")]
 
+HEADER = EpisodeHeader(action_layout=ACTIONS.to_json())
+
 
 async def recording(client: Client, on: bool = True) -> RecorderState:
     """Start or stop recording, and wait for the confirmation."""
@@ -60,88 +62,52 @@ def only(folder: Path) -> Path:
     return episode
 
 
+@pytest.mark.plan(deadline_ms=60_000, control_hz=200.0)
 async def test_a_step_pairs_an_observation_and_its_command(robot: Running, tmp_path: Path) -> None:
-    seen: list[Observation] = []
-    async with robot.client(role="person", name="Grace") as person:
-        await person.obtain()
-        await robot.arm(person)
-        await until(lambda: robot.guard.state.armed, "it is armed")
-        await until(lambda: robot.daemon._hub.state.armed, "that is known")
+    """While the robot is armed, also after a change of control."""
+    async with robot.client(role="person", name="Grace") as person, robot.client() as program:
+        await program.obtain()
         began = await recording(person)
         assert (began.steps, began.dropped, began.text) == (0, 0, "")
-        seen.extend(await drive(robot, person, 1, 12))
-        await person.send(Mark(text="a corner\n"))
-        while (state := await person.expect(RecorderState)).marks == 0:
-            pass
-        assert state.steps == 12
-        ended = await recording(person, on=False)
-        assert (ended.steps, ended.marks, ended.episode) == (12, 1, began.episode)
-    await robot.end()
-    episode = read_episode(only(tmp_path / "kept"))
-    assert episode.closed
-    assert episode.outcome == ""
-    header = episode.header
-    assert (header.driver, header.robot, header.body) == ("Grace", "test car", "car")
-    assert (header.clock, header.image_size, header.control_hz) == ("real", (160, 120), 20.0)
-    assert header.notes == {"name": "corridor", "recorded_by": "Grace"}
-    assert (header.camera_pitch_deg, header.camera_fovy_deg) == (3.0, 48.8)
-    assert [mark.text for mark in episode.marks] == ["a corner"]
-    assert len(episode.steps) == len(seen) == 12
-    for number, (step, observation) in enumerate(zip(episode.steps, seen, strict=True), 1):
-        assert step.action == (0.05, 0.5 * (number / 100))
-        assert step.applied == step.action
-        assert step.driver == "person"
-        assert step.captured_ns == observation.captured_ns
-        assert step.decided_ns > observation.sent_ns  # type: ignore[operator]
-        assert step.wanted is None
-        assert episode.jpeg(step) in {picture(n) for n in range(1, 13)}
-    assert len({step.frame for step in episode.steps}) > 6
-
-
-async def test_no_step_is_recorded_while_disarmed(robot: Running, tmp_path: Path) -> None:
-    async with robot.client(role="person") as person:
-        await person.obtain()
-        await recording(person)
-        await drive(robot, person, 1, 3)
-        assert (await recording(person, on=False)).steps == 0
-    await robot.end()
-    assert read_episode(only(tmp_path / "kept")).steps == ()
-
-
-@pytest.mark.plan(deadline_ms=60_000, control_hz=200.0)
-async def test_an_episode_continues_after_a_change_of_control(
-    robot: Running, tmp_path: Path
-) -> None:
-    async with robot.client(role="person") as person, robot.client(name="net") as program:
-        await program.obtain()
+        await drive(robot, program, 1, 2)
         await robot.arm(program)
-        await until(lambda: robot.daemon._hub.state.armed, "it is armed")
-        await recording(person)
-        await drive(robot, program, 1, 3)
+        await until(lambda: robot.daemon._hub.state.armed, "it is armed, and the daemon knows")
+        seen = await drive(robot, program, 3, 9)
         await person.obtain()
         suggestion = await program.observe()
         await program.send(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
         assert (await program.expect(Observation)).suggested == (-1.0, 5.0)
-        (answered,) = await drive(robot, person, 1, 1)
-        assert (answered.suggested, answered.suggested_by) == ((-1.0, 5.0), "net")
-        assert (answered.holder_role, answered.mine) == ("person", True)
-        assert (await person.observe()).commanded == (0.05, 0.005)
-        assert (await recording(person, on=False)).steps == 4
+        seen += await drive(robot, person, 12, 1)
+        assert (seen[-1].holder_role, seen[-1].mine) == ("person", True)
+        await person.send(Mark(text="a corner\n"))
+        while (state := await person.expect(RecorderState)).marks == 0:
+            pass
+        assert state.steps == 10
+        ended = await recording(person, on=False)
+        assert (ended.steps, ended.marks, ended.episode) == (10, 1, began.episode)
     await robot.end()
-    steps = read_episode(only(tmp_path / "kept")).steps
-    assert [step.driver for step in steps] == ["program", "program", "program", "person"]
-    assert [step.wanted for step in steps] == [None, None, None, (-1.0, 5.0)]
+    episode = read_episode(only(tmp_path / "kept"))
+    assert (episode.closed, episode.outcome) == (True, "")
+    header = episode.header
+    assert (header.robot, header.body, header.clock) == ("test car", "car", "real")
+    assert (header.driver, header.image_size) == ("program 2", (160, 120))
+    assert header.notes == {"name": "corridor", "recorded_by": "Grace"}
+    assert (header.camera_pitch_deg, header.camera_fovy_deg) == (3.0, 48.8)
+    assert [mark.text for mark in episode.marks] == ["a corner"]
+    assert [step.driver for step in episode.steps] == ["program"] * 9 + ["person"]
+    assert [step.wanted for step in episode.steps] == [None] * 9 + [(-1.0, 5.0)]
+    for number, (step, observation) in enumerate(zip(episode.steps, seen, strict=True), 3):
+        assert step.action == step.applied == (0.05, 0.5 * (number / 100))
+        assert step.captured_ns == observation.captured_ns
+        assert step.decided_ns > observation.sent_ns  # type: ignore[operator]
+        assert episode.jpeg(step) in {picture(n) for n in range(1, 13)}
+    assert len({step.frame for step in episode.steps}) > 5
 
 
 async def test_only_persons_record_and_judge(robot: Running, tmp_path: Path) -> None:
+    judge = Judge(episode="x", first=0, last=0)
     async with robot.client() as program:
-        for request in (
-            Record(on=True),
-            Record(on=False),
-            Mark(),
-            Undo(),
-            Judge(episode="x", first=0, last=0),
-        ):
+        for request in (Record(on=True), Record(on=False), Mark(), Undo(), judge):
             await program.send(request)
             assert "Only a person" in (await program.expect(Refused)).reason
         await program.send(Browse())
@@ -181,31 +147,25 @@ async def test_a_failing_disk_ends_the_recording_and_not_the_drive(
         await recording(person)  # A new recording starts.
 
 
-async def test_two_recordings_cannot_share_a_folder(robot: Running, tmp_path: Path) -> None:
-    header = EpisodeHeader(action_layout=ACTIONS.to_json())
-    async with robot.client(role="person") as one, robot.client(role="person") as two:
-        with EpisodeWriter.create(tmp_path / "kept", header):
-            await one.send(Record(on=True))
-            assert "in use by another recorder" in (await one.expect(Refused)).reason
-        await recording(one)
-        await two.send(Record(on=True))
-        assert "recorded already" in (await two.expect(Refused)).reason
-        await recording(two, on=False)
-
-
-async def test_recording_ends_when_the_last_person_leaves(robot: Running, tmp_path: Path) -> None:
+async def test_recordings_cannot_share_a_folder_or_outlast_people(
+    robot: Running, tmp_path: Path
+) -> None:
     async with robot.client() as program:
-        async with robot.client(role="person") as one:
-            async with robot.client(role="person") as two:
-                await recording(two)
+        async with robot.client(role="person") as one, robot.client(role="person") as two:
+            with EpisodeWriter.create(tmp_path / "kept", HEADER):
+                await one.send(Record(on=True))
+                assert "in use by another recorder" in (await one.expect(Refused)).reason
+            await recording(one)
+            await two.send(Record(on=True))
+            assert "recorded already" in (await two.expect(Refused)).reason
             async with robot.client(role="person") as late:
                 assert (await late.expect(RecorderState)).recording
-        del one
-        while not (state := await program.expect(RecorderState)).text:
-            assert state.recording
-        assert "last person" in state.text
+        while "last person" not in (state := await program.expect(RecorderState)).text:
+            pass
+        assert not state.recording
     await robot.end()
-    assert "last person" in read_episode(only(tmp_path / "kept")).outcome
+    outcomes = [read_episode(path).outcome for path in (tmp_path / "kept").glob("2*")]
+    assert any("last person" in outcome for outcome in outcomes)
 
 
 async def test_the_episode_is_closed_when_the_daemon_ends(robot: Running, tmp_path: Path) -> None:
@@ -219,17 +179,13 @@ async def test_the_episode_is_closed_when_the_daemon_ends(robot: Running, tmp_pa
 
 
 async def test_one_question_about_recordings_at_a_time(robot: Running, tmp_path: Path) -> None:
-    header = EpisodeHeader(action_layout=ACTIONS.to_json())
-    with EpisodeWriter.create(tmp_path / "kept", header) as writer:
+    with EpisodeWriter.create(tmp_path / "kept", HEADER) as writer:
         for number in range(200):
             writer.add(Step(action=(0.0, 0.5), driver="person"), picture(number))
-        name = writer.path.name
     async with robot.client() as program:
         for _ in range(40):
-            await program.send(Fetch(episode=name))
-        await program.send(Browse())
-        refused = await program.expect(Refused)
-        assert "one request" in refused.reason
+            await program.send(Fetch(episode=writer.path.name))
+        assert "one request" in (await program.expect(Refused)).reason
         await program.send(Ping(token=1))
         await program.expect(Pong)
         pieces = [m for m in program.received if isinstance(m, Piece)]
