@@ -47,9 +47,11 @@ from tests.robot.daemon.plans import car_plan, guard_state
 MS = 1_000_000
 MAX_AGE_NS = 400 * MS
 DEADLINE_MS = 250
-_seqs, _backs = st.integers(0, 12), st.integers(-1, 3)
+# Most messages are valid: the next number, in answer to the newest observation, by the holder.
+_aheads = st.sampled_from((1, 1, 1, 2, 0, -1))
+_backs = st.sampled_from((0, 0, 0, 1, 3, -1))
 _numbers = st.sampled_from((0.0, 0.5, -1.0, 3.0, math.nan, math.inf))
-_values = st.lists(_numbers, min_size=1, max_size=3).map(tuple)
+_values = st.just((0.0, 0.5)) | st.lists(_numbers, min_size=1, max_size=3).map(tuple)
 
 # What is in force: values, the name of the sender, and the last time, ns.
 Pending = tuple[tuple[float, ...], str, int]
@@ -69,6 +71,12 @@ class Connected:
     def answers(self, back: int) -> int:
         """Return the number of the last observation sent, or of one `back` before it."""
         return max(0, max(self.sent, default=0) - back)
+
+    def number(self, kind: type[Command | Suggest], ahead: int) -> tuple[int, bool]:
+        """Return the largest number so far plus `ahead`, and whether that is a new one."""
+        newest, number = self.newest[kind], max(0, self.newest[kind] + ahead)
+        self.newest[kind] = max(newest, number)
+        return number, number > newest
 
 
 class Robot(RuleBasedStateMachine):
@@ -98,7 +106,9 @@ class Robot(RuleBasedStateMachine):
         self.numbers += 1
         session = Session(self.numbers, self.hub, Authenticator())
         session.introduce(encode(Hello(version=VERSION, proof=b"", role=role)))
-        return Connected(session, role)
+        client = Connected(session, role)
+        self.observe(client)
+        return client
 
     @rule(client=consumes(clients), garbage=st.none() | st.binary(max_size=20))
     def leave(self, client: Connected, garbage: bytes | None) -> None:
@@ -131,12 +141,13 @@ class Robot(RuleBasedStateMachine):
         self.send(client, Release())
         self.lose_control(client)
 
-    @rule(client=clients, emergency=st.integers(0, 2), back=_backs)
-    def arm(self, client: Connected, emergency: int, back: int) -> None:
+    @rule(client=clients, by_holder=st.booleans(), emergency=st.integers(0, 2), back=_backs)
+    def arm(self, client: Connected, by_holder: bool, emergency: int, back: int) -> None:
         """A client that sees the robot can arm it if a client has control.
 
         It must be a person; or, if anyone may arm, a program in control without an emergency.
         """
+        client = (by_holder and self.holder) or client
         answers = client.answers(back)
         orders = self.send(client, Arm(answers=answers, emergency=emergency))
         program = self.anyone_arms and not self.emergency and self.holder is client
@@ -166,7 +177,8 @@ class Robot(RuleBasedStateMachine):
 
     @rule(
         client=clients,
-        seq=_seqs,
+        by_holder=st.booleans(),
+        ahead=_aheads,
         back=_backs,
         values=_values,
         scale=st.floats(0.0, 1.0),
@@ -175,14 +187,16 @@ class Robot(RuleBasedStateMachine):
     def command(
         self,
         client: Connected,
-        seq: int,
+        by_holder: bool,
+        ahead: int,
         back: int,
         values: tuple[float, ...],
         scale: float,
         ttl_ms: int,
     ) -> None:
         """A client sends a command: new, old, repeated, in answer to any number, or invalid."""
-        answers, is_new = client.answers(back), self.is_new(client, Command, seq)
+        client = (by_holder and self.holder) or client
+        answers, (seq, is_new) = client.answers(back), client.number(Command, ahead)
         message = Command(seq=seq, answers=answers, values=values, scale=scale, ttl_ms=ttl_ms)
         orders = self.send(client, message)
         if self.holder is not client or not is_new:
@@ -197,10 +211,10 @@ class Robot(RuleBasedStateMachine):
             self.command_in_force = (scaled, "", until_ns)
             assert orders[0].ttl_ms == ttl_ms
 
-    @rule(client=clients, seq=_seqs, back=_backs, values=_values)
-    def suggest(self, client: Connected, seq: int, back: int, values: tuple[float, ...]) -> None:
+    @rule(client=clients, ahead=_aheads, back=_backs, values=_values)
+    def suggest(self, client: Connected, ahead: int, back: int, values: tuple[float, ...]) -> None:
         """A suggestion counts if its sender does not have control, and moves nothing."""
-        answers, is_new = client.answers(back), self.is_new(client, Suggest, seq)
+        answers, (seq, is_new) = client.answers(back), client.number(Suggest, ahead)
         assert not self.send(client, Suggest(seq=seq, answers=answers, values=values))
         counts = self.holder is not client and is_new and self.is_good(values)
         if counts and self.is_fresh(client, answers):
@@ -222,7 +236,7 @@ class Robot(RuleBasedStateMachine):
         assert not self.send(client, request)
         assert not self.hub.recorder.on
 
-    @rule(milliseconds=st.integers(1, 600))
+    @rule(milliseconds=st.sampled_from((1, 250, 400)) | st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
         self.clock.ns += milliseconds * MS
 
@@ -274,13 +288,6 @@ class Robot(RuleBasedStateMachine):
     def forget_suggestion(self, client: Connected) -> None:
         if self.suggestion[1] == client.session.client.name:
             self.suggestion = NOTHING
-
-    @staticmethod
-    def is_new(client: Connected, kind: type[Command | Suggest], seq: int) -> bool:
-        """Note a number, and return True if it is the largest so far."""
-        newest = client.newest[kind]
-        client.newest[kind] = max(newest, seq)
-        return seq > newest
 
     @staticmethod
     def is_good(values: tuple[float, ...]) -> bool:

@@ -17,18 +17,14 @@ from shapechanger.robot.link.authentication import (
 )
 
 _parts = st.binary(max_size=40)
-_roles = st.sampled_from(("person", "program"))
+_given = st.tuples(_parts, _parts, _parts, st.sampled_from(("person", "program")))
 
 
-@given(key=_parts, nonce=_parts, certificate=_parts, role=_roles)
-def test_a_proof_verifies(key: bytes, nonce: bytes, certificate: bytes, role: str) -> None:
-    assert is_proof(make_proof(key, nonce, certificate, role), key, nonce, certificate, role)
-
-
-@given(one=st.tuples(_parts, _parts, _parts, _roles), two=st.tuples(_parts, _parts, _parts, _roles))
+@given(one=_given, two=_given, same=st.booleans())
 def test_a_proof_is_bound_to_all_its_inputs(
-    one: tuple[bytes, bytes, bytes, str], two: tuple[bytes, bytes, bytes, str]
+    one: tuple[bytes, bytes, bytes, str], two: tuple[bytes, bytes, bytes, str], same: bool
 ) -> None:
+    two = one if same else two
     # HMAC pads short keys with zeros (RFC 2104); real keys have 16 bytes.
     one, two = (one[0].ljust(64, b"\0"), *one[1:]), (two[0].ljust(64, b"\0"), *two[1:])
     assert is_proof(make_proof(*one), *two) == (one == two)
@@ -39,13 +35,10 @@ def test_random_bytes_do_not_verify(proof: bytes) -> None:
     assert not is_proof(proof, b"k" * 16, b"n" * 32, b"", "program")
 
 
-def test_a_nonce_has_32_bytes() -> None:
-    assert len(new_nonce()) == 32
-
-
 def test_keys_and_nonces_are_unique() -> None:
     assert len({new_key() for _ in range(100)}) == 100
-    assert len({new_nonce() for _ in range(100)}) == 100
+    nonces = {new_nonce() for _ in range(100)}
+    assert [len(nonce) for nonce in nonces] == [32] * 100
 
 
 def test_a_key_can_be_copied_by_hand() -> None:
@@ -64,7 +57,6 @@ def test_a_key_can_be_copied_by_hand() -> None:
     ("text", "message"),
     [
         ("", "26 letters and digits, got 0"),
-        ("ABCD-EFGH", "got 8"),
         ("A" * 25 + "9", "letters A to Z and the digits 2 to 7"),
         ("A" * 25 + "ß", "26 letters and digits, got 27"),
         ("A" * 25 + "é", "letters A to Z"),
@@ -84,12 +76,10 @@ def test_a_fingerprint_round_trips(certificate: bytes) -> None:
     assert parse_fingerprint(text) == parse_fingerprint(pairs) == fingerprint
 
 
-def test_the_short_form_has_four_groups() -> None:
+def test_an_invalid_fingerprint_is_an_error() -> None:
+    """The short form has four groups of four characters."""
     short = fingerprint_short(fingerprint_of(b"certificate"))
     assert [len(group) for group in short.split("-")] == [4, 4, 4, 4]
-
-
-@pytest.mark.parametrize("text", ["", "ab" * 31, "ab" * 33, "zz" * 32])
-def test_an_invalid_fingerprint_is_an_error(text: str) -> None:
-    with pytest.raises(LinkError, match="64 hexadecimal digits"):
-        parse_fingerprint(text)
+    for text in ("", "ab" * 31, "ab" * 33, "zz" * 32):
+        with pytest.raises(LinkError, match="64 hexadecimal digits"):
+            parse_fingerprint(text)
