@@ -68,7 +68,7 @@ def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
 
 
 @pytest.mark.parametrize("raspi_config", [True, False])
-def test_a_servo_board_needs_i2c(pi: FakePi, raspi_config: bool) -> None:
+def test_a_servo_board_and_a_rig_need_i2c(pi: FakePi, raspi_config: bool) -> None:
     """raspi-config is used where it is there, and config.txt otherwise."""
     if raspi_config:
         pi.write("usr/bin/raspi-config", "")
@@ -76,7 +76,10 @@ def test_a_servo_board_needs_i2c(pi: FakePi, raspi_config: bool) -> None:
     assert (found["I2C"], found["group i2c"]) == ("did", "did")
     assert any("raspi-config nonint do_i2c 0" in line for line in pi.ran) == raspi_config
     assert (pi.root / "etc/modules-load.d/i2c-dev.conf").exists() != raspi_config
-    assert _levels(_install(pi, _blind("car-esc")))["I2C"] == "already"
+    found = _levels(_install(pi, _blind("finger")))
+    did = ("latency timer", "I2C speed", "group dialout")
+    assert ([found[name] for name in did], found["I2C"]) == (["did"] * 3, "already")
+    assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}
 
 
 def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
@@ -86,35 +89,22 @@ def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
     assert pi.config.endswith("[pi5]\ndtparam=strict_gpiod\n\n[all]\ndtparam=strict_gpiod\n")
 
 
-def test_a_rig_on_an_adapter(pi: FakePi) -> None:
-    """The adapter gets a short latency, and its encoders a fast bus."""
-    found = _levels(_install(pi, _blind("finger")))
-    assert (found["latency timer"], found["I2C speed"], found["group dialout"]) == ("did",) * 3
-    assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}
-
-
-def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:
+def test_what_fails_is_told_with_its_command(
+    pi: FakePi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An exit code of 0 is not proof, and what Raspberry Pi OS would have is named."""
     pi.refuses = "usermod"
     found = _install(pi, _blind("car"))
     sentence = "usermod: permission denied. By hand: sudo usermod -aG gpio pi"
     assert (found["group gpio"], found["service"][0]) == (("failed", sentence), "did")
-
-
-def test_a_command_without_an_effect_is_told(pi: FakePi, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An exit code of 0 is not proof."""
-    monkeypatch.setattr(pi, "run", lambda _: "")
-    found = _install(pi, _blind("car"))
-    assert set(_levels(found).values()) == {"failed"}
-    assert all("the command had no effect" in sentence for _, sentence in found.values())
-
-
-def test_without_groups_and_config(tmp_path: Path) -> None:
-    """What Raspberry Pi OS would have is named."""
-    found = _install(FakePi(tmp_path, config=None, groups=()), shipped("car"))
+    other = FakePi(tmp_path / "other", config=None, groups=())
+    monkeypatch.setattr(other, "run", lambda _: "")
+    found = _install(other, shipped("car"))
     sentence = "There is no group gpio here, which Raspberry Pi OS has."
     assert found["group gpio"] == ("failed", sentence)
-    assert "no config.txt" in found["strict_gpiod"][1]
-    assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
+    for part in ("no config.txt", "dtparam=strict_gpiod"):
+        assert part in found["strict_gpiod"][1]
+    assert "the command had no effect" in found["service"][1]
 
 
 def test_the_service_is_removed(pi: FakePi) -> None:
