@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import math
 from typing import Any, Final, Self
 
 import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
-from shapechanger.robot.profile.load import load_profile
-from shapechanger.robot.twin.judge import propelled
 from shapechanger.robot.twin.robot import RunningRobot
-from shapechanger.robot.twin.signals import Transition, apply
-from shapechanger.robot.twin.wiring import TwinWiring
+from shapechanger.robot.twin.signals import Transition
 from tests.robot.twin.robots import until
 
 DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}
@@ -25,8 +20,8 @@ PHONE: Final[dict[str, Any]] = {
 }
 PHONE_ON_ITS_SIDE: Final[dict[str, Any]] = PHONE | {"viewport": {"width": 844, "height": 390}}
 
-# Bytes of a ledger: some minutes of a robot.
-_RECENT: Final = 1_000_000
+# Pins of the drive of `CAR`, forward and backward.
+_DRIVE: Final = (22, 27)
 
 _PRESSES: Final = 6
 _PRESSED_S: Final = 10.0
@@ -40,15 +35,13 @@ class Console:
     Args:
         browser: The browser.
         robot: The robot that serves the page.
-        key: Key in the address; None for that of the robot, "" for none.
+        key: Key in the address; None for the robot's, "" for none.
         script: Script to run before those of the page.
-        address: Address of the page; "" for that of the robot.
         options: Options of the browser's context, such as `PHONE`.
 
     Attributes:
         page: The page.
         errors: Errors of its scripts and of the browser, such as policy violations.
-        requested: The addresses that it requested.
         sent: The messages that it sent to the robot.
     """
 
@@ -59,23 +52,20 @@ class Console:
         *,
         key: str | None = None,
         script: str = "",
-        address: str = "",
         **options: Any,
     ) -> None:
         self._context = browser.new_context(ignore_https_errors=True, **(DESK | options))
         self._context.set_default_timeout(60_000)
         self.page: Page = self._context.new_page()
         self.errors: list[str] = []
-        self.requested: list[str] = []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda message: self._on_console(message.type, message.text))
         self.sent: list[dict[str, Any]] = []
         self.page.on("websocket", lambda socket: socket.on("framesent", self._on_sent))
-        self.page.on("request", lambda request: self.requested.append(request.url))
         if script:
             self.page.add_init_script(script)
         self._robot = robot
-        self.address = address or f"https://127.0.0.1:{robot.port}/"
+        self.address = f"https://127.0.0.1:{robot.port}/"
         key = robot.known.key if key is None else key
         self.page.goto(self.address + (f"#key={key}" if key else ""))
 
@@ -130,18 +120,7 @@ class Console:
                     operator.place(0)  # In twin time it may have reached a wall by now.
             else:
                 return
-        raise AssertionError(f"Nothing moved, though {key} was held: {self.state_of_robot()}")
-
-    def state_of_robot(self) -> str:
-        """Return the state of the robot and the log of the page, for error messages."""
-        with self._robot.client(frames=False) as observer:
-            seen = observer.ask().message
-        log = self.page.locator("#log").inner_text().splitlines()
-        state = [round(number, 2) for number in seen.state]
-        return (
-            f"{seen.stop_reason!r}, commanded {seen.commanded}, applied {seen.action_applied}, "
-            f"armed {seen.armed}, state {state}; the page's log: {log[:8]}"
-        )
+        raise AssertionError(f"Nothing moved, though {key} was held.")
 
     def stop(self) -> None:
         """Stop the robot, and wait until it has."""
@@ -159,31 +138,42 @@ class Console:
 
 
 class Pins:
-    """Outputs of a robot's twin, read from its ledger.
+    """The pins of a car's drive, read from the ledger of its twin.
 
     Unlike `read_ledger` this reads each line once, because it is called often and the ledger of a
     shared robot gets long.
+
+    Attributes:
+        rest_ns: Time of the last rest, ns; 0 for none yet.
     """
 
     def __init__(self, robot: RunningRobot) -> None:
-        profile = next(robot.folder.glob("*.toml"))
         self._path = robot.ledger_path
-        self._wiring = TwinWiring(load_profile(profile).guard_plan())
-        with robot.operator() as operator:
-            self._levels = operator.levels()
-        self._read = max(0, self._path.stat().st_size - _RECENT)
-        self._lines: list[Transition] = []
+        self._read = 0
+        self._duties = dict.fromkeys(_DRIVE, 0.0)
         self._pushes: list[float] = []
+        self.rest_ns = 0
         self.forget()
 
     def propels(self) -> float:
-        """Return the propelling output now, -1 to 1; 0 at rest."""
-        self._look()
+        """Return the duty of the drive now, -1 to 1; 0 at rest."""
+        with self._path.open("rb") as file:
+            file.seek(self._read)
+            whole, newline, _ = file.read().rpartition(b"\n")
+        self._read += len(whole) + len(newline)
+        for line in whole.splitlines():
+            if b'"kind":"pin"' not in line:
+                continue  # The edges of the encoder are many, and no output.
+            change = msgspec.json.decode(line, type=Transition)
+            if change.pin in self._duties:
+                self._duties[change.pin] = 0.0 if change.released else change.duty or 0.0
+                self._pushes.append(self._push())
+                if not self._push():
+                    self.rest_ns = change.t
         return self._push()
 
     def forget(self) -> None:
-        now = self.propels()
-        self._pushes = [now] if now else []
+        self._pushes = [self.propels()]
 
     def await_motion(self, way: float = 0.0) -> None:
         """Wait until the robot moves, in the direction of the sign of `way` or in any."""
@@ -194,40 +184,13 @@ class Pins:
 
         A busy machine reads so seldom that a robot in twin time may be at a wall by then.
         """
-        self._look()
+        self.propels()
         return any(push * (way or push) > 0.0 for push in self._pushes)
 
     def await_rest(self) -> None:
         until(lambda: self.propels() == 0.0, 60.0)
         self.forget()
 
-    def last_rest_ns(self) -> float:
-        """Return the time of the last rest in the ledger, ns; minus infinity for none."""
-        self._look()
-        ledger = sorted(self._lines, key=lambda line: line.t)
-        return max((i.end_ns for i in propelled(ledger, self._wiring)), default=-math.inf)
-
-    def _look(self) -> None:
-        with self._path.open("rb") as file:
-            file.seek(self._read)
-            if self._read and not self._lines:
-                self._read += len(file.readline())  # The rest of a line.
-            whole, newline, _ = file.read().rpartition(b"\n")
-        self._read += len(whole) + len(newline)
-        for line in whole.splitlines():
-            fields = json.loads(line)
-            if fields["kind"] == "input":
-                continue  # The edges of the encoder are many, and no output.
-            known = {key: fields[key] for key in fields if key in Transition.__slots__}
-            self._lines.append(Transition(**known))
-            apply(self._levels, self._lines[-1])
-            push = self._push()
-            if push:
-                self._pushes.append(push)
-
     def _push(self) -> float:
-        """Return the propelling output after the last line."""
-        if not self._lines:
-            return 0.0
-        outputs = self._wiring.read(self._levels, self._lines[-1].t)
-        return max((outputs[name].value or 0.0 for name in self._wiring.propelling), key=abs)
+        forward, backward = self._duties.values()
+        return forward - backward

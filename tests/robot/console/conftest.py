@@ -59,9 +59,3 @@ def visit(chromium: Browser) -> Iterator[Callable[..., Console]]:
 
         yield made
         assert [error for console in opened for error in console.errors] == []
-
-
-@pytest.fixture
-def recordings(car: RunningRobot) -> Path:
-    """Folder of the car's recordings."""
-    return car.folder / "recordings"

@@ -53,26 +53,9 @@ def _again(console: Console, *packed: bytes) -> list[str]:
 
 def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> None:
     """Integers, strings, bytes, arrays and maps of every width round-trip exactly."""
-    console = visit(car, key="")
-    packed = [msgspec.msgpack.encode(value) for value in _VALUES if abs(_number(value)) < 2**64]
-    for one, text in zip(packed, _again(console, *packed), strict=True):
-        value = msgspec.msgpack.decode(one)
+    packed = [msgspec.msgpack.encode(value) for value in _VALUES]
+    for value, text in zip(_VALUES, _again(visit(car, key=""), *packed), strict=True):
         assert msgspec.msgpack.decode(base64.b64decode(text)) == value
-
-
-def test_messages_of_both_sides_are_decoded(car: RunningRobot, visit: Visit) -> None:
-    console = visit(car, key="")
-    sent = [
-        m.Hello(version=m.VERSION, proof=b"x" * 32, name="Ada", role="person"),
-        m.Command(seq=2**53, answers=1, values=(0.25, -1.0), scale=1.0),
-        m.Arm(answers=3, emergency=2),
-        m.EmergencyStop(reason="Space was pressed."),
-    ]
-    back = _again(console, *(m.encode(each) for each in sent))
-    assert [m.decode_client_message(base64.b64decode(each)) for each in back] == sent
-    pong = m.Pong(token=1, now_ns=2**62 + 1)
-    (text,) = _again(console, m.encode(pong))
-    assert m.decode_robot_message(base64.b64decode(text)) == pong
 
 
 def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
@@ -85,7 +68,7 @@ def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> None:
-    """Proofs match for keys in any notation, with and without a certificate."""
+    """Proofs match for keys in any notation, with and without a certificate; versions do too."""
     console = visit(car, key="")
     cases = [(new_key(), bytes(range(32)), certificate) for certificate in (b"", b"\x01" * 32)]
     for key, nonce, certificate in cases:
@@ -100,13 +83,5 @@ def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> 
         )
         proof = make_proof(parse_key(key), nonce, certificate, "person")
         assert made == [list(parse_key(key)), list(proof)]
-
-
-def test_the_page_has_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
-    console = visit(car, key="")
     version = "async () => (await import('/console/link.js')).VERSION"
     assert console.page.evaluate(version) == m.VERSION
-
-
-def _number(value: Any) -> float:
-    return value if isinstance(value, int) else 0

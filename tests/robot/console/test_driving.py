@@ -72,7 +72,7 @@ def test_a_page_that_dies_stops_the_robot_within_the_deadline(
 
         until(rests, 60.0)
         assert max(commands) > 0
-        late_ms = (pins.last_rest_ns() - max(commands)) / 1e6
+        late_ms = (pins.rest_ns - max(commands)) / 1e6
         assert late_ms <= _DEADLINE_MS + _SLACK_MS
         until(lambda: not observer.ask().message.armed, 60.0)
 
@@ -146,17 +146,17 @@ def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
 
 def test_the_cap_scales_commands(car: RunningRobot, visit: Visit) -> None:
     console, pins = visit(car), Pins(car)
+    keyboard = console.page.keyboard
     console.arm()
     for _ in range(3):
-        console.page.keyboard.press("-")
+        keyboard.press("-")
     console.await_words("#cap-shown", "20 %")
-    console.page.keyboard.down("s")
+    keyboard.down("s")
     console.await_words("#actions", f"{_MINUS}0.20 → {_MINUS}0.20")
     pins.await_motion(-1.0)
-    console.page.keyboard.up("s")
-    console.page.keyboard.down("a")
-    console.await_words(
-        "#pad-info", f"A steering of {_MINUS}0.20 moves nothing here: raise the cap."
-    )
-    console.page.keyboard.up("a")
+    keyboard.up("s")
+    keyboard.down("a")
+    text = f"A steering of {_MINUS}0.20 moves nothing here: raise the cap."
+    console.await_words("#pad-info", text)
+    keyboard.up("a")
     console.stop()
