@@ -36,16 +36,13 @@ def seen_at_50_ns(
     return observed(hub, frame_sent)
 
 
-def test_an_absent_quantity_is_nan() -> None:
+def test_what_is_unknown_is_nan() -> None:
     seen = seen_at_50_ns(guard_state(applied=(0.1, 0.5)))
     assert seen.state[0] == 0.25
     assert math.isnan(seen.state[1])
     assert seen.state[2] == 0.5
     assert seen.sources == {"speed": "wheel", "distance": "absent"}
-
-
-def test_without_a_state_of_the_guard_all_is_unknown() -> None:
-    seen = observed(new_hub())
+    seen = observed(new_hub())  # Without a state of the guard.
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
     assert not seen.armed
@@ -58,18 +55,20 @@ def test_a_frame_is_sent_once_and_to_those_who_want_it() -> None:
     assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
     declined = seen_at_50_ns(frame_sent=None)
     assert (declined.frame, declined.captured_ns) == (None, 30)
-
-
-def test_without_a_camera_the_time_is_that_of_the_state() -> None:
-    seen = seen_at_50_ns(frames=0)
-    assert (seen.frame, seen.frame_seq, seen.captured_ns) == (None, 0, 40)
+    blind = seen_at_50_ns(frames=0)  # The time is the state's.
+    assert (blind.frame, blind.frame_seq, blind.captured_ns) == (None, 0, 40)
 
 
 def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
-    hub = new_hub()
+    """An order carries the limits of its command and the time of the frame."""
+    orders: list[Order] = []
+    hub = new_hub(orders.append)
     hub.take(ANN)
-    hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5)))
+    hub.on_frame(Frame(b"jpeg", 30))
+    hub.command(ANN, Command(seq=9, answers=1, values=(0.0, 0.5), scale=0.5, ttl_ms=80))
     hub.on_state(guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39))
+    (order,) = orders
+    assert (order.values, order.ttl_ms, order.frame_ns) == ((0.0, 0.25), 80, 30)
     own = observed(hub)
     assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 50)
     hub.release(ANN, "she went")
@@ -77,13 +76,3 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
     other = observed(hub)
     assert (other.applied_seq, other.applied_ns, other.command_ns) == (None, None, None)
     assert other.action_applied == (0.0, 0.5)
-
-
-def test_an_order_carries_the_limits_of_its_command_and_the_time_of_the_frame() -> None:
-    orders: list[Order] = []
-    hub = new_hub(orders.append)
-    hub.on_frame(Frame(b"jpeg", 30))
-    hub.take(ANN)
-    hub.command(ANN, Command(seq=1, answers=1, values=(-1.0, 0.5), scale=0.5, ttl_ms=80))
-    (order,) = orders
-    assert (order.values, order.ttl_ms, order.frame_ns) == ((-0.5, 0.25), 80, 30)
