@@ -162,7 +162,7 @@ class Pins:
             whole, newline, _ = file.read().rpartition(b"\n")
         self._read += len(whole) + len(newline)
         for line in whole.splitlines():
-            if b'"kind":"pin"' not in line:
+            if b'"kind": "pin"' not in line:
                 continue  # The edges of the encoder are many, and no output.
             change = msgspec.json.decode(line, type=Transition)
             if change.pin in self._duties:

@@ -92,12 +92,13 @@ class Robot(RuleBasedStateMachine):
         self.holder: Connected | None = None
         self.here = self.numbers = self.stops = self.halts = 0
         self.command_in_force = self.suggestion = NOTHING
-        self.armed = self.emergency = False
+        self.emergency = False
 
     @initialize(arming=st.sampled_from(("person", "anyone")))
     def serve(self, arming: Any) -> None:
         self.anyone_arms = arming == "anyone"
         self.hub = SessionHub(car_plan(arming=arming), self.clock, self.orders.append)
+        self.report(False)
 
     @precondition(lambda self: self.here < 4)
     @rule(target=clients, role=st.sampled_from(("person", "program")))
@@ -147,7 +148,7 @@ class Robot(RuleBasedStateMachine):
 
         It must be a person; or, if anyone may arm, a program in control without an emergency.
         """
-        client = (by_holder and self.holder) or client
+        client = self.actor(client, by_holder)
         answers = client.answers(back)
         orders = self.send(client, Arm(answers=answers, emergency=emergency))
         program = self.anyone_arms and not self.emergency and self.holder is client
@@ -182,7 +183,7 @@ class Robot(RuleBasedStateMachine):
         back=_backs,
         values=_values,
         scale=st.floats(0.0, 1.0),
-        ttl_ms=st.integers(1, 400),
+        ttl_ms=st.sampled_from((1, 100, 250, 400)),
     )
     def command(
         self,
@@ -195,7 +196,7 @@ class Robot(RuleBasedStateMachine):
         ttl_ms: int,
     ) -> None:
         """A client sends a command: new, old, repeated, in answer to any number, or invalid."""
-        client = (by_holder and self.holder) or client
+        client = self.actor(client, by_holder)
         answers, (seq, is_new) = client.answers(back), client.number(Command, ahead)
         message = Command(seq=seq, answers=answers, values=values, scale=scale, ttl_ms=ttl_ms)
         orders = self.send(client, message)
@@ -214,6 +215,7 @@ class Robot(RuleBasedStateMachine):
     @rule(client=clients, ahead=_aheads, back=_backs, values=_values)
     def suggest(self, client: Connected, ahead: int, back: int, values: tuple[float, ...]) -> None:
         """A suggestion counts if its sender does not have control, and moves nothing."""
+        self.observe(client)
         answers, (seq, is_new) = client.answers(back), client.number(Suggest, ahead)
         assert not self.send(client, Suggest(seq=seq, answers=answers, values=values))
         counts = self.holder is not client and is_new and self.is_good(values)
@@ -236,14 +238,14 @@ class Robot(RuleBasedStateMachine):
         assert not self.send(client, request)
         assert not self.hub.recorder.on
 
-    @rule(milliseconds=st.sampled_from((1, 250, 400)) | st.integers(1, 600))
+    @rule(milliseconds=st.sampled_from((1, 100, 250, 400)) | st.integers(1, 600))
     def wait(self, milliseconds: int) -> None:
         self.clock.ns += milliseconds * MS
 
     @rule(emergency=st.booleans())
     def report(self, emergency: bool) -> None:
         """A state of the guard and a frame arrive."""
-        self.armed, self.emergency = True, emergency
+        self.emergency = emergency
         self.hub.on_state(guard_state(at_ns=self.clock.ns, armed=True, emergency=emergency))
         self.hub.on_frame(Frame(b"jpeg", self.clock.ns))
 
@@ -275,10 +277,17 @@ class Robot(RuleBasedStateMachine):
         shown, now_ns = self.hub.observation(Client(0), 1, None), self.clock.ns
         command, suggestion = (
             pending if now_ns <= pending[2] else NOTHING
-            for pending in (self.command_in_force if self.armed else NOTHING, self.suggestion)
+            for pending in (self.command_in_force, self.suggestion)
         )
         assert shown.commanded == command[0]
         assert (shown.suggested, shown.suggested_by) == suggestion[:2]
+
+    def actor(self, client: Connected, by_holder: bool) -> Connected:
+        """Return the client in control, which has just observed; or else another one."""
+        if not by_holder or self.holder is None:
+            return client
+        self.observe(self.holder)
+        return self.holder
 
     def lose_control(self, client: Connected) -> None:
         if self.holder is client:
