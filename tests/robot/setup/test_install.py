@@ -58,13 +58,17 @@ def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
 
 
 def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
-    """What the checks find bad in the computer's settings is what `install` puts in place."""
+    """What the checks find bad in the computer's settings is what `install` puts in place.
+
+    A line below a filter, such as [pi5], applies to that model only; ours applies to all.
+    """
+    pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")
     profile = replace(_blind("car"), path=pi.root / "my home" / "car.toml")
     for expected in ("bad", "good"):
-        found = examine(StandingRobot(profile, root=pi.root))
-        levels = {one.check: one.level for one in found}
+        levels = {one.check: one.level for one in examine(StandingRobot(profile, root=pi.root))}
         assert (levels["strict_gpiod"], levels["systemd"]) == (expected, expected)
         _install(pi, profile)
+    assert pi.config.endswith("[pi5]\ndtparam=strict_gpiod\n\n[all]\ndtparam=strict_gpiod\n")
 
 
 @pytest.mark.parametrize("raspi_config", [True, False])
@@ -80,13 +84,6 @@ def test_a_servo_board_and_a_rig_need_i2c(pi: FakePi, raspi_config: bool) -> Non
     did = ("latency timer", "I2C speed", "group dialout")
     assert ([found[name] for name in did], found["I2C"]) == (["did"] * 3, "already")
     assert set(_levels(_install(pi, _blind("finger"))).values()) == {"already"}
-
-
-def test_lines_of_another_model_do_not_count(pi: FakePi) -> None:
-    """A line below a filter, such as [pi5], applies to that model only; ours applies to all."""
-    pi.write("boot/firmware/config.txt", "[pi5]\ndtparam=strict_gpiod\n")
-    assert _install(pi, _blind("car"))["strict_gpiod"][0] == "did"
-    assert pi.config.endswith("[pi5]\ndtparam=strict_gpiod\n\n[all]\ndtparam=strict_gpiod\n")
 
 
 def test_what_fails_is_told_with_its_command(
@@ -119,15 +116,8 @@ def test_the_service_is_removed(pi: FakePi) -> None:
     assert "dtparam=strict_gpiod" in pi.config
 
 
-def test_other_machines_are_refused(pi: FakePi) -> None:
-    pi.machine.require_pi()
-    (pi.root / "proc/device-tree/model").unlink()
-    with pytest.raises(RobotError, match=r"not a Raspberry Pi.*Raspberry Pi OS"):
-        pi.machine.require_pi()
-
-
-def test_commands_run_as_root(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without root they go through sudo, and a failure is its last line."""
+def test_commands_run_as_root(pi: FakePi, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without root they go through sudo, and a failure is its last line; only a Pi is changed."""
     code = "import sys; sys.stderr.write('one\\ntwo\\n'); sys.exit(len(sys.stdin.read()))"
     script = RootCommand((sys.executable, "-c", code), "text")
     monkeypatch.setattr("os.geteuid", lambda: 0)
@@ -138,6 +128,10 @@ def test_commands_run_as_root(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.geteuid", lambda: 1000)
     monkeypatch.setenv("PATH", "")
     assert run_as_root(script) == "sudo: No such file or directory"
+    pi.machine.require_pi()
+    (pi.root / "proc/device-tree/model").unlink()
+    with pytest.raises(RobotError, match=r"not a Raspberry Pi.*Raspberry Pi OS"):
+        pi.machine.require_pi()
 
 
 def test_the_unit_names_profile_program_and_user(

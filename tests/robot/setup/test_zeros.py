@@ -29,8 +29,8 @@ class _Straight(DrivingWorld):
         return self._tremble
 
 
-def _board(tremble: float = 0.0, servo_zero: int = 0) -> LocalBoard:
-    """Encoders whose true zeros are `_ZEROS`, and servos with a true zero."""
+def _board(tremble: float = 0.0) -> LocalBoard:
+    """Encoders whose true zeros are `_ZEROS`, and servos with a zero of 0."""
 
     def changed(one: Any, **settings: object) -> Any:
         return replace(one, settings={**one.settings, **settings})
@@ -38,9 +38,9 @@ def _board(tremble: float = 0.0, servo_zero: int = 0) -> LocalBoard:
     *others, joints = _RIG.sensors
     rows = joints.settings["rows"].items()
     zeroed = {n: {**row, "zero": zero} for (n, row), zero in zip(rows, _ZEROS, strict=True)}
-    sensors = [*others, changed(joints, rows=zeroed)]
-    outputs = [changed(output, zero=servo_zero) for output in _RIG.outputs]
-    plan = replace(_RIG.guard_plan(), sensors=tuple(sensors), outputs=tuple(outputs))
+    outputs = tuple(changed(output, zero=0) for output in _RIG.outputs)
+    sensors = (*others, changed(joints, rows=zeroed))
+    plan = replace(_RIG.guard_plan(), sensors=sensors, outputs=outputs)
     return LocalBoard(TwinWiring(plan), _Straight(tremble))
 
 
@@ -52,21 +52,17 @@ def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
     assert zeros == {f"joints.{n}": zero for n, zero in zip(names, _ZEROS, strict=True)}
 
 
-def test_a_missing_magnet_is_an_error() -> None:
-    """The error names the encoder; a robot without encoders has no zeros."""
+def test_a_missing_magnet_or_a_loose_tendon_is_an_error() -> None:
+    """The error names it, and all servos are released; a car has neither."""
     board = _board()
     board.pins.encoder("DIP_flexion").set_magnet("gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
         find_joint_zeros(_RIG, board.hardware, lambda: None)
-    assert find_joint_zeros(_CAR, board.hardware, lambda: None) == {}
-
-
-def test_a_loose_tendon_is_an_error() -> None:
-    """The error names the tendon, and all servos are released; a car has no tendons."""
-    board = _board()
-    board.pins.require_rig().break_servo("EIP", "snapped")
+    rig = board.pins.require_rig()
+    rig.break_servo("EIP", "snapped")
     with pytest.raises(RobotError, match="EIP"):
         find_zeros(_RIG, board.hardware, lambda: board.pass_ns(10_000_000))
-    assert not any(servo.has_torque for servo in board.pins.require_rig().servos.values())
+    assert not any(servo.has_torque for servo in rig.servos.values())
+    assert find_joint_zeros(_CAR, board.hardware, lambda: None) == {}
     with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
         find_zeros(_CAR, board.hardware, lambda: None)
