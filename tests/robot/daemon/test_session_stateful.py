@@ -195,7 +195,12 @@ class Robot(RuleBasedStateMachine):
         scale: float,
         ttl_ms: int,
     ) -> None:
-        """A client sends a command: new, old, repeated, in answer to any number, or invalid."""
+        """A client sends a command: new, old, repeated, in answer to any number, or invalid.
+
+        Half of the commands are valid, and the holder's if there is one.
+        """
+        if by_holder:
+            ahead, back, values = 1, 0, (0.5, -1.0)
         client = self.actor(client, by_holder)
         answers, (seq, is_new) = client.answers(back), client.number(Command, ahead)
         message = Command(seq=seq, answers=answers, values=values, scale=scale, ttl_ms=ttl_ms)

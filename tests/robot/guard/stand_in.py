@@ -43,19 +43,10 @@ def main(arguments: list[str]) -> None:
         heart.send(b".")
         if not drives:
             continue
-        try:
+        with contextlib.suppress(BlockingIOError):
             while state := guard.recv(1 << 16):
-                received = json.loads(state)
-                if received["armed"] and not was_armed:
-                    note(armed=True)
-                was_armed = received["armed"]
-                if received["refused"]:
-                    note(refused=received["refused"])
-        except BlockingIOError:
-            pass
+                was_armed = json.loads(state)["armed"]
         if not was_armed and seq == 0:
-            for garbage in plan.pop("garbage", ()):
-                guard.send(garbage.encode())
             send("arm")
         if was_armed and seq < limit:
             seq += 1

@@ -3,15 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock, Mock, call
+from unittest.mock import Mock, call
 
 import pytest
 
 from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, output_values
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard import outputs
-from shapechanger.robot.guard.outputs import OutputBank, estimated, make_safe, preload
-from shapechanger.robot.hardware import REAL
+from shapechanger.robot.guard.outputs import OutputBank, estimated, make_safe
 from tests.robot.guard.plans import car
 from tests.robot.guard.recording import Record, connect
 
@@ -170,25 +169,3 @@ def test_a_bus_tells_why_it_is_not_ready(calls: Mock) -> None:
     calls.bus.ready.assert_called_once_with(alive)
     calls.bus.ready.side_effect = RobotError("servo 3 is hot.")
     assert bank.ready(alive) == "servo 3 is hot."
-
-
-@pytest.mark.parametrize("source", [REAL, "twin:hardware"])
-def test_everything_to_make_outputs_safe_is_imported(
-    monkeypatch: pytest.MonkeyPatch, source: str
-) -> None:
-    """Drivers, pulses, the source of the hardware, and the libraries that are there."""
-    tables = MagicMock()
-    monkeypatch.setattr(outputs, "OUTPUTS", tables.outputs)
-    monkeypatch.setattr(outputs, "PULSES", tables.pulses)
-    monkeypatch.setattr(outputs, "load", tables.load)
-    library = Mock(side_effect=ImportError)
-    monkeypatch.setattr("importlib.import_module", library)
-    over = OutputPlan("arm", "servo", settings={"over": "pca9685"})
-    preload(replace(_CAR, outputs=(_CAR.outputs[0], over)), source)
-    tables.load.assert_called_once_with(source)
-    drivers = [one.args[0] for one in tables.outputs.__getitem__.mock_calls]
-    pulses = [one.args[0] for one in tables.pulses.__getitem__.mock_calls]
-    assert (drivers, pulses) == (["esc", "servo"], ["pca9685"])
-    real = ["shapechanger.robot.lgpio_pins", "gpiozero.pins.lgpio", "smbus2"]
-    libraries = [one.args[0] for one in library.mock_calls]
-    assert libraries == ["gpiozero", *(real if source == REAL else [])]

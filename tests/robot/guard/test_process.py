@@ -27,7 +27,7 @@ from shapechanger.robot.guard.channel import (
     decode_state,
     encode,
 )
-from shapechanger.robot.guard.process import Guard, main
+from shapechanger.robot.guard.process import Guard
 from tests.robot.guard.plans import MS, arm, command, quick_car
 
 _T0 = 1_000 * MS
@@ -353,21 +353,6 @@ def test_a_failed_output_stops_all_until_rearmed(
     assert [one.args[1] for one in write.mock_calls[:2]] == [_T0 + 31 * MS] * 2
 
 
-def test_all_failures_of_outputs_are_reported(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also an error without a text."""
-    bench = make()
-    bench.arms()
-    for driver in bench.drivers.values():
-        failing = Mock(side_effect=ValueError)
-        bench.at(31, lambda one=driver, failing=failing: monkeypatch.setattr(one, "write", failing))
-    failures = "Output drive: ValueError Output steer: ValueError"
-    reason = f"NOT at rest: {failures} Emergency stop: ValueError"
-    assert bench.run(50).stop_reason == reason
-    monkeypatch.undo()
-    bench.guard.close()
-    assert bench.guard.is_safe is True
-
-
 def test_outputs_are_released_once_per_stop(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make(stop=replace(quick_car().stop, then="release"))
     released: list[str] = []
@@ -497,11 +482,3 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
         Guard(replace(quick_car(), sensors=plans), hardware, Mock(), logging.getLogger("test"))
     good.close.assert_called_once()
     OutputDevice(22, pin_factory=hardware.factory).close()  # The pin is free.
-
-
-def test_wrong_arguments_exit_with_one_line(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["--plan-fd", "3"])
-    assert ended.value.code == 1
-    (line,) = capfd.readouterr().err.splitlines()
-    assert line.startswith("guard: ends, for ValueError: This takes --plan-fd N")

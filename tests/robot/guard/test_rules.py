@@ -96,26 +96,23 @@ def test_a_command_ends_exactly_at_its_deadline() -> None:
     assert [robot.rules.stands(_T0 + 250 * MS - left) for left in (1, 0)] == [False, True]
 
 
-def test_an_emergency_stop_latches_until_a_person_who_has_seen_it_arms() -> None:
+def test_an_emergency_stop_keeps_its_first_reason() -> None:
+    """A refusal to arm says why."""
     robot = _driving()
     rules = robot.rules
-    for reason in ("a child.", ""):
-        rules.offer(Order("emergency", reason=reason), _T0)
-    rules.offer(Order("disarm", reason="the lease was lost."), _T0)
+    for order in (Order("emergency", reason="a child."), Order("emergency"), Order("disarm")):
+        rules.offer(order, _T0)
     assert robot.tick().stop_reason == "Emergency stop: a child."
     assert "Emergency stop: a child." in robot.order()
-    for seen in (0, 1, 3):
-        assert "2 emergency stops" in rules.offer(arm(_T0, seen), _T0)
+    assert "2 emergency stops" in rules.offer(arm(_T0, 1), _T0)
     assert "only a person" in rules.offer(arm(_T0, 2, person=False), _T0)
     assert "1.5 s old" in rules.offer(arm(_T0 - 1_500 * MS, 2), _T0)
     robot.arm()
-    assert robot.tick().seq is None
     assert robot.ask(0.5) == (0.5, "")
-    rules.offer(Order("disarm", reason="the lease was lost."), _T0)
-    assert robot.tick().stop_reason == "Disarmed: the lease was lost."
-    robot.arm()
-    rules.offer(Order("end"), _T0)
-    assert robot.tick().stop_reason == "Disarmed: the guard ends."
+    for order, reason in ((Order("disarm", reason="lost."), "lost."), (Order("end"), "the guard")):
+        robot.arm()
+        rules.offer(order, _T0)
+        assert robot.tick().stop_reason.startswith(f"Disarmed: {reason}")
 
 
 def test_a_pressed_button_stops_and_prevents_arming() -> None:
@@ -212,20 +209,12 @@ def test_an_output_that_fails_stops_everything_without_hold() -> None:
     assert decision.stop_reason == "Emergency stop: Output drive: no answer"
 
 
-def test_a_stale_frame_stops_the_robot() -> None:
+def test_a_blind_robot_says_so() -> None:
     robot = _Armed(quick_car(LimitPlan(camera_stale_ms=100)))
-    assert robot.tick().stop_reason == "No fresh command."
     robot.order()
     assert robot.tick().stop_reason == "Blind: no image yet."
-    robot.order(frame_age_ms=-51)  # A frame from the future is ignored.
-    assert robot.tick().seq is None
-    for age_ms in (40, 90):
-        robot.order(frame_age_ms=age_ms)
-    before, after = robot.change(60)
-    assert (before.seq, after.stop_reason) == (4, "Blind: no image for 100 ms.")
-    robot.order(frame_age_ms=-50)  # A tolerated time in the future counts from now.
-    before, after = robot.change(160)
-    assert (before.seq, after.seq) == (5, None)
+    robot.order(frame_age_ms=100)
+    assert robot.tick().stop_reason == "Blind: no image for 100 ms."
 
 
 def test_a_bump_prevents_driving_forward() -> None:

@@ -81,7 +81,7 @@ class _World(RuleBasedStateMachine):
         age_ns=_ages,
         ttl_ms=st.sampled_from([0, 1, 50, 100, 10_000, 10_000]),
         values=st.lists(_values, min_size=1, max_size=3),
-        frame_age_ns=st.none() | _ages,
+        frame_age_ns=st.none() | st.just(0) | _ages,
         ahead=st.sampled_from([1, 1, 0, None]),
         is_good=st.booleans(),
     )
@@ -96,11 +96,11 @@ class _World(RuleBasedStateMachine):
         ahead: int | None,
         is_good: bool,
     ) -> None:
-        """Offer any command; half are the next one, and half have enough values and a frame."""
+        """Offer any command; half are the next one, and half have enough values."""
         if ahead is not None:
             session, seq = max(self.newest[0], 0), self.newest[1] + ahead
         if is_good:
-            frame_age_ns, values = 0, (values * 2)[:2]
+            values = (values * 2)[:2]
         issued_ns = self.now_ns - age_ns
         frame_ns = None if frame_age_ns is None else self.now_ns - frame_age_ns
         order = Order("command", session, seq, issued_ns, ttl_ms, frame_ns, tuple(values))

@@ -89,25 +89,6 @@ def test_a_killed_or_stopped_process(
     assert ("was silent, and was killed" in _log(tmp_path)) == (number is signal.SIGSTOP)
 
 
-def test_killed_supervisor(tmp_path: Path) -> None:
-    with running(tmp_path) as robot:
-        robot.drive()
-        guard = robot.pids("hardware")[0]
-        killed_ns = robot.record.lines()[-1]["t"]
-        robot.process.kill()
-        assert robot.rested_ns(killed_ns, guard) - killed_ns < 1_000 * MS
-        until(lambda: all(map(_is_gone, (guard, *robot.pids("daemon")))))
-        assert robot.record.is_at_rest()
-
-
-def test_silent_daemon(tmp_path: Path) -> None:
-    with running(tmp_path, commands=20) as robot:
-        until(lambda: len(robot.commands()) == 20)
-        last_ns = robot.commands()[-1]
-        rested_ns = robot.rested_ns(last_ns)
-        assert 240 * MS < rested_ns - last_ns < 450 * MS
-
-
 def test_a_resumed_supervisor_restarts_nothing(tmp_path: Path) -> None:
     with running(tmp_path) as robot:
         robot.drive()
