@@ -33,9 +33,7 @@ def test_a_report_names_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     sentence = "anna owns /home/anna/car.toml on annas-pi, and a banana."
     assert anonymous(sentence) == "USER owns ~/car.toml on HOST, and a banana."
     head = facts(shipped("car"), twin=False, root=tmp_path)
-    assert any(
-        line.split(maxsplit=1) == ["board", "Raspberry Pi 5 Model B Rev 1.0"] for line in head
-    )
+    assert "board        Raspberry Pi 5 Model B Rev 1.0" in head
     report = tmp_path / "report.txt"
     said: list[str] = []
     good = Finding("drives", "good", sentence)

@@ -69,25 +69,21 @@ def refusal(answer: Answer) -> str:
     return answer.reason
 
 
-@pytest.mark.parametrize("count", [1, 2, 7, 100_000])
+@pytest.mark.parametrize("count", [1, 7, 100_000])
 def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int) -> None:
     path = record(tmp_path, 60)
-    lines, shown, pictures = b"", None, []
+    lines, pictures = b"", []
     at, total = 0, 1
     while at < total:
         piece = ask(Fetch(episode=path.name, first=at, count=count))
         assert isinstance(piece, Piece)
         assert 1 <= len(piece.lines) <= count
         assert piece.header.encode() == (path / "episode.json").read_bytes()
-        for line, jpeg in zip(piece.lines, piece.frames, strict=True):
-            lines += line.encode() + b"\n"
-            if '"kind":"step"' in line:
-                shown = jpeg or shown
-                pictures.append(shown)
+        lines += "".join(f"{line}\n" for line in piece.lines).encode()
+        pictures += piece.frames
         at, total = at + len(piece.lines), piece.total
     assert lines == (path / "steps.jsonl").read_bytes()
-    episode = read_episode(path)
-    assert pictures == [episode.jpeg(step) for step in episode.steps]
+    assert [one for one in dict.fromkeys(pictures) if one] == [picture(n) for n in range(0, 60, 2)]
 
 
 def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
