@@ -3,6 +3,9 @@
 import math
 from collections.abc import Callable
 
+import pytest
+
+from shapechanger.errors import RobotRefused
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.client import Client
 from shapechanger.robot.daemon.hub import SessionHub
@@ -76,3 +79,21 @@ def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
     other = observed(hub)
     assert (other.applied_seq, other.applied_ns, other.command_ns) == (None, None, None)
     assert other.action_applied == (0.0, 0.5)
+
+
+def test_a_person_always_gets_a_place() -> None:
+    """6 programs and 8 clients in total; the oldest goes that does not have control."""
+    hub, programs = new_hub(), [Client(number) for number in range(6)]
+    people = [Client(10 + number, f"person {number}", "person") for number in range(3)]
+    for client in programs:
+        hub.join(client)
+    hub.take(programs[0])
+    with pytest.raises(RobotRefused, match="only a person can still connect"):
+        hub.join(Client(6))
+    for client in people:
+        hub.join(client)
+    with pytest.raises(RobotRefused, match="8 clients are connected"):
+        hub.join(Client(6))
+    reason = "person 2 connected, and 8 clients are the limit."
+    assert [one.expelled for one in (*programs, *people)] == ["", reason, *[""] * 7]
+    assert hub.holder is programs[0]

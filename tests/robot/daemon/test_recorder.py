@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import Episode, Step, episodes_of, read_episode, writer
 from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.client import Client, Declined, Sent
+from shapechanger.robot.daemon.client import Client, Sent
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.recorder import DISK_TOO_SLOW, Recorder
 from shapechanger.robot.link import messages
-from shapechanger.robot.link.messages import Mark, RecorderState, Refused, Undo
+from shapechanger.robot.link.messages import Mark, RecorderState
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, picture
 
@@ -44,15 +44,8 @@ class Recording:
         self.recorder = Recorder(plan, self.told.append, self._calls.put)
         self.recorder.begin(self.ada, "corridor", "")
 
-    @property
-    def state(self) -> RecorderState:
-        return self.recorder.state()
-
     def add(self, made: Step, jpeg: bytes | None) -> None:
         self.recorder._add(made, jpeg)
-
-    def edit(self, request: Mark | Undo) -> None:
-        self.recorder.edit(request, self.ada)
 
     def listen(self, until: Callable[[], object]) -> None:
         """Call the functions of the thread until a condition holds."""
@@ -67,30 +60,6 @@ class Recording:
         self.listen(lambda: not episode.jobs)
         return [read_episode(path) for path in episodes_of(self.folder)]
 
-    def refusals(self) -> list[str]:
-        """Return the refusals to Ada so far."""
-        return [m.reason for m in iter(self.ada.take, None) if isinstance(m, Refused)]
-
-
-def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
-    recording = Recording(tmp_path)
-    recording.edit(Mark(text="too early"))
-    recording.edit(Undo())
-    for number in range(40):
-        recording.add(*step(number))
-    recording.edit(Mark(text="here"))
-    recording.edit(Undo(seconds=0.5))
-    (episode,) = recording.end("time")
-    with pytest.raises(Declined, match=r"Nothing is being recorded\."):
-        recording.recorder.end()
-    assert recording.refusals() == ["There is no step to mark yet.", "There is nothing to undo."]
-    assert [state.marks for state in recording.told] == [0, 1, 1, 1]
-    assert (episode.closed, episode.outcome) == (True, "time")
-    assert episode.header.notes == {"name": "corridor", "recorded_by": "Ada"}
-    assert [s.action[1] for s in episode.steps] == [number / 1e6 for number in range(40)]
-    assert (len(episode.kept), recording.state.dropped) == (30, 10)
-    assert [mark.step for mark in episode.marks] == [39]
-
 
 def test_a_full_episode_goes_on_in_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -100,7 +69,7 @@ def test_a_full_episode_goes_on_in_the_next(
     for number in range(40):
         made, jpeg = step(number)
         recording.add(made, jpeg if number % 3 == 0 else None)
-        recording.edit(Mark(text=str(number)))
+        recording.recorder.edit(Mark(text=str(number)), recording.ada)
     episodes = recording.end("time")
     assert len(episodes) > 3
     names = dict.fromkeys(state.episode for state in recording.told)
@@ -113,7 +82,7 @@ def test_a_full_episode_goes_on_in_the_next(
     assert numbers == list(range(40))
     seen = [e.jpeg(s) for e in episodes for s in e.steps]
     assert seen == [step(number - number % 3)[1] for number in range(40)]
-    assert recording.refusals() == []
+    assert recording.ada.take() is None
     assert [len(e.marks) for e in episodes] == [len(e.steps) for e in episodes]
 
 
@@ -126,7 +95,7 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(
     while recording.recorder.on:  # As far as the recorder knows, the disk does nothing.
         recording.add(step(0)[0], large)
     assert recording.told == [RecorderState(text=DISK_TOO_SLOW)]
-    recording.listen(lambda: recording.state.steps == fits and len(recording.told) == 3)
+    recording.listen(lambda: recording.recorder.state().steps == fits and len(recording.told) == 3)
     (path,) = episodes_of(tmp_path)
     episode = read_episode(path)
     assert (episode.outcome, len(episode.steps)) == (DISK_TOO_SLOW, fits)

@@ -1,4 +1,4 @@
-"""The plan, commands, log and priority of processes, and the modules that the guard imports."""
+"""The plan, commands, log and priority of the processes."""
 
 import fcntl
 import json
@@ -62,43 +62,6 @@ def test_processes_ignore_the_working_folder() -> None:
     assert command_of("guard", _PLAN) == [sys.executable, "-I", start.__file__, "guard"]
     assert supervisor_command(_PLAN, 7)[1:] == ["-I", start.__file__, "supervise", "--plan-fd", "7"]
     assert command_of("daemon", _PLAN)[1:] == ["-P", "-m", "shapechanger.robot.daemon.process"]
-
-
-_LISTS_MODULES = """
-import importlib.util, sys
-spec = importlib.util.spec_from_file_location("start", sys.argv[1])
-start = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(start)
-start._put_package_in_place()
-import importlib
-for module in ("guard.process", "guard.supervisor", "twin.hardware"):
-    importlib.import_module(f"shapechanger.robot.{module}")
-print(*(name for name in sys.modules if ".drivers." in name or name == "importlib.metadata"))
-from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
-for chips in (OUTPUTS, PULSES, SENSORS):
-    list(chips.values())
-print(*sys.modules)
-"""
-
-
-def test_guard_and_supervisor_import_only_their_drivers() -> None:
-    command = [sys.executable, "-I", "-c", _LISTS_MODULES, start.__file__]
-    before = "import sys; print(*sys.modules)"
-    bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()
-    first, loaded = subprocess.check_output(command, text=True).split("\n", 1)
-    # Without a chip these suffice: each other module costs the guard memory.
-    assert {name.rpartition(".")[2] for name in first.split()} == {"chip", "pins", "simulation"}
-    # gpiozero and msgspec prefer backports where another package has brought them.
-    backport = {"importlib_metadata", "lazy_importer", "typing_extensions", "zipp"}
-    theirs = {"gpiozero", "colorzero", "lgpio", "_lgpio", "smbus2", "msgspec", "start"} | backport
-    for module in set(loaded.split()) - set(bare):
-        top = module.partition(".")[0]
-        if top == "shapechanger":
-            ours, inner = [*module.split("."), "", ""][1:3]
-            assert ours in {"", "errors", "robot", "contract"}, module
-            assert inner in {"", "guard", "drivers", "hardware", "plan", "limits", "twin"}, module
-        else:
-            assert top in theirs or top in sys.stdlib_module_names, module
 
 
 @pytest.fixture
