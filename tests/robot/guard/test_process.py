@@ -290,17 +290,15 @@ def test_the_log_has_a_line_for_each_event(
     bench = make(sensors={"bumper": _sensor(good, good, good, RobotError("No answer."), good)})
     bench.arms()
     bench.send(15, b"{")
-    bench.send(16, b"x" * 300)
     bench.send(65, Order("disarm", reason="lunch."))
     bench.run(80)
     failing = Mock(side_effect=RobotError("No power."))
     monkeypatch.setattr(bench.drivers["steer"], "close", failing)
     bench.guard.close()
     assert bench.guard.is_safe is False
-    said = [record.getMessage() for record in caplog.records]
-    assert [line.partition("orders:")[0] for line in said] == [
-        *("Not armed.", "Armed.", "1 datagrams were no ", "2 datagrams were no "),
-        *("Sensor bumper fails: No answer.", "Sensor bumper responds again."),
+    assert [record.getMessage()[:30] for record in caplog.records] == [
+        *("Not armed.", "Armed.", "1 datagrams were no orders: In"),
+        *("Sensor bumper fails: No answer", "Sensor bumper responds again."),
         *("Disarmed: lunch.", "Output steer: No power."),
     ]
 

@@ -1,13 +1,11 @@
 """The card of a robot, which its processes, clients and recordings share."""
 
-import dataclasses
 import json
 import math
 
 import msgspec
 import pytest
 
-from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.errors import LinkError
 from shapechanger.layout import Layout
 from shapechanger.robot.link.card import RobotCard, card_of
@@ -57,11 +55,3 @@ def test_a_welcome_without_a_limit_is_refused() -> None:
         rest = {name: value for name, value in fields.items() if name != missing}
         with pytest.raises(LinkError, match=missing):
             decode_robot_message(msgspec.msgpack.encode(rest))
-
-
-def test_headers_of_episodes_share_its_names() -> None:
-    shared = {f.name for f in dataclasses.fields(EpisodeHeader)} & {*RobotCard.__struct_fields__}
-    assert shared == {
-        *("robot", "body", "action_layout", "state_layout", "image_size", "control_hz", "clock"),
-        *("camera_pitch_deg", "camera_fovy_deg"),
-    }
