@@ -209,12 +209,18 @@ def test_an_output_that_fails_stops_everything_without_hold() -> None:
     assert decision.stop_reason == "Emergency stop: Output drive: no answer"
 
 
-def test_a_blind_robot_says_so() -> None:
+def test_a_stale_frame_stops_the_robot() -> None:
     robot = _Armed(quick_car(LimitPlan(camera_stale_ms=100)))
     robot.order()
     assert robot.tick().stop_reason == "Blind: no image yet."
-    robot.order(frame_age_ms=100)
-    assert robot.tick().stop_reason == "Blind: no image for 100 ms."
+    robot.order(frame_age_ms=-51)  # A frame from the future is ignored.
+    assert robot.tick().seq is None
+    for age_ms in (40, 90):
+        robot.order(frame_age_ms=age_ms)
+    before, after = robot.change(60)
+    assert (before.seq, after.stop_reason) == (4, "Blind: no image for 100 ms.")
+    robot.order(frame_age_ms=-50)  # A tolerated time in the future counts from now.
+    assert [one.seq for one in robot.change(160)] == [5, None]
 
 
 def test_a_bump_prevents_driving_forward() -> None:
@@ -340,7 +346,7 @@ _HEALTH = LimitPlan(low_battery_v=0.8, high_temperature_c=80.0)
 def test_a_low_battery_and_a_hot_computer_stop_after_half_a_second(
     limits: LimitPlan, name: str, value: float, reason: str
 ) -> None:
-    """Half a second without an interruption; a limit of 0 is none."""
+    """Half a second without an interruption; a limit of 0 is not checked."""
     robot = _driving(quick_car(limits))
     for at_ms, one in ((0, value), (400, 1.0), (450, value)):
         robot.now_ns = _T0 + at_ms * MS
