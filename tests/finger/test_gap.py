@@ -13,13 +13,7 @@ import pytest
 
 from shapechanger.errors import FingerError, UnknownName
 from shapechanger.finger.anatomy import AN_1983_ARMS
-from shapechanger.finger.gap import (
-    GAPS,
-    Gap,
-    geared_around,
-    require_balance,
-    resolve_gap,
-)
+from shapechanger.finger.gap import GAPS, Gap, geared_around, require_balance, resolve_gap
 from shapechanger.finger.identify import FingerLog
 from shapechanger.finger.parameters import NOMINAL, CommandPath
 from shapechanger.finger.reach import FingerReachEnv
@@ -77,9 +71,7 @@ def test_draws_span_all_torques() -> None:
     assert 0.02 < np.mean([spans_all_torques(arms) for arms in raw]) < 0.9
 
 
-def test_a_gap_without_valid_fingers_raises(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_gap_without_valid_fingers_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     """After several tries the error names the setting to reduce."""
     monkeypatch.setattr("shapechanger.finger.gap.spans_all_torques", lambda _: False)
     with pytest.raises(FingerError, match=r"off by 90%, hardly any .* make arm_error smaller"):

@@ -140,8 +140,7 @@ def test_a_shape_round_trips_through_csv(
 
 
 @pytest.mark.parametrize(
-    "path",
-    [*map(as_path, KINDS), recording(True, 0), recording(False, 1), from_callable(wave)],
+    "path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1), from_callable(wave)]
 )
 def test_paths_are_values(path: FingertipPath) -> None:
     """A pickled path has the same positions; writing to a result does not change the path."""

@@ -10,10 +10,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.errors import BadAction, FingerError, UnknownName
-from shapechanger.finger.anatomy import (
-    JOINT_REST,
-    TENDONS,
-)
+from shapechanger.finger.anatomy import JOINT_REST, TENDONS
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL

@@ -75,8 +75,7 @@ def test_the_rms_error_starts_after_half_a_second() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "beyond"),
-    [((0.08, 0.0, -0.04), (9.5, 10.5)), ((0.05, 0.08, -0.03), (20.0, 120.0))],
+    ("place", "beyond"), [((0.08, 0.0, -0.04), (9.5, 10.5)), ((0.05, 0.08, -0.03), (20.0, 120.0))]
 )
 def test_a_path_that_leaves_the_workspace_is_refused(
     place: tuple[float, float, float], beyond: tuple[float, float]

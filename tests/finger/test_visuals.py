@@ -12,12 +12,7 @@ from shapechanger.finger.anatomy import JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.model import TARGET, FingerFigure
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.tensions import DRIVES
-from shapechanger.finger.visuals import (
-    TENDON_COLOURS,
-    THICKEST_M,
-    THINNEST_M,
-    route_names,
-)
+from shapechanger.finger.visuals import TENDON_COLOURS, THICKEST_M, THINNEST_M, route_names
 from tests.finger.commands import STRETCHED, at_rest, made
 
 

@@ -73,9 +73,7 @@ def test_joints_and_friction_are_found() -> None:
     assert all(1e-3 < sd < 0.2 for _, sd in found.values())
 
 
-def test_the_covariance_has_the_correction_for_few_windows(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_covariance_has_the_correction_for_few_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two windows with opposite errors: a sandwich, times two windows over one."""
     fit = _MotionFit.__new__(_MotionFit)
     monkeypatch.setattr(motion, "_PRIOR_SD", 1.0)

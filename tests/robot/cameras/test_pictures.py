@@ -12,11 +12,7 @@ from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
-from shapechanger.robot.cameras.jpeg import (
-    JpegSplitter,
-    captured_ns_of,
-    checked_frame,
-)
+from shapechanger.robot.cameras.jpeg import JpegSplitter, captured_ns_of, checked_frame
 from shapechanger.robot.cameras.sources import barcode_rows, draw_barcode
 from shapechanger.robot.daemon.camera import FrameChecks
 from tests.robot.cameras.barcode import read_barcode

@@ -9,9 +9,7 @@ from shapechanger.contract.world import World
 from shapechanger.finger.anatomy import JOINTS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
-from shapechanger.robot.drivers.as5600 import (
-    open_and_read,
-)
+from shapechanger.robot.drivers.as5600 import open_and_read
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.in_process import LocalBoard
 

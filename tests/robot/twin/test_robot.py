@@ -20,10 +20,7 @@ def test_a_lost_link_keeps_the_end_of_the_log(tmp_path: Path, error: Exception) 
     (folder / "ready.json").write_text('{"port": 1, "fingerprint": ""}')
     (folder / "log.txt").write_text("x" * 5000 + "guard: the daemon has ended")
     supervisor = subprocess.Popen([sys.executable, "-c", _WAIT])
-    with (
-        pytest.raises(type(error)) as raised,
-        RunningRobot(folder, supervisor, temporary=True),
-    ):
+    with pytest.raises(type(error)) as raised, RunningRobot(folder, supervisor, temporary=True):
         raise error
     notes = getattr(raised.value, "__notes__", [])
     assert not folder.exists()

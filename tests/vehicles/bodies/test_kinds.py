@@ -24,11 +24,7 @@ def test_an_unknown_name_is_refused() -> None:
     ("name", "parts", "message"),
     [
         ("car", {"wheels"}, "The robot drives 'wheels'; a car is driven by 'steering' and"),
-        (
-            "car",
-            {"wheels", "steering", "bed"},
-            "The robot drives 'bed' and 'steering' and",
-        ),
+        ("car", {"wheels", "steering", "bed"}, "The robot drives 'bed' and 'steering' and"),
         ("truck", {"gear"}, "The robot drives nothing;"),
         ("boat", {"propeller", "left propeller", "right propeller"}, ", or by 'left propeller'"),
     ],

@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 from shapechanger.vehicles.bodies import VEHICLES, add_vehicle
-from shapechanger.vehicles.bodies.visuals import (
-    OUTSIDE_VIEW,
-    OWN_VIEW,
-    read_obj,
-)
+from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW, read_obj
 from tests.vehicles.bodies.grounds import ALL
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)

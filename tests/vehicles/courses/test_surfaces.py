@@ -12,13 +12,7 @@ from shapechanger.errors import UnknownName
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import LOOKS, VARIANTS, Course, Lamp, Look, Wall
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
-from shapechanger.vehicles.courses.surfaces import (
-    BANK_M,
-    QuadMesh,
-    Surfaces,
-    fittings,
-    moored,
-)
+from shapechanger.vehicles.courses.surfaces import BANK_M, QuadMesh, Surfaces, fittings, moored
 from shapechanger.vehicles.courses.textures import PAINTERS, texture
 from tests.vehicles.courses.scenes import square, with_walls
 

@@ -12,12 +12,7 @@ import pytest
 from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
 from shapechanger.vehicles.courses.course import HOME
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
-from shapechanger.vehicles.envs.ranges import (
-    BEARINGS_DEG,
-    FARTHEST_M,
-    MeanOutputs,
-    leave_rest,
-)
+from shapechanger.vehicles.envs.ranges import BEARINGS_DEG, FARTHEST_M, MeanOutputs, leave_rest
 from shapechanger.vehicles.waypoints import LEAST_THROTTLE
 
 _COURSE = {"course": 2, "start": 2}
@@ -27,10 +22,7 @@ _STEPS = 60
 @pytest.mark.parametrize("vehicle", HOME)
 def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
     """Equal actions lead to nearly equal poses."""
-    with (
-        closing(VehicleEnv(vehicle, image=False)) as robot,
-        closing(RangesEnv(vehicle)) as fast,
-    ):
+    with closing(VehicleEnv(vehicle, image=False)) as robot, closing(RangesEnv(vehicle)) as fast:
         robot.reset(options=_COURSE)
         fast.reset(options=_COURSE)
         expert = robot.expert()
@@ -90,10 +82,7 @@ def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
     """The bumper's reflex stops the vehicle for 0.75 s after `put_back`."""
     ahead = np.array([0.0, 0.8], np.float32)
     waits: list[int] = []
-    for env in (
-        VehicleEnv("car", image=False, put_back=True),
-        RangesEnv("car", put_back=True),
-    ):
+    for env in (VehicleEnv("car", image=False, put_back=True), RangesEnv("car", put_back=True)):
         with closing(env):
             env.reset(options=_COURSE)
             steps = 0

@@ -67,11 +67,7 @@ def test_policies_that_fit() -> None:
         (clone_card(body="tank"), _CAR, "learned to steer a tank, and my-car is a car"),
         (clone_card(control_hz=10.0), _CAR, "10 actions a second, and my-car has control_hz = 20"),
         (_CLONE, replace(_CAR, image_size=None), "my-car has no camera"),
-        (
-            _CLONE,
-            replace(_CAR, action_layout=_STATE.to_json()),
-            "those required here are speed",
-        ),
+        (_CLONE, replace(_CAR, action_layout=_STATE.to_json()), "those required here are speed"),
         (_WAYPOINTS, replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
         (_WAYPOINTS, replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
     ],

@@ -15,12 +15,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.check.pins import lamps_of
 from shapechanger.robot.twin.check import trial as module
 from shapechanger.robot.twin.check.faults import FAULTS, Fault
-from shapechanger.robot.twin.check.trial import (
-    Bench,
-    TrialResult,
-    Watcher,
-    fault_finding,
-)
+from shapechanger.robot.twin.check.trial import Bench, TrialResult, Watcher, fault_finding
 from tests.robot.check.held_pins import HeldPins, shipped
 
 
