@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course, Lamp, Obstacle, Surface, Wall
 
@@ -55,3 +56,18 @@ def square(world: str) -> Course:
 def with_walls(course: Course, *walls: Wall) -> Course:
     """Return the course with other walls and no obstacles."""
     return replace(course, walls=walls, obstacles=(), lamps=())
+
+
+def in_lane(course: Course, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which points, m, (n, 2), are within the lane, by the number of walls that a ray meets.
+
+    The lane is between two closed lines, and everything else is inside the inner or outside both.
+    """
+    starts = np.array([wall.start for wall in course.walls])
+    ends = np.array([wall.end for wall in course.walls])
+    x, y = points[:, None, 0], points[:, None, 1]
+    (x0, y0), (x1, y1) = starts.T, ends.T
+    spans = (y0 > y) != (y1 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+    return (spans & (at > x)).sum(axis=1) % 2 == 1

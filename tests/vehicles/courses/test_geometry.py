@@ -88,13 +88,14 @@ def test_distances_are_those_of_the_nearest_points(seed: int) -> None:
     """Distances equal the nearest samples', and are 0 or less on overlap."""
     rng = np.random.default_rng(seed)
     one, other = _random_obstacle(rng), _random_obstacle(rng)
-    measured = _nearest(_samples(one), _samples(other))
-    assert max(obstacle_gap(one, other), 0.0) == pytest.approx(measured, abs=0.1)
-    assert obstacle_gap(one, other) == pytest.approx(obstacle_gap(other, one))
     piece = rng.uniform(-2.0, 2.0, (1, 4))
     line = piece[0, :2] + np.linspace(0, 1, 200)[:, None] * (piece[0, 2:] - piece[0, :2])
-    far = float(distances_from_obstacle(one, piece)[0])
-    assert max(far, 0.0) == pytest.approx(_nearest(_samples(one), line), abs=0.1)
+    assert obstacle_gap(one, other) == pytest.approx(obstacle_gap(other, one))
+    for found, points in (
+        (obstacle_gap(one, other), _samples(other)),
+        (float(distances_from_obstacle(one, piece)[0]), line),
+    ):
+        assert max(found, 0.0) == pytest.approx(_nearest(_samples(one), points), abs=0.1)
 
 
 def test_segments_that_share_an_end_do_not_cross() -> None:

@@ -41,41 +41,18 @@ def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
 
 
 def test_distances_are_those_to_the_walls() -> None:
-    """Distances agree with `distance_m`, and their sum across the lane with its width."""
+    """Across the lane, they add up to its width, in either direction."""
     with closing(RangesEnv("car")) as env:
         seen, _ = env.reset(options=_COURSE)
-        assert env.observation_space.contains(seen)
         distances = dict(zip(BEARINGS_DEG, seen, strict=False))
         assert distances[0] == pytest.approx(env.world.distance_m(), rel=0.1)
-        assert 0.1 < distances[90] < FARTHEST_M
-        assert 0.1 < distances[-90] < FARTHEST_M
+        assert 0.1 < min(distances[90], distances[-90])
         width = distances[90] + distances[-90]
+        assert width < FARTHEST_M
         pose = env.world.pose
         env.world.put(type(pose)(pose.x, pose.y, pose.heading + math.pi))
         turned = env.world.ranges_m(np.radians(BEARINGS_DEG))
         assert turned[0] + turned[-1] == pytest.approx(width, rel=0.3)
-
-
-def test_a_collision_costs_and_ends_the_episode() -> None:
-    ahead = np.array([0.0, 1.0], np.float32)
-    with closing(RangesEnv("car")) as env:
-        env.reset(options=_COURSE)
-        for _ in range(200):
-            _, reward, terminated, _, info = env.step(ahead)
-            if terminated:
-                break
-        assert info["collisions"] == 1
-        assert info["reward_terms"]["reward_collision"] == -3.0
-        assert reward == pytest.approx(sum(info["reward_terms"].values()))
-    with closing(RangesEnv("car", put_back=True)) as env:
-        env.reset(options=_COURSE)
-        costs = 0.0
-        for _ in range(200):
-            _, _, terminated, _, info = env.step(ahead)
-            costs += info["reward_terms"]["reward_collision"]
-            assert not terminated
-        assert info["collisions"] >= 2
-        assert costs == -3.0 * info["collisions"]
 
 
 def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
