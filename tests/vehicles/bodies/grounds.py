@@ -29,21 +29,9 @@ TO_THE_LEFT: Mapping[str, Mapping[str, float]] = {
 }
 
 
-def scaled(outputs: Mapping[str, float], factor: float) -> dict[str, float]:
-    """Return the outputs, scaled."""
-    return {part: factor * value for part, value in outputs.items()}
-
-
 @dataclass
 class Ground:
-    """A vehicle on flat ground or in water.
-
-    Attributes:
-        kind: Model of the vehicle.
-        model: Compiled scene.
-        data: State of the scene.
-        vehicle: The bound vehicle.
-    """
+    """A vehicle on flat ground or in water."""
 
     kind: VehicleModel
     model: mujoco.MjModel

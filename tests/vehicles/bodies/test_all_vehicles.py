@@ -11,7 +11,7 @@ import pytest
 from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
 from shapechanger.vehicles.bodies.parts import BATTERY_V
 from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
-from tests.vehicles.bodies.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground, scaled
+from tests.vehicles.bodies.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -46,12 +46,8 @@ def test_left_is_counter_clockwise(name: str) -> None:
     here.drive(3.0, TO_THE_LEFT[name])
     left = here.vehicle.motion().yaw_rate
     assert left > 0.1
-    mirrored = dict(TO_THE_LEFT[name])
-    for part in ("steering", "rudder"):
-        if part in mirrored:
-            mirrored[part] *= -1.0
-    if name == "tank":
-        mirrored = scaled(mirrored, -1.0)
+    turning = ("steering", "rudder", "left track", "right track")
+    mirrored = {part: -v if part in turning else v for part, v in TO_THE_LEFT[name].items()}
     here.vehicle.place(0.0, 0.0, 0.0)
     here.drive(3.0, mirrored)
     assert here.vehicle.motion().yaw_rate == pytest.approx(-left, rel=0.02)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import mujoco
 import pytest
@@ -13,11 +15,10 @@ from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR
 from tests.vehicles.bodies.grounds import TO_THE_LEFT, Ground, ground
 
 
-def test_an_unknown_name_is_refused() -> None:
+@pytest.mark.parametrize("make", [vehicle_model, partial(add_vehicle, mujoco.MjSpec())])
+def test_an_unknown_name_is_refused(make: Callable[[str], object]) -> None:
     with pytest.raises(UnknownName, match=r"Did you mean 'truck'\?"):
-        vehicle_model("truk")
-    with pytest.raises(UnknownName):
-        add_vehicle(mujoco.MjSpec(), "plane")
+        make("truk")
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
@@ -68,14 +69,13 @@ def test_progress_counts_laps_and_counts_down() -> None:
     assert metres == pytest.approx(-1.0, abs=0.2)
 
 
-_HOMES = {"car": "corridor", "tank": "corridor", "truck": "yard", "boat": "harbour"}
-_CASES = list(itertools.product(_HOMES, range(3)))
+_CASES = list(itertools.product(HOME, range(3)))
 
 
 def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
     """Return a course of the vehicle, its path, and the required clearance."""
     traits = TRAITS[vehicle]
-    course = lay_out(_HOMES[vehicle], seed)
+    course = lay_out(HOME[vehicle], seed)
     path = plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
     return course, path, traits.half_width_m + traits.margin_m
 
@@ -113,17 +113,11 @@ def _plug(course: Course, size: float) -> Course:
     return dataclasses.replace(course, obstacles=(*course.obstacles, obstacle))
 
 
-def test_a_blocked_lane_is_refused() -> None:
-    """The message names the width, the place and alternatives."""
-    with pytest.raises(WorldError, match=r"blocked for anything 0\.40 m wide .* another seed"):
-        plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1, comfort_m=0.3)
-
-
 def test_a_gap_is_found_until_it_is_too_narrow() -> None:
-    """A passage of 0.6 m fits a width of 0.5 m, not one of 0.7 m."""
+    """A passage of 0.6 m fits a width of 0.5 m, not one of 0.7 m; the error names the width."""
     course = _plug(ring(0, obstacles=0), 0.8)
     assert plan_path(course, 0.1, 0.15, comfort_m=0.45).clearance.min() >= 0.25
-    with pytest.raises(WorldError):
+    with pytest.raises(WorldError, match=r"blocked for anything 0\.70 m wide .* another seed"):
         plan_path(course, 0.1, 0.25, comfort_m=0.75)
 
 
@@ -189,39 +183,20 @@ def test_a_vehicle_recovers_from_a_wall(name: str, side: int) -> None:
         assert _progress_m(env, 20.0) > 0.4 * 20.0 * env.world.vehicle.top_speed_mps
 
 
-def pose_on(expert: CourseExpert, i: int) -> Pose:
-    """Return the pose at a point of the expert's path."""
-    x, y = expert.path.points[i].tolist()
-    return Pose(x, y, float(expert.path.heading[i]))
+def test_the_expert_backs_up_when_it_is_stuck() -> None:
+    """Recovery starts after 0.7 s of throttle without motion, and follows from the seed."""
 
+    def actions(seed: int) -> NDArray[np.float32]:
+        expert = CourseExpert(ring(1), "car", seed)
+        (x, y), heading = expert.path.points[0].tolist(), float(expert.path.heading[0])
+        return np.array([expert.act(Pose(x, y, heading), 0.0) for _ in range(120)])
 
-def test_it_backs_up_when_stuck() -> None:
-    """Recovery starts after 0.7 s of throttle without motion and ends by driving forward."""
-    course = ring(0)
-    expert = CourseExpert(course, "car")
-    pose = pose_on(expert, 0)
-    throttles = [float(expert.act(pose, 0.0)[1]) for _ in range(80)]
-    assert min(throttles[:14]) > 0.25
-    assert throttles[16] < 0
-    first_back = next(i for i, throttle in enumerate(throttles) if throttle < 0)
+    throttles = actions(0)[:, 1]
+    first_back = int((throttles < 0.0).argmax())
     assert 13 <= first_back <= 15
-    assert max(throttles[first_back + 10 :]) > 0.25
-
-
-def test_recovery_is_reproducible() -> None:
-    """Equal seeds give equal actions during recovery, and another seed differs."""
-    course = ring(1)
-
-    def track(seed: int) -> list[float]:
-        expert = CourseExpert(course, "car", seed)
-        pose = pose_on(expert, 0)
-        return [float(value) for _ in range(120) for value in expert.act(pose, 0.0)]
-
-    assert track(0) == track(0)
-    assert track(0) != track(1)
-
-
-def test_an_unknown_vehicle_is_refused() -> None:
-    """The error suggests the nearest name."""
+    assert throttles[:first_back].min() > 0.25
+    assert throttles[first_back + 10 :].max() > 0.25
+    np.testing.assert_array_equal(actions(0), actions(0))
+    assert (actions(0) != actions(1)).any()
     with pytest.raises(UnknownName, match="Did you mean 'truck'"):
         CourseExpert(ring(0), "trukc")
