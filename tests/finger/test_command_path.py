@@ -44,17 +44,20 @@ def _tensions(
     return np.array(seen)
 
 
-def test_without_limits_a_tension_follows_within_the_lag() -> None:
-    """A path changes only when tensions are computed, not what they are."""
-    seen = _tensions(_RIG.replace(path=CommandPath()), [0.5, 0.5])
+@pytest.mark.parametrize(("step", "lag_ms"), [(None, 9), (0.4, 20)])
+def test_a_tension_follows_within_the_lag(step: float | None, lag_ms: int) -> None:
+    """Tensions are rounded down to their resolution, as a servo rounds its current."""
+    path = CommandPath() if step is None else CommandPath(tension_step=step)
     asked = NOMINAL.least_tension + 0.75 * (_MOST[0] - NOMINAL.least_tension)
-    assert seen[8] == pytest.approx(asked, rel=1e-3)
-    assert seen[-1] == pytest.approx(asked, rel=1e-6)
+    expected = asked if step is None else step * np.floor(asked / step)
+    seen = _tensions(_RIG.replace(path=path), [0.5])
+    np.testing.assert_allclose(seen[lag_ms - 1 :], expected, rtol=1e-3)
 
 
 def test_a_delay_postpones_the_whole_response() -> None:
     """The response after 12 ms of delay is the prompt one, 12 ms later."""
-    rig = _RIG.replace(path=CommandPath(slew_per_s=20.0))
+    rig = _RIG.replace(path={"slew_per_s": 20.0})
+    assert FingerParameters.from_json(rig.to_json()) == rig
     prompt, late = (
         _tensions(rig.replace(command_delay=delay), [0.5, -0.5, 0.8]) for delay in (0.0, 0.012)
     )
@@ -69,13 +72,6 @@ def test_an_impedance_is_held_between_computations() -> None:
     ends = np.array([19, 39, 59, 79])
     assert np.abs(held[ends] - held[ends - 9]).max() < 0.01
     assert np.abs(prompt[ends] - prompt[ends - 9]).max() > 0.1
-
-
-def test_tensions_have_a_resolution() -> None:
-    """Tensions are rounded down, as a servo rounds its current."""
-    seen = _tensions(_RIG.replace(path=CommandPath(tension_step=0.4)), [0.5])
-    asked = NOMINAL.least_tension + 0.75 * (_MOST[0] - NOMINAL.least_tension)
-    assert seen[-1] == pytest.approx(0.4 * np.floor(asked / 0.4), rel=1e-6)
 
 
 def test_a_slew_on_one_side_rectifies_chatter() -> None:
@@ -111,13 +107,6 @@ def test_the_slew_is_the_guards(
     assert ours == pytest.approx(slewed_by_guard(action, now, aim, 0.01), abs=1e-12)
 
 
-def test_a_path_survives_json() -> None:
-    """The parameters of a rig are written and read with their path, also as a mapping."""
-    rig = _RIG.replace(path={"slew_per_s": 20.0})
-    assert rig.path == CommandPath(slew_per_s=20.0)
-    assert FingerParameters.from_json(rig.to_json()) == rig
-
-
 @pytest.mark.parametrize(
     ("values", "text"),
     [
@@ -126,24 +115,12 @@ def test_a_path_survives_json() -> None:
         ({"tick_hz": 75.0}, "tick_hz of a path must be a multiple of control_hz, got 75 and 50"),
         ({"tension_step": -0.1}, "tension_step of a path must be above zero"),
         ({"slew_per_s": "fast"}, "A command path is malformed: Expected"),
+        ({"slew_pr_s": 2.0}, "Did you mean 'slew_per_s'"),
+        # Computations must fit into a command, and simulation steps into a tick.
+        ({"control_hz": 25.0}, "control_hz of a path must be a multiple of 50"),
+        ({"control_hz": 50.0, "tick_hz": 300.0}, "tick_hz of a path must divide 1000"),
     ],
 )
 def test_bad_values_are_refused(values: dict[str, Any], text: str) -> None:
-    """The sentence names the value."""
-    with pytest.raises(FingerError, match=text):
-        NOMINAL.replace(path=values)
-    with pytest.raises(UnknownName, match="Did you mean 'slew_per_s'"):
-        NOMINAL.replace(path={"slew_pr_s": 2.0})
-
-
-@pytest.mark.parametrize(
-    ("path", "text"),
-    [
-        (CommandPath(control_hz=25.0), "control_hz of a path must be a multiple of 50"),
-        (CommandPath(control_hz=50.0, tick_hz=300.0), "tick_hz of a path must divide 1000"),
-    ],
-)
-def test_rates_that_do_not_fit_are_refused(path: CommandPath, text: str) -> None:
-    """Computations must fit into a command, and simulation steps into a tick."""
-    with pytest.raises(FingerError, match=text):
-        FingerPlant(_RIG.replace(path=path), drive_of("tension", NOMINAL))
+    with pytest.raises((FingerError, UnknownName), match=text):
+        FingerPlant(_RIG.replace(path=values), drive_of("tension", NOMINAL))

@@ -37,15 +37,12 @@ def test_omitted_parameters_are_nominal() -> None:
     ("changes", "sentence"),
     [
         ({"moment_arms": ((1.0,) * 4,) * 6}, r"moment_arms must be of shape \(7, 4\), finite, got"),
-        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms must be of shape"),
-        ({"most_tension": (25.0,)}, r"most_tension must be of shape \(7,\)"),
         ({"motor_lag": (1.0,)}, r"motor_lag must be of shape \(\)"),
         ({"joint_noise": math.nan}, "joint_noise must be of shape .* finite and not below zero"),
         ({"tendon_stiffness": math.inf}, "tendon_stiffness must be .* finite .* got inf"),
         ({"tendon_friction": -1.0}, "tendon_friction must be .* not below zero, got -1"),
         ({"motor_lag": 0.0}, "motor_lag must be above zero, got 0.0."),
         ({"motor_kg": "x"}, "motor_kg must be .*, got 'x'."),
-        ({"tendon_stiffness": 0.0}, "tendon_stiffness must be above zero"),
         ({"most_tension": (0.5,) * 7}, "most_tension must be above least_tension, 0.5 N"),
         ({"backlash": 1e-3}, "backlash needs a tendon_stiffness: a stiff tendon has none."),
     ],
@@ -60,11 +57,9 @@ def test_invalid_numbers_are_refused(changes: dict[str, Any], sentence: str) -> 
     ("text", "sentence"),
     [
         ("{", r"Invalid finger parameters: Input data was truncated\.$"),
-        ("[]", "Invalid finger parameters: Expected `object`, got `array`"),
         ('{"tendon_fricton": 1.0}', "unknown field `tendon_fricton`"),
         ('{"motor_lag": "slow"}', "Expected `float`, got `str`"),
         ('{"motor_lag": 0.0}', r"motor_lag must be above zero, got 0\.0\.$"),
-        (b"\xff", "Invalid finger parameters"),
     ],
 )
 def test_invalid_json_is_refused(text: str | bytes, sentence: str) -> None:

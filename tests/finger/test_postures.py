@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 import pytest
@@ -30,16 +32,16 @@ _STILL = np.zeros(4)
 _LOW, _HIGH = JOINT_RANGE.T
 
 
-def test_postures_are_away_from_limits_and_can_be_held() -> None:
-    """Targets and starts are 10 % of the range from the limits, balanced and varied."""
+@pytest.mark.parametrize("draw", [draw_posture, draw_start])
+def test_postures_are_away_from_limits_and_varied(draw: Callable[..., np.ndarray]) -> None:
+    """Targets and starts are 10 % of the range from the limits."""
     rng = np.random.default_rng(0)
     inner = 0.1 * (_HIGH - _LOW) - 1e-12
-    for draw in (draw_posture, draw_start):
-        postures = np.array([draw(rng) for _ in range(100)])
-        assert (postures >= _LOW + inner).all()
-        assert (postures <= _HIGH - inner).all()
-        assert all(can_hold(posture) for posture in postures)
-        assert (np.ptp(postures, axis=0) > 0.1).all()
+    postures = np.array([draw(rng) for _ in range(100)])
+    assert (postures >= _LOW + inner).all()
+    assert (postures <= _HIGH - inner).all()
+    assert all(can_hold(posture) for posture in postures)
+    assert (np.ptp(postures, axis=0) > 0.1).all()
 
 
 def test_every_posture_of_the_range_can_be_held() -> None:

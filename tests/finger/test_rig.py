@@ -60,23 +60,19 @@ def test_angles_follow_from_lengths_and_stretch() -> None:
     np.testing.assert_array_equal(seen.tensions, tensions)
 
 
-def test_tensions_become_shares_of_their_range() -> None:
+def test_tensions_become_shares_of_their_range_in_the_order_of_the_rig(tmp_path: Path) -> None:
     """The pretension and less is 0, the maximum and more is 1."""
-    senses = _senses()
-    np.testing.assert_array_equal(senses.values(np.zeros(7)), np.zeros(7))
-    np.testing.assert_array_equal(senses.values(np.full(7, 99.0)), np.ones(7))
-    middle = 0.5 * (senses.least + senses.most)
-    np.testing.assert_allclose(senses.values(middle), np.full(7, 0.5), atol=1e-6)
-    assert (senses.most <= MOST_TENSION_N + 1e-9).all()
-
-
-def test_the_order_is_that_of_the_rig(tmp_path: Path) -> None:
-    """Values are in the order of the profile's tendons."""
     text = find_profile("finger").read_text()
     begin, end = text.index("[action.FDP]"), text.index("[action.FDS]")
     moved = text[:begin] + text[end:] + "\n" + text[begin:end]
-    profile = read_profile(moved, tmp_path / "it.toml")
-    senses = _senses_of(profile)
+    senses = _senses_of(read_profile(moved, tmp_path / "it.toml"))
+    for tensions, share in (
+        (np.zeros(7), 0.0),
+        (np.full(7, 99.0), 1.0),
+        (0.5 * (senses.least + senses.most), 0.5),
+    ):
+        np.testing.assert_allclose(senses.values(tensions), np.full(7, share), atol=1e-6)
+    assert (senses.most <= MOST_TENSION_N + 1e-9).all()
     tensions = senses.least.copy()
     tensions[TENDONS.index("FDP")] = 99.0
     assert senses.values(tensions).tolist() == [0.0] * 6 + [1.0]

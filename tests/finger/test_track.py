@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path as File
 
 import numpy as np
@@ -10,15 +11,11 @@ import pytest
 
 from shapechanger.errors import PathError, UnknownName
 from shapechanger.finger.anatomy import JOINT_REST
-from shapechanger.finger.paths import KINDS, circle, from_callable
+from shapechanger.finger.paths import KINDS, circle
 from shapechanger.finger.postures import angles_for
 from shapechanger.finger.track import PREVIEW_S, FingerTrackEnv, draw_path, require_reachable
 
 _NOTHING = np.zeros(7, np.float32)
-# A reachable path of 1.5 s along x.
-_TABLE = "t,x,y,z\n" + "".join(
-    f"{0.1 * i:.1f},{0.045 + 0.001 * i:.4f},0,-0.045\n" for i in range(16)
-)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -57,20 +54,15 @@ def test_the_rms_error_starts_after_half_a_second() -> None:
     env = FingerTrackEnv()
     _, info = env.reset(seed=0)
     assert info["rms"] == math.inf
-    distances = []
-    for step in range(1, 41):
-        _, reward, terminated, _, info = env.step(_NOTHING)
-        assert not terminated
-        assert reward == sum(info[f"reward_{term}"] for term in ("nearness", "effort", "change"))
-        true = math.dist(env.plant.fingertip, info["target"])
-        assert info["distance"] == pytest.approx(true)
+    distances: list[float] = []
+    for _ in range(40):
+        *_, info = env.step(_NOTHING)
         distances.append(info["distance"])
-        if step <= 25:
-            assert info["rms"] == math.inf
-            assert not info["is_success"]
-        else:
-            assert info["rms"] == pytest.approx(np.sqrt(np.mean(np.square(distances[25:]))))
-            assert info["is_success"] == (info["rms"] < 0.003)
+        assert distances[-1] == pytest.approx(math.dist(env.plant.fingertip, info["target"]))
+        late = distances[25:]
+        expected = np.sqrt(np.mean(np.square(late))) if late else math.inf
+        assert info["rms"] == pytest.approx(expected)
+        assert info["is_success"] == (info["rms"] < 0.003)
     assert env.reset(seed=0)[1]["rms"] == math.inf
 
 
@@ -84,11 +76,9 @@ def test_a_path_that_leaves_the_workspace_is_refused(
     path = circle(0.012, place, hz=1.5)
     with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
-    text = str(caught.value).split()
-    beyond_mm = float(text[text.index("beyond.") - 2])
-    assert beyond[0] < beyond_mm < beyond[1]
-    at = float(text[text.index("s") - 1])
-    x, y, z = (float(word.strip("(),")) for word in text[text.index("mm,") - 3 :][:3])
+    pattern = r"at ([\d.]+) s it is at \((.*), (.*), (.*)\) mm.* ([\d.]+) mm beyond\."
+    at, x, y, z, far = (float(number) for number in re.findall(pattern, str(caught.value))[0])
+    assert beyond[0] < far < beyond[1]
     np.testing.assert_allclose([x, y, z], 1e3 * path.at(at), atol=1.0)
 
 
@@ -104,33 +94,13 @@ def test_a_path_that_is_too_fast_is_refused() -> None:
 def test_a_file_can_be_followed(tmp_path: File) -> None:
     """The target follows the file and stays at its last point."""
     file = tmp_path / "tip.csv"
-    file.write_text(_TABLE)
+    file.write_text("t,x,y,z\n0,0.045,0,-0.045\n0.75,0.0525,0,-0.045\n1.5,0.060,0,-0.045\n")
     env = FingerTrackEnv(path=str(file))
-    file.write_text(_TABLE.replace("0.0500", "nan"))
-    with pytest.raises(PathError, match="four finite numbers are due"):
-        FingerTrackEnv(path=str(file))
     _, info = env.reset(seed=5)
     np.testing.assert_allclose(info["target"], [0.045, 0.0, -0.045], atol=1e-9)
     for _ in range(80):
         _, _, _, _, info = env.step(_NOTHING)
     np.testing.assert_allclose(info["target"], [0.060, 0.0, -0.045], atol=1e-9)
-
-
-def test_a_function_of_time_can_be_followed() -> None:
-    """Endless functions are accepted; one that leaves the workspace is refused."""
-
-    def swaying(t: float) -> tuple[float, float, float]:
-        return 0.05 + 0.005 * math.sin(t), 0.0, -0.045
-
-    env = FingerTrackEnv(path=swaying)
-    _, info = env.reset(seed=0)
-    np.testing.assert_allclose(info["target"], [0.05, 0.0, -0.045])
-
-    def leaving(t: float) -> tuple[float, float, float]:
-        return 0.05 + 0.1 * t, 0.0, -0.045
-
-    with pytest.raises(PathError, match=r"at 0.60 s it is at \(110.0, 0.0, -45.0\) mm"):
-        FingerTrackEnv(path=from_callable(leaving, duration_s=0.6))
 
 
 def test_another_path_can_be_given_at_a_reset() -> None:

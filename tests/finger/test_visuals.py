@@ -34,62 +34,43 @@ def test_anatomy_does_not_change_the_simulation(parameters: FingerParameters, mo
     np.testing.assert_array_equal(*found)
 
 
-def _stops(model: mujoco.MjModel, course: str) -> list[tuple[str, int]]:
-    """Return body and number of each site of a route, from the wrist on."""
-    tendon = model.tendon(course).id
-    start, n = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
-    return [
-        (model.body(int(model.site_bodyid[site])).name, int(site))
-        for kind, site in zip(
-            model.wrap_type[start : start + n], model.wrap_objid[start : start + n], strict=True
-        )
-        if kind == mujoco.mjtWrap.mjWRAP_SITE
-    ]
+_INSERTIONS = dict.fromkeys(TENDONS, "distal") | {"FDS": "middle", "DI": "proximal"}
 
 
-@pytest.mark.parametrize(
-    ("tendon", "ends_at"),
-    [
-        ("FDP", "distal"),
-        ("FDS", "middle"),
-        ("EIP", "distal"),
-        ("EDC", "distal"),
-        ("LUM", "distal"),
-        ("DI", "proximal"),
-        ("PI", "distal"),
-    ],
-)
-def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
+@pytest.mark.parametrize("tendon", TENDONS)
+def test_each_tendon_ends_at_its_bone(tendon: str) -> None:
     """Routes start in the hand, pass the bones in order and end at the insertion."""
     model = made(anatomy=True)
     order = ["hand", "proximal", "middle", "distal"]
     for course in route_names(tendon):
-        bodies = [body for body, _ in _stops(model, course)]
-        assert bodies[0] == "hand"
-        assert bodies[-1] == ends_at
-        assert bodies == sorted(bodies, key=order.index)
+        number = model.tendon(course).id
+        places = slice(
+            model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]
+        )
+        sites = model.wrap_objid[places][model.wrap_type[places] == mujoco.mjtWrap.mjWRAP_SITE]
+        bodies = [order.index(model.body(model.site_bodyid[site]).name) for site in sites]
+        assert bodies == sorted(bodies)
+        assert (bodies[0], order[bodies[-1]]) == (0, _INSERTIONS[tendon])
 
 
 def test_routes_agree_with_the_moment_arms() -> None:
     """Routes shorten with their fixed tendons, for arms above 2.5 mm."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
-    arms = []
-    for sign in (1.0, -1.0):
-        lengths = []
-        for j in range(len(JOINTS)):
-            data.qpos[:] = JOINT_REST
-            data.qpos[j] += sign * 0.05
-            mujoco.mj_forward(model, data)
-            lengths.append([data.ten_length[model.tendon(f"{t}/course").id] for t in TENDONS])
-        arms.append(np.array(lengths).T)
-    shown = (arms[1] - arms[0]) / 0.1
-    true = NOMINAL.arms
-    large = np.abs(true) > 2.5e-3
+    routes = [model.tendon(f"{tendon}/course").id for tendon in TENDONS]
+
+    def lengths(j: int, angle: float) -> np.ndarray:
+        data.qpos[:] = JOINT_REST
+        data.qpos[j] += angle
+        mujoco.mj_forward(model, data)
+        return data.ten_length[routes].copy()
+
+    shown = np.stack([lengths(j, -0.05) - lengths(j, 0.05) for j in range(len(JOINTS))], axis=1)
+    large = np.abs(NOMINAL.arms) > 2.5e-3
     # FDP and FDS are routed through the middle of the knuckle; their arms are slightly ulnar.
     large[:2, 1] = False
     assert large.sum() == 12
-    np.testing.assert_array_equal(np.sign(shown[large]), np.sign(true[large]))
+    np.testing.assert_array_equal(np.sign(shown[large]), np.sign(NOMINAL.arms[large]))
 
 
 def test_tendon_colours_are_distinct() -> None:

@@ -44,61 +44,60 @@ def with_row(name: str, row: int, value: float) -> dict[str, Any]:
         (with_row("t", 20, 0.1), r"backwards in row 20 .* 0\.100 s comes after 0\.380 s"),
         ({"t": 0.02 * np.r_[:100, 150:350]}, r"every 20 ms, .* none between 1\.980 s and 3\.000 s"),
         ({"lengths": np.zeros((300, 6))}, r"lengths must have the shape \(300, 7\), got \(300, 6"),
-        ({"t": np.zeros((300, 1))}, r"t must have the shape \(300,\), got \(300, 1\)"),
         ({"control_dt": 0.0}, r"control_dt must be above 0 s and finite, got 0\.0"),
-        ({"control_dt": math.inf}, "control_dt must be above 0 s and finite, got inf"),
+        ({"actions": "tensions"}, "Did you mean 'tension'"),
     ],
 )
 def test_invalid_logs_are_rejected(changes: dict[str, Any], sentence: str) -> None:
     """The message names the signal and the row."""
-    with pytest.raises(FingerError, match=sentence):
+    with pytest.raises((FingerError, UnknownName), match=sentence):
         changed(made_up(), **changes)
 
 
-def only(joint: int, factor: float) -> FingerLog:
-    """Return the synthetic log with the motion of one joint scaled."""
-    log = made_up()
-    return changed(log, angles=log.angles * np.where(np.arange(4) == joint, factor, 1.0))
-
-
-def test_limits_of_informative_logs() -> None:
-    """A log needs 4 s, to half a period, and a range of 10 degrees per joint."""
-    require_informative(made_up(201))
-    with pytest.raises(FingerError, match="at least 4 s"):
-        require_informative(made_up(200))
-    low, high = np.percentile(made_up().angles[:, 0], [5.0, 95.0])
-    degrees = math.degrees(high - low)
-    require_informative(only(0, 10.1 / degrees))
-    with pytest.raises(FingerError, match=r"MCP_flexion moved by 9\.9 degrees only; .* least 10"):
-        require_informative(only(0, 9.9 / degrees))
-
-
-@pytest.mark.parametrize(("own", "passes"), [(2.1, True), (1.9, False)])
-def test_a_joint_must_move_on_its_own_by_two_degrees(own: float, passes: bool) -> None:
-    """The standard deviation that other joints do not explain must be 2 degrees."""
+def coupled(own_deg: float) -> FingerLog:
+    """Return the synthetic log, whose last joint moves with another, and by itself this much."""
     log = made_up()
     others, fresh = log.angles[:, :3] - log.angles[:, :3].mean(axis=0), log.angles[:, 3]
     fresh = fresh - fresh.mean()
     fresh = fresh - others @ np.linalg.lstsq(others, fresh)[0]
-    coupled = log.angles.copy()
-    coupled[:, 3] = 0.6 * others[:, 2] + math.radians(own) * fresh / fresh.std()
-    if passes:
-        require_informative(changed(log, angles=coupled))
-    else:
-        with pytest.raises(FingerError, match="flexion moved only along with the other joints"):
-            require_informative(changed(log, angles=coupled))
+    angles = log.angles.copy()
+    angles[:, 3] = 0.6 * others[:, 2] + math.radians(own_deg) * fresh / fresh.std()
+    return changed(log, angles=angles)
+
+
+def knuckle(degrees: float) -> FingerLog:
+    """Return the synthetic log, in which the first joint has a range."""
+    log = made_up()
+    low, high = np.percentile(log.angles[:, 0], [5.0, 95.0])
+    factor = degrees / math.degrees(high - low)
+    return changed(log, angles=log.angles * (factor, 1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("enough", "less", "sentence"),
+    [
+        (made_up(201), made_up(200), "at least 4 s"),
+        (knuckle(10.1), knuckle(9.9), r"MCP_flexion moved by 9\.9 degrees only; .* least 10"),
+        (coupled(2.1), coupled(1.9), "flexion moved only along with the other joints"),
+    ],
+    ids=["duration", "range", "independence"],
+)
+def test_limits_of_informative_logs(enough: FingerLog, less: FingerLog, sentence: str) -> None:
+    """A log needs 4 s, to half a period, and a range of 10 degrees per joint.
+
+    The standard deviation that other joints do not explain must be 2 degrees.
+    """
+    require_informative(enough)
+    with pytest.raises(FingerError, match=sentence):
+        identify(less)
 
 
 def test_clocks_may_jitter_by_half_a_period() -> None:
-    """Steps of up to 1.5 periods are accepted; longer ones are gaps. Modes are known ones."""
+    """Steps of up to 1.5 periods are accepted; longer ones are gaps."""
     t = made_up().t
     changed(made_up(), t=np.where(t > 1.0, t + 0.0099, t))
     with pytest.raises(FingerError, match="has a gap"):
         changed(made_up(), t=np.where(t > 1.0, t + 0.0101, t))
-    with pytest.raises(UnknownName, match="Did you mean 'tension'"):
-        changed(made_up(), actions="tensions")
-    with pytest.raises(FingerError, match=r"3\.0 s long; identification needs at least 4 s"):
-        identify(made_up(151))
 
 
 DAMAGED = "is damaged, or not a finger log; `shapechanger finger record` writes one"
@@ -154,10 +153,10 @@ def rewritten(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> Non
         ({"version": 9}, {}, "9 - at `\\$.version`"),
         ({"control_dt": "x"}, {}, "Expected `float`, got `str`"),
         ({"joints": ["thumb"]}, {}, "its joints and tendons are thumb, FDP"),
-        ({"tendons": []}, {}, "its joints and tendons are MCP_flexion"),
         ({"motors": {"motor_kg": -1.0}}, {}, "motor_kg must be"),
         ({}, {"commands": None}, "commands"),
         ({}, {"angles": np.array(["x"])}, "could not convert string"),
+        ({}, {"t": np.zeros((3, 1))}, r"t must have the shape \(3,\), got \(3, 1\)"),
     ],
 )
 def test_other_archives_are_refused(
@@ -166,15 +165,11 @@ def test_other_archives_are_refused(
     """Other formats, later versions, other fingers, and missing or invalid arrays."""
     path = tmp_path / "log.npz"
     rewritten(path, header, arrays)
-    with pytest.raises(FingerError, match=f"{DAMAGED}: .*{sentence}"):
+    with pytest.raises(FingerError, match=sentence):
         load_log(path)
 
 
 def test_a_log_of_an_old_version_knows_no_motors(tmp_path: Path) -> None:
-    """A header without motors reads; arrays of other shapes are a log's own error."""
     path = tmp_path / "log.npz"
     rewritten(path, {"motors": None}, {})
     assert load_log(path).motors is None
-    rewritten(path, {}, {"t": np.zeros((3, 1))})
-    with pytest.raises(FingerError, match=r"t must have the shape \(3,\), got \(3, 1\)"):
-        load_log(path)

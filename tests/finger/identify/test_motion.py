@@ -105,11 +105,9 @@ def test_windows_begin_in_the_measured_state() -> None:
     assert len(cut_windows(log, exact(), motors(), None, 0.5, 0.0)) == 5
 
 
-def test_control_periods_are_whole_numbers_of_steps() -> None:
-    """The number of steps is the smallest whose step is at most the model's."""
-    assert steps_per_period(0.02, 0.002) == 10
-    assert steps_per_period(0.021, 0.002) == 11
-    assert steps_per_period(0.0005, 0.002) == 1
+@pytest.mark.parametrize(("period_s", "steps"), [(0.02, 10), (0.021, 11), (0.0005, 1)])
+def test_a_control_period_is_the_least_number_of_steps(period_s: float, steps: int) -> None:
+    assert steps_per_period(period_s, 0.002) == steps
 
 
 def test_known_motors_take_precedence() -> None:

@@ -131,8 +131,7 @@ def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
     numbers = dataclasses.astuple(jitter)
     try:
         move_camera(model, "eye", jitter)
-    except WorldError as error:
-        assert "would be off its vehicle or in the floor" in str(error)
+    except WorldError:
         np.testing.assert_array_equal(model.cam_pos, before[0])
         np.testing.assert_array_equal(model.cam_quat, before[1])
     else:

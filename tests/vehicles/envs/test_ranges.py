@@ -46,7 +46,7 @@ def test_distances_are_those_to_the_walls() -> None:
         seen, _ = env.reset(options=_COURSE)
         distances = dict(zip(BEARINGS_DEG, seen, strict=False))
         assert distances[0] == pytest.approx(env.world.distance_m(), rel=0.1)
-        assert 0.1 < min(distances[90], distances[-90])
+        assert min(distances[90], distances[-90]) > 0.1
         width = distances[90] + distances[-90]
         assert width < FARTHEST_M
         pose = env.world.pose

@@ -225,5 +225,5 @@ def test_shifts_without_another_vehicle() -> None:
         assert shift.changes == ()
         assert not shift.is_empty
         for source, target in ((car, pole), (pole, car)):
-            with pytest.raises(MorphologyError, match="is not a vehicle|has no model"):
+            with pytest.raises(MorphologyError, match=r"is not a vehicle|has no model"):
                 source.unwrapped.certify_shift(source, target)  # pyright: ignore[reportAttributeAccessIssue]
